@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
@@ -38,9 +39,16 @@ bool ActsAlone(What what) {
          what == What::kDelay || what == What::kError || what == What::kBabble;
 }
 
+// In quotes, with what is not printable escaped, and cut to a length fit for a message.
+std::string Shown(std::string_view text) {
+  constexpr size_t kMost = 64;  // bytes of the text
+  return absl::StrCat("\"", absl::CHexEscape(std::string(text.substr(0, kMost))),
+                      text.size() > kMost ? "…\"" : "\"");
+}
+
 absl::StatusOr<Fault> ParseFault(std::string_view text) {
   const auto bad = [&](const char* what) {
-    return absl::InvalidArgumentError(absl::StrCat("fault \"", std::string(text), "\": ", what,
+    return absl::InvalidArgumentError(absl::StrCat("fault ", Shown(text), ": ", what,
                                                    "; it is WHAT[:AMOUNT]@WHEN[/in], such as ",
                                                    "unplug:500@2000ms or stall@t10"));
   };

@@ -140,9 +140,11 @@ class Connection final : public WorkerConnection {
 
   absl::Status TakeSegment(Message& message) {
     const auto named = message.As<SegmentMessage>();
-    const int fd = std::exchange(message.fd, -1);
-    if (!named.has_value() || fd < 0) return absl::InvalidArgumentError("a segment without memory");
-    absl::StatusOr<std::shared_ptr<Segment>> segment = Segment::Adopt(fd, named->size);
+    if (!named.has_value() || message.fd < 0) {
+      return absl::InvalidArgumentError("a segment without memory");
+    }
+    absl::StatusOr<std::shared_ptr<Segment>> segment =
+        Segment::Adopt(std::exchange(message.fd, -1), named->size);
     if (!segment.ok()) return absl::InvalidArgumentError(segment.status().message());
     Mapped& mapped = segments_[named->segment];
     mapped.segment = *std::move(segment);
@@ -161,9 +163,11 @@ class Connection final : public WorkerConnection {
 
   absl::Status TakeBulkSegment(Message& message) {
     const auto named = message.As<BulkSegmentMessage>();
-    const int fd = std::exchange(message.fd, -1);
-    if (!named.has_value() || fd < 0) return absl::InvalidArgumentError("a segment without memory");
-    absl::StatusOr<std::shared_ptr<Segment>> segment = Segment::AdoptReadOnly(fd, named->size);
+    if (!named.has_value() || message.fd < 0) {
+      return absl::InvalidArgumentError("a segment without memory");
+    }
+    absl::StatusOr<std::shared_ptr<Segment>> segment =
+        Segment::AdoptReadOnly(std::exchange(message.fd, -1), named->size);
     if (!segment.ok()) return absl::InvalidArgumentError(segment.status().message());
     if (hooks_.pin_read_only) hooks_.pin_read_only((*segment)->bytes());
     bulk_.segments[named->segment] = *std::move(segment);

@@ -250,5 +250,22 @@ TEST(FaultPlan, IsReadAndRefused) {
   }
 }
 
+TEST(FaultPlan, WhatIsWrongIsShownEscapedAndNotAtLength) {
+  const auto control = ParseFaultPlan("t\001y\"\xffvalue\n");
+  EXPECT_TRUE(std::string(control.status().message())
+                  .starts_with("fault \"t\\x01y\\\"\\xffvalue\\n\": there is no '@'"))
+      << control.status();
+  const std::string longest(64, 'a');
+  for (const char* rest : {"@t1", "@t1;stall@t1", ""}) {
+    const auto whole = ParseFaultPlan(longest.substr(0, 61) + rest);
+    EXPECT_NE(std::string(whole.status().message()).find("\": there is no"), std::string::npos);
+    EXPECT_EQ(std::string(whole.status().message()).find("…"), std::string::npos);
+  }
+  const auto cut = ParseFaultPlan(longest + std::string(100'000, 'b'));
+  EXPECT_TRUE(std::string(cut.status().message())
+                  .starts_with("fault \"" + longest + "…\": there is no '@'"))
+      << cut.status();
+}
+
 }  // namespace
 }  // namespace voxeld::display::emulator

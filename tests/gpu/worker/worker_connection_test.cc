@@ -45,6 +45,15 @@ class WorkerConnectionTest : public ::testing::Test {
     if (!answer.ok()) return absl::InternalError("no answer");
     return answer->type == MessageType::kDone ? StatusOf(*answer) : absl::OkStatus();
   }
+  // Of a message with a descriptor.
+  void ExpectRefusedAndClosed(Message message) {
+    message.fd = dup(ends_[0]);
+    const int descriptor = message.fd;
+    ASSERT_GE(descriptor, 0);
+    EXPECT_EQ(connection_->Handle(message).code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_LT(message.fd, 0);
+    EXPECT_EQ(fcntl(descriptor, F_GETFD), -1);
+  }
   void Open(EngineKind kind, SlicePart part = {}) {
     OpenMessage open;
     open.kind = kind;
@@ -119,12 +128,20 @@ TEST_F(WorkerConnectionTest, MoreVoxelsThanCanBeCountedInBytesAreInNoSegment) {
 
 TEST_F(WorkerConnectionTest, ADescriptorThatNobodyAskedForIsClosed) {
   Open(EngineKind::kCpu);
-  Message message = MakeMessage(MessageType::kDropSegment, 0, SegmentMessage{});
-  message.fd = dup(ends_[0]);
-  const int descriptor = message.fd;
-  EXPECT_FALSE(connection_->Handle(message).ok());
-  EXPECT_LT(message.fd, 0);
-  EXPECT_EQ(fcntl(descriptor, F_GETFD), -1);
+  ExpectRefusedAndClosed(MakeMessage(MessageType::kDropSegment, 0, SegmentMessage{}));
+}
+
+TEST_F(WorkerConnectionTest, ADescriptorWithAMessageThatIsTooShortIsClosed) {
+  for (const MessageType type : {MessageType::kSegment, MessageType::kBulkSegment}) {
+    Message message;
+    message.type = type;
+    ExpectRefusedAndClosed(message);
+  }
+}
+
+TEST_F(WorkerConnectionTest, ADescriptorThatIsNoSegmentIsClosed) {
+  ExpectRefusedAndClosed(MakeMessage(MessageType::kSegment, 0, SegmentMessage{1, 0, 4096}));
+  ExpectRefusedAndClosed(MakeMessage(MessageType::kBulkSegment, 0, BulkSegmentMessage{1, 4096}));
 }
 
 }  // namespace

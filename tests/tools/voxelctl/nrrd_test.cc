@@ -13,6 +13,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
@@ -136,6 +137,23 @@ TEST_F(Volumes, NrrdThatIsWrong) {
   }
   EXPECT_THAT(Error("a.nhdr", head + "encoding: raw\ndata file: gone.raw\n"),
               HasSubstr("a.nhdr: has \"gone.raw\" for \"datafile\"; No such file"));
+}
+
+// Steps that span a volume, and so long that no number says where it ends.
+TEST_F(Volumes, NrrdThatEndsNowhere) {
+  const auto place = [](const char* directions, const char* origin) {
+    return absl::StrCat(
+        "NRRD0004\ntype: uchar\nencoding: raw\ndimension: 3\nsizes: 2 1 2\nspace: LPS\n",
+        "space directions: ", directions, "\nspace origin: ", origin, "\n\n1234");
+  };
+  EXPECT_THAT(
+      Error("a.nrrd", place("(5e307,0,0) (0,1,0) (0,0,1)", "(1.2e308,0,0)")),
+      AllOf(HasSubstr("a.nrrd: has a corner at (inf, "), HasSubstr("by steps of (5e+307, 0, 0), "),
+            HasSubstr("corners at finite places are expected")));
+  EXPECT_THAT(Error("a.nrrd", place("(1e200,0,0) (0,1e-200,0) (0,0,1)", "(0,0,0)")),
+              HasSubstr("corners at finite places are expected"));
+  EXPECT_THAT(Read("a.nrrd", place("(1e150,0,0) (0,1e150,0) (0,0,1)", "(0,0,0)")).size,
+              ElementsAre(2, 1, 2));
 }
 
 TEST_F(Volumes, RawAsItIsTold) {

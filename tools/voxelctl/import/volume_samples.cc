@@ -139,6 +139,14 @@ absl::Status PlaceVolume(const SourceFile& file, const Point3& first,
       at.y += steps[axis].y * along;
       at.z += steps[axis].z * along;
     }
+    if (!std::isfinite(at.x) || !std::isfinite(at.y) || !std::isfinite(at.z)) {
+      return FileError(file,
+                       absl::StrCat("has a corner at (", at.x, ", ", at.y, ", ", at.z,
+                                    "), by steps of (", a.x, ", ", a.y, ", ", a.z, "), (", b.x,
+                                    ", ", b.y, ", ", b.z, ") and (", c.x, ", ", c.y, ", ", c.z,
+                                    ") from (", first.x, ", ", first.y, ", ", first.z, ")"),
+                       "corners at finite places are expected");
+    }
     volume->corners[corner] = at;
   }
   return absl::OkStatus();
