@@ -95,8 +95,12 @@ void FirmwareDevice::DeliverEvents() {
     const Waiting urb = interrupt_.front();
     interrupt_.pop_front();
     const std::span<const std::byte> bytes = std::as_bytes(std::span(event, length));
-    complete_(urb.id, length < urb.length ? TransferStatus::kShort : TransferStatus::kOk,
-              static_cast<uint32_t>(length), bytes.first(std::min<size_t>(length, urb.length)));
+    const size_t count = std::min<size_t>(length, urb.length);
+    complete_(urb.id,
+              length > urb.length   ? TransferStatus::kOverflow
+              : length < urb.length ? TransferStatus::kShort
+                                    : TransferStatus::kOk,
+              static_cast<uint32_t>(count), bytes.first(count));
   }
 }
 

@@ -12,6 +12,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <variant>
 #include <vector>
 
@@ -116,6 +117,43 @@ TEST(Firmware, AnswersThePagesExampleWithThePagesBytes) {
   const uint8_t* const light = voxlink_light(&device);
   ASSERT_NE(light, nullptr);
   EXPECT_EQ(std::vector<uint8_t>(light, light + 12), FromHex("FF0000 00FF00 0000FF FFFFFF"));
+}
+
+// The stack around the device does as the emulator: an event that a read has no room for is more than was asked for.
+TEST(Firmware, AnEventThatItsReadHasNoRoomForOverflows) {
+  sync::FakeClock clock;
+  const auto device = Make(Emulated({}).config, clock);
+  std::vector<std::tuple<uint64_t, TransferStatus, uint32_t, size_t>> done;
+  device->SetComplete(
+      [&](uint64_t id, TransferStatus status, uint32_t actual, std::span<const std::byte> in) {
+        done.emplace_back(id, status, actual, in.size());
+      });
+  const auto read = [&](uint64_t id, uint32_t room) {
+    Urb urb;
+    urb.id = id;
+    urb.endpoint = voxlink::kInterruptIn;
+    urb.length = room;
+    device->Submit(urb);
+  };
+  const auto start = [&](uint64_t id) {
+    Urb urb;
+    urb.id = id;
+    urb.setup = {.request_type = voxlink::kRequestOut,
+                 .request = static_cast<uint8_t>(voxlink::Request::kStart)};
+    device->Submit(urb);
+  };
+  // READY has 32 bytes.
+  for (const auto& [room, status, size] :
+       {std::tuple{5u, TransferStatus::kOverflow, 5u},
+        std::tuple{31u, TransferStatus::kOverflow, 31u}, std::tuple{32u, TransferStatus::kOk, 32u},
+        std::tuple{64u, TransferStatus::kShort, 32u}}) {
+    done.clear();
+    start(1);
+    read(2, room);
+    ASSERT_EQ(done.size(), 2u) << room;
+    EXPECT_EQ(done[0], std::tuple(uint64_t{1}, TransferStatus::kOk, 0u, size_t{0}));
+    EXPECT_EQ(done[1], std::tuple(uint64_t{2}, status, size, size_t{size}));
+  }
 }
 
 // ---- a host that means harm
