@@ -122,7 +122,7 @@ TEST(Firmware, AnswersThePagesExampleWithThePagesBytes) {
 // The stack around the device does as the emulator: an event that a read has no room for is more than was asked for.
 TEST(Firmware, AnEventThatItsReadHasNoRoomForOverflows) {
   sync::FakeClock clock;
-  const auto device = Make(Emulated({}).config, clock);
+  const auto device = Make(Emulated({{"size", "1x1x1"}}).config, clock);
   std::vector<std::tuple<uint64_t, TransferStatus, uint32_t, size_t>> done;
   device->SetComplete(
       [&](uint64_t id, TransferStatus status, uint32_t actual, std::span<const std::byte> in) {
