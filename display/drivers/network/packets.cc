@@ -23,7 +23,8 @@ uint32_t Get(View in, size_t at, size_t bytes) {
 }
 
 void PutBytes(Bytes& out, size_t at, std::span<const uint8_t> bytes) {
-  std::memcpy(out.data() + at, bytes.data(), bytes.size());
+  std::transform(bytes.begin(), bytes.end(), out.begin() + static_cast<std::ptrdiff_t>(at),
+                 [](uint8_t byte) { return std::byte{byte}; });
 }
 
 // `in`: no shorter.

@@ -21,10 +21,11 @@ using google::protobuf::Message;
 using ::testing::HasSubstr;
 
 MaybeFault FaultOf(const v1::Primitive& primitive) {
-  static text::Fonts* const fonts = new text::Fonts();
+  static text::Fonts fonts;
   const Limits limits;
   Content content;
-  return ToContent(FieldPath("primitive"), primitive, {.limits = limits, .fonts = fonts}, &content);
+  return ToContent(FieldPath("primitive"), primitive, {.limits = limits, .fonts = &fonts},
+                   &content);
 }
 
 // visit(message, field, index or -1, path) for each scalar of `root` that is set, or that has no presence; messages that are absent are

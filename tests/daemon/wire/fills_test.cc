@@ -24,9 +24,9 @@ using ::testing::StartsWith;
 
 MaybeFault FaultOf(const v1::Primitive& primitive, Content* content, gpu::BulkPool* pool = nullptr,
                    const Limits& limits = {}) {
-  static text::Fonts* const fonts = new text::Fonts();
+  static text::Fonts fonts;
   return ToContent(FieldPath("primitive"), primitive,
-                   {.limits = limits, .pool = pool, .fonts = fonts}, content);
+                   {.limits = limits, .pool = pool, .fonts = &fonts}, content);
 }
 
 std::string KindOf(const v1::Primitive& primitive) {
