@@ -411,13 +411,13 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
     supervisor.Ready(displays_text);
     signal = 0;
   }
+  end_limit.emplace(kEndLimit);
   reloads = nullptr;
   watchdog.reset();
   supervisor.Stopping();
   ticker.reset();
   security->access().SetOnChange(nullptr);
   log.Info("shutting down", {{"signal", signal == SIGTERM ? "SIGTERM" : "SIGINT"}});
-  end_limit.emplace(kEndLimit);
   *draining = true;
   watch.Tell(nullptr);
   if (play.player != nullptr) play.player->End();

@@ -91,8 +91,8 @@ bool MemoryReserve::Fill(size_t bytes) {
     }
 #endif
     if (part == nullptr) return false;
+    ++held_;  // first: somebody may give it up at once
     parts_[i] = part;
-    ++held_;
   }
   said_ = false;
   return true;
@@ -121,7 +121,8 @@ bool MemoryReserve::Help(size_t bytes, unsigned attempt) noexcept {
     last_bytes_ = bytes;
   }
   // What is larger than all of it cannot be helped by it.
-  bool help = bytes <= held_.load() * kPartBytes && GiveUpOne();
+  const size_t held = held_.load();
+  bool help = held > 0 && bytes <= held * kPartBytes && GiveUpOne();
   if (!help && giving_.load() > 0) {
     sched_yield();
     help = true;

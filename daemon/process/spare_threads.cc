@@ -121,10 +121,8 @@ absl::Status SpareThreads::Begin(int count) {
 
 uint64_t SpareThreads::Refill() {
   Pool& pool = ThePool();
-  if (pool.missing > 0) {
-    sync::MutexLock lock(pool.mutex);
-    Fill(pool);
-  }
+  sync::MutexLock lock(pool.mutex);
+  if (pool.missing > 0) Fill(pool);
   const uint64_t taken = pool.taken;
   return taken - pool.told.exchange(taken);
 }

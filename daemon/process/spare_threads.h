@@ -17,8 +17,7 @@ class SpareThreads {
 
   // Begins `count` of 1 to kMost; ResourceExhausted: the system does not give them. One object at a time.
   static absl::Status Begin(int count);
-  // Begins what is missing, as far as it can be had. How many were taken since the last call, so that somebody says so. Any thread;
-  // costs next to nothing where none is missing.
+  // Begins what is missing, as far as it can be had. How many were taken since the last call, so that somebody says so. Any thread.
   static uint64_t Refill();
   // Ends those that wait, and waits for that; those that were taken are whoever's they are.
   static void End();

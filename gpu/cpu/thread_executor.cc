@@ -22,18 +22,16 @@ class SerialExecutor final : public Executor {
 class ThreadExecutor final : public Executor {
  public:
   explicit ThreadExecutor(int threads) {
-    for (int worker = 1; worker < threads; ++worker) {
-      threads_.emplace_back([this, worker] { Run(worker); });
+    try {
+      for (int worker = 1; worker < threads; ++worker) {
+        threads_.emplace_back([this, worker] { Run(worker); });
+      }
+    } catch (...) {  // those that there are wait for work
+      End();
+      throw;
     }
   }
-  ~ThreadExecutor() override {
-    {
-      sync::MutexLock lock(mutex_);
-      stopping_ = true;
-    }
-    begin_.NotifyAll();
-    for (std::thread& thread : threads_) thread.join();
-  }
+  ~ThreadExecutor() override { End(); }
 
   int concurrency() const override { return static_cast<int>(threads_.size()) + 1; }
 
@@ -60,6 +58,15 @@ class ThreadExecutor final : public Executor {
   }
 
  private:
+  void End() {
+    {
+      sync::MutexLock lock(mutex_);
+      stopping_ = true;
+    }
+    begin_.NotifyAll();
+    for (std::thread& thread : threads_) thread.join();
+  }
+
   void Work(const Body& body, size_t count, size_t grain, int worker) {
     try {
       const WantOfMemory caught;

@@ -1,8 +1,12 @@
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
+#include <fstream>
 #include <new>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -41,6 +45,26 @@ TEST(Executor, EveryKindRunsEachIndexOnce) {
     ExpectEachIndexOnce(*MakeExecutor(threads));
   }
 }
+
+#ifndef VOXELD_SANITIZED  // whose own memory is beyond any limit
+void AskForMoreThreadsThanThereAre() {
+  uint64_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  const rlim_t most = pages * static_cast<uint64_t>(getpagesize()) + (rlim_t{64} << 20);
+  const rlimit limit = {most, RLIM_INFINITY};
+  if (setrlimit(RLIMIT_AS, &limit) != 0) _exit(2);
+  try {
+    MakeThreadExecutor(10'000);
+  } catch (const std::system_error&) {
+    _exit(0);
+  }
+  _exit(1);
+}
+
+TEST(ExecutorDeathTest, WithoutThreadsThereIsNoneAndThoseThatBeganHaveEnded) {
+  EXPECT_EXIT(AskForMoreThreadsThanThereAre(), ::testing::ExitedWithCode(0), "");
+}
+#endif
 
 TEST(Executor, WhatABodyThrowsComesOutOnceNoneRuns) {
   for (int threads : {1, 2, 5}) {
