@@ -78,6 +78,18 @@ class Life:
         except (voxel.VoxelError, grpc.RpcError, TimeoutError, ConnectionError, OSError, AssertionError) as error:
             self.told.failed.append(f"{name}: {type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}")
 
+    def lived(self, process: "subprocess.Popen[str]", pid: Callable[[], int]) -> tuple[bool, str]:
+        """Whether it came to be ready, and lived then; and what it said that was not true. `pid`: the daemon's own, once it has begun."""
+        is_ready = self.ready(process)
+        self.pid = pid()
+        if not is_ready:
+            return False, ""
+        try:
+            self.live()
+        except RuntimeError as untrue:
+            return True, str(untrue)
+        return True, ""
+
     def live(self) -> None:
         for name in ("draw", "durable", "lifetimes", "asset", "page", "reload", "capture"):
             if self.process is not None and self.process.poll() is not None:

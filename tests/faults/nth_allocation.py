@@ -90,14 +90,7 @@ def run(way: str, place: Place, most_descriptors: int) -> Result:
         process = life.start(environment={
             "LD_PRELOAD": os.environ["FAIL_MALLOC"], "FAIL_MALLOC_SITE": place.site, "FAIL_MALLOC_TOLD": str(told),
             "FAIL_MALLOC_TIMES": {"reserve": "1", "bare": "2", "forever": "0"}[way]})
-        life.pid = process.pid
-        is_ready = life.ready(process)
-        wrong = ""
-        if is_ready:
-            try:
-                life.live()
-            except RuntimeError as untrue:
-                wrong = str(untrue)
+        is_ready, wrong = life.lived(process, lambda: process.pid)
         alive = process.poll() is None
         left = descriptors(process, most_descriptors)
         counted = failures(life) if alive and told.exists() else -1  # it may come with the end
