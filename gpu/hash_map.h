@@ -17,7 +17,8 @@ struct NeverThrowing {
   using value_type = T;
 
   NeverThrowing() = default;
-  template <typename Other>
+  template <typename Other>  // implicit: allocators convert into one another
+  // NOLINTNEXTLINE(google-explicit-constructor)
   NeverThrowing(const NeverThrowing<Other>&) {}
 
   T* allocate(size_t count) noexcept {
