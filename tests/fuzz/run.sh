@@ -62,7 +62,7 @@ esac
 fuzz_cores=$((cores - exchange_cores))
 [ "$fuzz_cores" -gt 0 ] || targets=()
 
-mkdir -p "$out/found" "$out/work" || exit 2
+mkdir -p "$out/found" "$out/grown" || exit 2
 out=$(cd "$out" && pwd)
 cp "$here/COMMIT" "$out/COMMIT"
 asan=allocator_may_return_null=1:handle_abort=1
@@ -79,7 +79,7 @@ broken=0
 follow() {  # TARGET BEGIN
   local line edges=0 begin=$2 now
   while IFS= read -r line; do
-    printf '%s\n' "$line" >>"$out/work/$1.log"
+    printf '%s\n' "$line" >>"$out/grown/$1.log"
     [[ $line =~ ^#([0-9]+).*[[:space:]]cov:\ ([0-9]+) ]] || continue
     [ "${BASH_REMATCH[2]}" -gt "$edges" ] || continue
     edges=${BASH_REMATCH[2]}
@@ -90,11 +90,11 @@ follow() {  # TARGET BEGIN
 
 fuzz() {  # TARGET SECONDS
   local target=$1 length=$2 begin=${EPOCHREALTIME/[.,]/} end executions=0 status=0 left more
-  local inputs=$out/work/$target
+  local inputs=$out/grown/$target
   mkdir -p "$inputs"
   [ ! -f "$out/$target.tar.gz" ] || tar -C "$inputs" -xzf "$out/$target.tar.gz"
   printf 'seconds,executions,edges\n' >"$out/$target.csv"
-  : >"$out/work/$target.log"
+  : >"$out/grown/$target.log"
   local options=()
   mapfile -t options <"$here/options/$target"
   end=$((begin + length * 1000000))
@@ -107,21 +107,21 @@ fuzz() {  # TARGET SECONDS
     status=${PIPESTATUS[0]}
     [ "$status" -ne 0 ] || break
   done
-  while read -r more; do executions=$((executions + more)); done < <(sed -n 's/^stat::number_of_executed_units: *//p' "$out/work/$target.log")
-  tail -n 200 "$out/work/$target.log" >"$out/$target.log"
+  while read -r more; do executions=$((executions + more)); done < <(sed -n 's/^stat::number_of_executed_units: *//p' "$out/grown/$target.log")
+  tail -n 200 "$out/grown/$target.log" >"$out/$target.log"
   local now=${EPOCHREALTIME/[.,]/}
-  tar -C "$inputs" -czf "$out/$target.tar.gz" . && rm -rf "$inputs" "$out/work/$target.log"
+  tar -C "$inputs" -czf "$out/$target.tar.gz" . && rm -rf "$inputs" "$out/grown/$target.log"
   printf '%s,%s,%d.%01d,%s\n' "$target" "$executions" $(((now - begin) / 1000000)) $(((now - begin) / 100000 % 10)) "$status" >>"$out/summary.csv"
 }
 
 exchange() {  # SIDE JOBS SECONDS
   (cd "$here" && exec bin/hostile_exchanges --side "$1" --jobs "$2" --seconds "$3" --seed "$seed" --corpus corpus --json) \
     >"$out/exchanges-$1.json" 2>"$out/exchanges-$1.log"
-  printf '%s\n' $? >"$out/work/exchanges-$1.status"
+  printf '%s\n' $? >"$out/grown/exchanges-$1.status"
 }
 
 printf 'target,executions,seconds,status\n' >"$out/summary.csv"
-rm -f "$out"/work/*.status
+rm -f "$out"/grown/*.status
 running=()
 if [ "$exchange_cores" -gt 0 ]; then
   device=$(((exchange_cores + 1) / 2))
@@ -147,10 +147,10 @@ if [ ${#targets[@]} -gt 0 ]; then
   done
 fi
 [ ${#running[@]} -eq 0 ] || wait "${running[@]}"
-for status in "$out"/work/*.status; do
+for status in "$out"/grown/*.status; do
   [ ! -f "$status" ] || [ "$(cat "$status")" = 0 ] || { echo "run.sh: $(basename "$status" .status) broke" >&2; broken=1; }
 done
-rm -rf "$out/work"
+rm -rf "$out/grown"
 if grep -qvE '^target|,0$' "$out/summary.csv" || [ -n "$(ls -A "$out/found")" ]; then
   echo "run.sh: something broke; see $out/found and the logs" >&2
   broken=1

@@ -11,6 +11,7 @@
 #include "display/drivers/voxlink/capabilities.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include "tests/display/drivers/made_up_device.h"
 
 namespace voxeld::display::voxlink {
 namespace {
@@ -22,16 +23,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 const double kNaN = std::nan("");
 
 DeviceCapabilities Device(Geometry geometry) {
-  DeviceCapabilities device;
-  device.fixed.version = 0x0100;
-  device.fixed.formats = 0x05;
-  device.fixed.max_sub_frames = 4;
-  device.fixed.receive_buffer = 1 << 20;
-  device.fixed.max_payload = 65536;
-  device.fixed.volume_buffers = 3;
-  device.fixed.min_rate_mhz = 1000;
-  device.fixed.nominal_rate_mhz = device.fixed.max_rate_mhz = 30'000;
-  device.fixed.keepalive_ms = 100;
+  DeviceCapabilities device = MadeUpDevice(0x0100);
   device.geometry = std::move(geometry);
   return device;
 }

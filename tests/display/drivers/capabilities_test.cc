@@ -9,21 +9,13 @@
 #include <string>
 
 #include "gtest/gtest.h"
+#include "tests/display/drivers/made_up_device.h"
 
 namespace voxeld::display::voxlink {
 namespace {
 
 DeviceCapabilities Planar() {
-  DeviceCapabilities device;
-  device.fixed.version = 0x0103;
-  device.fixed.formats = 0x05;
-  device.fixed.max_sub_frames = 4;
-  device.fixed.receive_buffer = 1 << 20;
-  device.fixed.max_payload = 65536;
-  device.fixed.volume_buffers = 3;
-  device.fixed.min_rate_mhz = 1000;
-  device.fixed.nominal_rate_mhz = device.fixed.max_rate_mhz = 30'000;
-  device.fixed.keepalive_ms = 100;
+  DeviceCapabilities device = MadeUpDevice(0x0103);
   PlanarStack planar;
   planar.normal = PlanarStack::Normal::kY;
   planar.width_px = 1024;

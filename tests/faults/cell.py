@@ -1,0 +1,192 @@
+"""A daemon under a load, and who goes on beside it (fault_matrix_test). Paths are in VOXELD and PYTHONPATH."""
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+import urllib.error
+import urllib.request
+from pathlib import Path
+from typing import Optional
+
+import numpy as np
+import voxeld as voxel
+
+from polling import LONG, until
+
+DISPLAYS = 'driver = "simulated"\nsize = "16x16x12"\nrate = 60\n'
+HERE = Path(__file__).parent
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Cell:
+    """A daemon under a load."""
+
+    def __init__(self, test: unittest.TestCase, clients: int, hurt: str = "", engine: str = "", environment: Optional[dict[str, str]] = None, tls: bool = False) -> None:
+        self.test = test
+        self.folder = tempfile.mkdtemp(prefix="voxeld-faults-")
+        self.server = f"unix:{self.folder}/s"
+        self.port, self.http = free_port(), free_port()
+        listen = f'"{self.server}", "127.0.0.1:{self.port}"'
+        security = ""
+        if tls:
+            self.certificate("first")
+            self.install("first")
+            listen = f'"{self.server}", "tls:127.0.0.1:{self.port}"'
+            security = (f'[security]\ntls_certificate = "{self.folder}/server.pem"\ntls_key = "{self.folder}/server.key"\n'
+                        f'tls_client_ca = "{self.folder}/first.pem"\ngrants = "{self.folder}/grants.toml"\n')
+            grants = Path(self.folder, "grants.toml")
+            grants.write_text('[[certificate]]\nname = "all"\nsubject = "first"\nscopes = ["view", "draw"]\n', encoding="utf-8")
+            grants.chmod(0o600)
+        Path(self.folder, "voxeld.toml").write_text(
+            f'[server]\nlisten = [{listen}]\nhttp = "127.0.0.1:{self.http}"\n[state]\ndir = "{self.folder}/state"\n{security}'
+            f'[engine]\nkind = "cpu"\n{engine}[[display]]\nname = "hurt"\n{DISPLAYS}{hurt}[[display]]\nname = "well"\n{DISPLAYS}', encoding="utf-8")
+        self.environment = {**os.environ, **(environment or {})}
+        self.told = ""  # by health, now and then
+        self.start()
+        test.addCleanup(self.close)
+        self.via = self.server
+        self.clients = clients
+        self.load: Optional[subprocess.Popen[str]] = None
+
+    def start(self) -> None:
+        self.log = open(f"{self.folder}/log", "a", encoding="utf-8")
+        self.daemon = subprocess.Popen([os.environ["VOXELD"], "--config", f"{self.folder}/voxeld.toml", "--log-level", "info"],
+                                       stdin=subprocess.DEVNULL, stdout=self.log, stderr=subprocess.STDOUT, env=self.environment)
+        until(self.reachable, f"a daemon: {self.said()[-2000:]}")
+
+    def reachable(self) -> bool:
+        assert self.daemon.poll() is None, self.said()[-2000:]
+        with contextlib.suppress(OSError, urllib.error.URLError):
+            return "status" in self.health()
+        return False
+
+    def said(self) -> str:
+        return Path(f"{self.folder}/log").read_text(encoding="utf-8", errors="replace")
+
+    def health(self) -> str:
+        try:
+            with urllib.request.urlopen(f"http://127.0.0.1:{self.http}/healthz", timeout=LONG) as answer:
+                return str(answer.read().decode())
+        except urllib.error.HTTPError as error:
+            return str(error.read().decode())
+
+    def metrics(self) -> dict[str, float]:
+        """Of samples alone: what is said about them is in every answer."""
+        with urllib.request.urlopen(f"http://127.0.0.1:{self.http}/metrics", timeout=LONG) as answer:
+            lines = answer.read().decode().splitlines()
+        return {line.rpartition(" ")[0]: float(line.rpartition(" ")[2]) for line in lines if line and not line.startswith("#")}
+
+    def watch_health(self, seconds: float) -> None:
+        """What it says meanwhile is kept; a daemon that is stopped says nothing."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            with contextlib.suppress(OSError, urllib.error.URLError):
+                with urllib.request.urlopen(f"http://127.0.0.1:{self.http}/healthz", timeout=max(0.05, end - time.monotonic())) as answer:
+                    self.told += answer.read().decode() + "\n"
+            time.sleep(0.05)  # the pace at which it is asked
+
+    def certificate(self, name: str) -> None:
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "2", "-subj", f"/CN={name}",
+                        "-addext", "subjectAltName=DNS:display.example", "-keyout", f"{self.folder}/{name}.key", "-out", f"{self.folder}/{name}.pem"],
+                       check=True, capture_output=True)
+
+    def install(self, name: str) -> None:
+        for end in ("key", "pem"):
+            path = Path(self.folder, f"server.{end}.new")
+            path.write_bytes(Path(self.folder, f"{name}.{end}").read_bytes())
+            path.chmod(0o600)
+            path.rename(Path(self.folder, f"server.{end}"))
+
+    def begin_load(self, *more: str) -> None:
+        if self.clients == 0:
+            return
+        self.load = subprocess.Popen([sys.executable, str(HERE / "clients.py"), self.via, str(self.clients), "20" if self.clients == 1 else "4", *more],
+                                     stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        assert self.load.stdout is not None
+        self.test.assertEqual(self.load.stdout.readline(), "ready\n")
+
+    def end_load(self) -> dict[str, int]:
+        """What became of everything; what was drawn stays up until close()."""
+        if self.load is None:
+            return {}
+        assert self.load.stdin is not None and self.load.stdout is not None
+        self.load.stdin.write("stop\n")
+        self.load.stdin.flush()
+        sums: dict[str, int] = json.loads(self.load.stdout.readline())
+        self.test.assertEqual(sums["clients"], self.clients)
+        self.test.assertEqual(sums["missing"], 0, sums)
+        return sums
+
+    def close(self) -> None:
+        if self.load is not None:
+            with contextlib.suppress(ProcessLookupError):
+                self.load.send_signal(signal.SIGCONT)
+            self.load.kill()
+            self.load.communicate()
+        if self.daemon.poll() is None:
+            self.daemon.send_signal(signal.SIGCONT)
+            self.daemon.terminate()
+            try:
+                self.daemon.wait(LONG)
+            except subprocess.TimeoutExpired:
+                self.daemon.kill()
+                self.daemon.wait()
+        self.log.close()
+        subprocess.run(["rm", "-rf", self.folder], check=True)
+
+
+class GoesOn:
+    """A client that is to notice nothing: each commit is shown on the display that is well."""
+
+    def __init__(self, cell: Cell) -> None:
+        self.commits, self.wrong = 0, ""
+        self.stop = threading.Event()
+        self.v = voxel.connect(cell.server, name="goes on", timeout=LONG)
+        self.thread = threading.Thread(target=self._run)
+        self.thread.start()
+
+    def _run(self) -> None:
+        try:
+            while not self.stop.is_set():
+                self.v.layer("goes on").sphere("ball", radius=0.1 + self.commits % 9 / 20, color="green")
+                outcome = self.v.commit().wait_shown(timeout=LONG)["well"]
+                self.commits += 1
+                if outcome.kind not in ("presented", "unchanged", "superseded"):
+                    self.wrong = f"commit {self.commits}: {outcome}"
+                self.stop.wait(0.03)
+        except (voxel.VoxelError, TimeoutError, KeyError) as error:
+            self.wrong = f"after {self.commits}: {type(error).__name__}: {error}"
+
+    def end(self) -> None:
+        self.stop.set()
+        self.thread.join(2 * LONG)
+        assert not self.thread.is_alive()
+
+
+def same_light(cell: Cell) -> None:
+    """Both displays have the same, and it is not darkness."""
+    with voxel.connect(cell.server, name="last", timeout=LONG) as v:
+        v.layer("last").box("box", size=(0.4, 0.4, 0.4), color="white", fill="solid")
+        accepted = v.commit().wait(LONG).accepted
+        assert accepted is not None
+        snapshot = accepted.snapshot
+
+        def alike() -> bool:
+            with contextlib.suppress(voxel.VoxelError):
+                hurt, well = (v.capture(name, at_least_snapshot=snapshot, timeout=LONG).rgb for name in ("hurt", "well"))
+                return bool(np.array_equal(hurt, well) and well.any())
+            return False
+
+        until(alike, "the same light on both displays")
