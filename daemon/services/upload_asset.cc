@@ -26,7 +26,8 @@ absl::Status CheckDigest(const std::string& digest) {
                                                  kDigestBytes, " of the content's SHA-256"));
 }
 
-// Owns itself until gRPC is done with it. Reads come one after another; End may come at any time.
+// Owns itself until gRPC is done with it. Reads come one after another; End may come at any time,
+// and what it says goes out from the assets' thread.
 class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
                          public ActiveCall,
                          public std::enable_shared_from_this<UploadCall> {
@@ -48,9 +49,13 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
   }
 
   void End(const absl::Status& status) override {
-    sync::MutexLock lock(mutex_);
-    if (std::exchange(ended_, true)) return;
-    Finish(ToGrpc(status));
+    {
+      sync::MutexLock lock(mutex_);
+      if (std::exchange(ended_, true)) return;
+    }
+    context_.asset_calls->Post([self = shared_from_this(), status = ToGrpc(status)](bool) {
+      self->LetGoAndFinish(status);
+    });
   }
 
   void OnReadDone(bool ok) override {
@@ -80,10 +85,8 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
       alarm = std::move(alarm_);
     }
     alarm.reset();
-    --context_.uploads;
     context_.calls.Remove(this);
-    context_.asset_calls->Post(
-        [self = std::move(self_)](bool) { self->context_.assets->Abandon(self->upload_); });
+    const auto self = std::move(self_);  // may be the last of it
   }
 
  private:
@@ -130,12 +133,22 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
       return false;
     }
     if (ok && !here_) return true;
-    sync::MutexLock lock(mutex_);
-    if (std::exchange(ended_, true)) return false;
-    response_->set_sha256(digest_);
-    response_->set_stored(size_);
-    Finish(grpc::Status::OK);
+    {
+      sync::MutexLock lock(mutex_);
+      if (std::exchange(ended_, true)) return false;
+      response_->set_sha256(digest_);
+      response_->set_stored(size_);
+    }
+    LetGoAndFinish(grpc::Status::OK);
     return false;
+  }
+
+  // In the assets' thread, once. Whoever has been told of the end finds the content and the call's
+  // place free for another.
+  void LetGoAndFinish(const grpc::Status& status) {
+    context_.assets->Abandon(upload_);
+    --context_.uploads;
+    Finish(status);
   }
 
   absl::Status TakePiece() {

@@ -3,9 +3,13 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <csignal>
 #include <cstring>
 #include <filesystem>
+#include <latch>
+#include <thread>
+#include <vector>
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
@@ -274,22 +278,32 @@ TEST_F(Assets, ManyCallsAreNotHeld) {
     v1::UploadAssetResponse response;
     std::unique_ptr<grpc::ClientWriter<v1::UploadAssetRequest>> call;
   };
+  constexpr int kCalls = 40, kMost = 32;
   std::vector<std::unique_ptr<Open>> calls;
-  for (int i = 0; i < 40; ++i) {
+  for (int i = 0; i < kCalls; ++i) {
     calls.push_back(std::make_unique<Open>());
-    Open& open = *calls.back();
-    SetDeadline(open.context);
-    open.call = daemon_->scene().UploadAsset(&open.context, &open.response);
+    SetDeadline(calls.back()->context);
+    calls.back()->call =
+        daemon_->scene().UploadAsset(&calls.back()->context, &calls.back()->response);
   }
-  int refused = 0;
+  // Those that came in stay open until so many have ended as are to be refused.
+  std::atomic<int> refused = 0, ended = 0;
+  std::latch enough(kCalls - kMost);
+  std::vector<std::thread> waiting;
   for (const auto& open : calls) {
-    open->call->WritesDone();
-    const grpc::Status status = open->call->Finish();
-    if (status.error_code() != grpc::StatusCode::RESOURCE_EXHAUSTED) continue;
-    EXPECT_THAT(status.error_message(), HasSubstr("32 uploads are open"));
-    ++refused;
+    waiting.emplace_back([&, &call = *open->call] {
+      const grpc::Status status = call.Finish();
+      if (status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED) {
+        EXPECT_THAT(status.error_message(), HasSubstr("32 uploads are open"));
+        ++refused;
+      }
+      if (++ended <= kCalls - kMost) enough.count_down();
+    });
   }
-  EXPECT_EQ(refused, 8);
+  enough.wait();
+  for (const auto& open : calls) open->call->WritesDone();
+  for (std::thread& thread : waiting) thread.join();
+  EXPECT_EQ(refused, kCalls - kMost);
   EXPECT_TRUE(Upload(kPointHash, 12, {{kPoint, 0}}).ok()) << "they have ended, and others come in";
 }
 
