@@ -301,6 +301,7 @@ class FakeServer::Display final : public v1::DisplayService::Service {
     stats.set_version("9.9\x1b");
     stats.set_sessions(1);
     stats.set_entities(3);
+    stats.mutable_process()->set_trouble("no memory\x1b");
     v1::DisplayStats* display = stats.add_displays();
     display->set_name(kDisplay);
     display->set_state(v1::DISPLAY_STATE_SHOWING);

@@ -91,6 +91,7 @@ TEST(TopView, WhatTheServerSaysIsMadeFitForATerminal) {
     EXPECT_THAT(Text(view), HasSubstr(words));
   }
   EXPECT_THAT(TopText(stats, Owners(1)), Not(HasSubstr("\x1b")));
+  EXPECT_THAT(TopText(stats, Owners(1)), HasSubstr("grants\\u{1b}\nmemory\\u{1b}\n"));
 }
 
 TEST(TopView, DisplaysAreChosenRoundAndRound) {

@@ -8,6 +8,7 @@
 #include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/proto_json.h"
 #include "tools/voxelctl/text/table.h"
+#include "tools/voxelctl/text/troubles.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -33,7 +34,7 @@ std::string SweepText(const v1::DisplayStats& d) {
   std::string text =
       absl::AsciiStrToLower(absl::StripPrefix(v1::SweepLock_Name(d.sweep_lock()), "SWEEP_LOCK_"));
   if (d.sweep_lock() == v1::SWEEP_LOCK_LOCKED) {
-    absl::StrAppendFormat(&text, ", %+.0f ppm", d.sweep_drift_ppm());
+    absl::StrAppendFormat(&text, ", %+.0f ppm", std::round(d.sweep_drift_ppm()) + 0.0);  // no −0
   }
   return text;
 }
@@ -99,7 +100,9 @@ std::string Full(const v1::Stats& stats) {
   });
   row("engine faults", [](const D& d) { return Grouped(d.engine_faults()); });
   row("  returns", [](const D& d) { return Grouped(d.engine_returns()); });
-  std::string text = absl::StrCat(Server(stats), "\n", table.Text());
+  std::string text = Server(stats);
+  for (const std::string& trouble : Troubles(stats)) absl::StrAppend(&text, trouble, "\n");
+  absl::StrAppend(&text, "\n", table.Text());
   for (const D& d : stats.displays()) {
     if (d.state() != v1::DISPLAY_STATE_SHOWING) {
       absl::StrAppend(&text, "\n", EscapeForTerminal(d.name()), ": ",

@@ -12,6 +12,7 @@
 #include "absl/strings/strip.h"
 #include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/table.h"
+#include "tools/voxelctl/text/troubles.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -261,10 +262,8 @@ void TopView::AddConnections(std::vector<TopLine>* out) const {
        Refused(c) + CutOff(c) > Refused(before_.connections()) + CutOff(before_.connections())
            ? TopStyle::kWarning
            : TopStyle::kPlain});
-  for (const std::string& trouble :
-       {c.unreachable(), c.access_trouble(), c.config_trouble(), stats_.state().trouble(),
-        stats_.assets().trouble(), stats_.process().trouble()}) {
-    if (!trouble.empty()) out->push_back({EscapeForTerminal(trouble), TopStyle::kBad});
+  for (std::string& trouble : Troubles(stats_)) {
+    out->push_back({std::move(trouble), TopStyle::kBad});
   }
 }
 
@@ -309,9 +308,11 @@ std::vector<TopLine> TopView::Lines(int width, int height) const {
 std::string TopText(const v1::Stats& stats, const v1::ListOwnersResponse& owners) {
   std::string text = DisplayTable(stats, "").Text();
   if (!owners.owners().empty()) absl::StrAppend(&text, OwnerTable(owners).Text());
-  return absl::StrCat(text, "memory ", Bytes(Used(stats.memory())), " of ",
-                      Bytes(stats.memory().limit_bytes()), "; connections ",
-                      ConnectionText(stats.connections()), "\n");
+  absl::StrAppend(&text, "memory ", Bytes(Used(stats.memory())), " of ",
+                  Bytes(stats.memory().limit_bytes()), "; connections ",
+                  ConnectionText(stats.connections()), "\n");
+  for (const std::string& trouble : Troubles(stats)) absl::StrAppend(&text, trouble, "\n");
+  return text;
 }
 
 }  // namespace voxeld::voxelctl
