@@ -493,8 +493,8 @@ int Main(int argc, char** argv) {
 int main(int argc, char** argv) {
   try {
     return voxeld::daemon::Main(argc, argv);
-  } catch (const std::exception& error) {  // no memory, no threads, no descriptors
-    std::fprintf(stderr, "voxeld: it cannot go on: %s\n", error.what());
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "voxeld: cannot go on: %s\n", voxeld::daemon::WhyItEnds(error).c_str());
     return 1;
   }
 }

@@ -3,6 +3,10 @@
 #include <malloc.h>
 #include <sys/resource.h>
 
+#include <new>
+#include <system_error>
+
+#include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
 
 namespace voxeld::daemon {
@@ -30,6 +34,24 @@ void RaiseDescriptorLimit() {
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
   limit.rlim_cur = limit.rlim_max;
   setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+std::string WhyItEnds(const std::exception& error) {
+  const auto* const refused = dynamic_cast<const std::system_error*>(&error);
+  if (refused != nullptr && refused->code() == std::errc::resource_unavailable_try_again) {
+    return absl::StrCat("the system gives it no more threads (", error.what(),
+                        "): allow it more of them (TasksMax, LimitNPROC, ulimit -u), or more "
+                        "memory for their stacks (LimitAS, ulimit -v)");
+  }
+  if (refused != nullptr && refused->code() == std::errc::too_many_files_open) {
+    return absl::StrCat("the system gives it no more descriptors (", error.what(),
+                        "): allow it more of them (LimitNOFILE, ulimit -n)");
+  }
+  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr) {
+    return absl::StrCat("there is no memory (", error.what(),
+                        "): allow it more (MemoryMax, LimitAS, ulimit -v)");
+  }
+  return error.what();
 }
 
 }  // namespace voxeld::daemon

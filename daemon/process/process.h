@@ -1,6 +1,9 @@
 // What a process that serves gRPC sets for itself as a whole, once, before it has a second thread.
 #pragma once
 
+#include <exception>
+#include <string>
+
 namespace voxeld::daemon {
 
 // Has the allocator keep what messages need from one to the next, up to a bound, in place of giving it back to the
@@ -10,5 +13,8 @@ void TuneProcess();
 
 // As many descriptors as the process may have: every client holds two, what serves it and what guards it.
 void RaiseDescriptorLimit();
+
+// What ends a daemon that is starting, for people: what the system refuses, and which limit to look at.
+std::string WhyItEnds(const std::exception& error);
 
 }  // namespace voxeld::daemon
