@@ -3,8 +3,10 @@
 #include <malloc.h>
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <new>
 #include <system_error>
+#include <thread>
 
 #include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
@@ -17,6 +19,8 @@ namespace {
 constexpr int kKeptBytes = 16 << 20;
 constexpr int kGrownBytes = 1 << 20;
 constexpr int kMappedBytes = 4 << 20;  // from here on memory is mapped, and goes back at once
+// By itself the C library has eight for each core, and each keeps what its threads once needed together.
+constexpr unsigned kLeastArenas = 4;
 
 }  // namespace
 
@@ -26,6 +30,8 @@ void TuneProcess() {
   mallopt(M_TRIM_THRESHOLD, kKeptBytes);
   mallopt(M_TOP_PAD, kGrownBytes);
   mallopt(M_MMAP_THRESHOLD, kMappedBytes);
+  mallopt(M_ARENA_MAX,
+          static_cast<int>(std::max(kLeastArenas, std::thread::hardware_concurrency())));
 #endif
 }
 

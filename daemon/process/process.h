@@ -7,8 +7,8 @@
 namespace voxeld::daemon {
 
 // Has the allocator keep what messages need from one to the next, up to a bound, in place of giving it back to the
-// system and faulting it in again; and leaves out Abseil's search for deadlocks, with which distributions build it and
-// which gRPC would make for every message.
+// system and faulting it in again, in as many arenas as there are cores (four at least); and leaves out Abseil's search
+// for deadlocks, with which distributions build it and which gRPC would make for every message.
 void TuneProcess();
 
 // As many descriptors as the process may have: every client holds two, what serves it and what guards it.

@@ -34,7 +34,7 @@ LONG = 60.0
 PARTS = 12
 WARM = 20  # minutes; of a shorter run slopes are told, and receipts alone are judged
 # By what part of its level a quantity may grow in an hour; of whole numbers, by how many.
-GROWTH = {"resident_mb": 0.02, "descriptors": 0.5, "threads": 0.5, "p50_ms": 0.5, "p99_ms": 0.5}
+GROWTH = {"resident_mb": 0.02, "anonymous_mb": 0.02, "descriptors": 0.5, "threads": 0.5, "p50_ms": 0.5, "p99_ms": 0.5}
 WHOLE = ("descriptors", "threads")
 DISPLAYS = 3
 
@@ -158,10 +158,11 @@ def role(name: str, server: str, stop: Stop, answer: Pipe) -> None:
 
 def sample(pid: int, port: int) -> dict[str, float]:
     status = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
-    number = {key: int(value) for key, value in re.findall(r"^(VmRSS|Threads):\s+(\d+)", status, re.M)}
+    # Resident is what files hold too: programs' pages, which come as they are first used, and of which there are no more than files have.
+    number = {key: int(value) for key, value in re.findall(r"^(VmRSS|RssAnon|Threads):\s+(\d+)", status, re.M)}
     with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=LONG) as answer:
         answer.read()
-    return {"resident_mb": number["VmRSS"] / 1024, "descriptors": len(os.listdir(f"/proc/{pid}/fd")), "threads": number["Threads"]}
+    return {"resident_mb": number["VmRSS"] / 1024, "anonymous_mb": number["RssAnon"] / 1024, "descriptors": len(os.listdir(f"/proc/{pid}/fd")), "threads": number["Threads"]}
 
 
 def line_through(times: np.ndarray[Any, Any], values: np.ndarray[Any, Any]) -> tuple[float, float]:
