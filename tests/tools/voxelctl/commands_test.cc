@@ -57,6 +57,7 @@ TEST_F(CommandsTest, TablesAreDataAndNothingFromTheServerReachesTheTerminalRaw) 
     EXPECT_THAT(result.out, Not(HasSubstr("\x1b"))) << command[0];
   }
   EXPECT_THAT(RunTool({"stats"}).out, HasSubstr("1,234,567"));
+  EXPECT_THAT(RunTool({"stats"}).out, HasSubstr("locked, +0 ppm"));
   EXPECT_THAT(RunTool({"stats"}).out, HasSubstr("no memory\\u{1b}\n"));
   EXPECT_THAT(RunTool({"top", "--once"}).out, HasSubstr("no memory\\u{1b}\n"));
 }

@@ -306,6 +306,8 @@ class FakeServer::Display final : public v1::DisplayService::Service {
     display->set_name(kDisplay);
     display->set_state(v1::DISPLAY_STATE_SHOWING);
     display->set_engine("cpu");
+    display->set_sweep_lock(v1::SWEEP_LOCK_LOCKED);
+    display->set_sweep_drift_ppm(-0.2);
     display->set_lit_voxels(1234567);
     display->set_bytes_out(5000);
     display->mutable_commit_to_last_byte()->set_p50_ns(1'000'000);
