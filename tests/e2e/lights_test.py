@@ -11,7 +11,6 @@ import struct
 import subprocess
 import tempfile
 import threading
-import time
 import unittest
 import urllib.parse
 import urllib.request
@@ -26,6 +25,15 @@ from polling import LONG, until
 
 X, Y, Z = 8, 6, 5
 LIGHTS = X * Y * Z  # two universes: 170 lights and 70
+
+
+def unread(port: int) -> int:
+    """Bytes that the kernel holds for who listens at this port of 127.0.0.1; a datagram over loopback is among them once it is sent."""
+    for line in Path("/proc/net/udp").read_text(encoding="ascii").splitlines()[1:]:
+        fields = line.split()
+        if fields[1] == f"0100007F:{port:04X}":
+            return int(fields[4].partition(":")[2], 16)
+    raise AssertionError(f"nobody listens at port {port}")
 
 
 class Reading:
@@ -233,7 +241,7 @@ class Lights(unittest.TestCase):
         port = int(first.split(" on 127.0.0.1:")[1].split(" ")[0])
         with socket.socket(type=socket.SOCK_DGRAM) as sender:
             sender.sendto(b"no", ("127.0.0.1", port))
-            time.sleep(0.3)
+            until(lambda: unread(port) == 0, "the message has been read")
         told.terminate()
         _, words = told.communicate(timeout=LONG)
         self.assertEqual(told.returncode, 0, words)
