@@ -24,6 +24,7 @@ import zlib
 from concurrent import futures
 
 import request_seeds
+import session_seeds
 import shape_seeds
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -461,6 +462,7 @@ def main():
     args = parser.parse_args()
     texts()
     request_seeds.requests(put, text)
+    session_seeds.sessions(put, text)
     voxlink()
     programs()
     sockets()

@@ -97,6 +97,18 @@ def drawings(put):
         put("import_text", b"\x05" + text.encode("latin-1"))
 
 
+def grants(put):
+    digest = "0123456789abcdef" * 4
+    token = lambda *more: "\n".join(["[[token]]", 'name = "a"', f'sha256 = "{digest}"', 'scopes = ["view"]', *more]) + "\n"
+    user = lambda name: f'[[user]]\nname = "{name}"\nscopes = ["all"]\n'
+    certificate = lambda subject: f'[[certificate]]\nname = "b"\nsubject = {subject}\nscopes = ["draw", "view"]\n'
+    for text in (token(), token() + token(), token("expires = 2027-01-31T00:00:00Z"), token("expires = 2027-01-31T00:00:00-05:30"), token("expires = 2027-01-31T00:00:00"), token("expires = 2027-01-31"), token('expires = "soon"'), token("expires = 5"), token("expire = 5"),
+                 user("root") + user("0"), user("no-such-user"), user("7") + user("7"), user("a b"), user("a" * 300), user("4294967296"), certificate('"x"') + certificate('"x"'), certificate('""'), certificate("1"), certificate('"x"').replace("subject", "sha256"),
+                 token().replace(digest, digest.upper()), token().replace(digest, "12"), token().replace("sha256", "#"), token().replace('["view"]', '["view", 1]'), token().replace('["view"]', '"view"'), token().replace('["view"]', "[]"), token().replace('["view"]', '["none"]'),
+                 "token = 1", "[token]", "token = [1]", "tokens = []", "[[token]]", "[[token]]\n" * 30, "a = ", "all", "none", "view,draw control", "view paint", ""):
+        put("grants", text.encode())
+
+
 def texts(put):
-    for reader in (maps, points, molecules, drawings):
+    for reader in (grants, maps, points, molecules, drawings):
         reader(put)

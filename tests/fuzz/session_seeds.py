@@ -1,0 +1,128 @@
+"""Seeds by hand for sessions: what of a protocol's course is rare in real traffic, each refusal among it. As shape_seeds.py; `text` is
+make_seeds.text."""
+import json
+import struct
+
+
+def foxglove(put, text):
+    say = lambda update: b"\x03" + text(json.dumps(update).encode())
+    points = [{"x": 0, "y": 0, "z": 0}, {"x": 1, "y": 1, "z": 1}, {"x": 1}]
+    colors = [{"r": 1, "g": 0, "b": 0, "a": 1}, {"r": 0.5}, {"g": 2}]
+    cube = {"size": {"x": 1, "y": 1, "z": 1}}
+    entity = lambda name, **what: {"id": name, **what}
+    several = say({"entities": [entity("a", cubes=[cube] * 3), entity("b", cubes=[cube], lifetime={"sec": 1, "nsec": 0}), entity("c", spheres=[{"size": {"x": 1, "y": 1, "z": 1}}])]})
+    for then in (say({"deletions": [{"type": 0, "id": "a"}, {"type": 0, "id": "none"}]}), say({"deletions": [{"type": 1}]}), say({"entities": [entity("a", cubes=[cube])]}), say({"entities": [entity("a")]}), b"\x04\x20" + say({"deletions": [{"type": 0, "id": "b"}]})):
+        put("foxglove", several + then + several)
+    for what in ({"lines": [{"type": t, "points": points, "colors": colors, "thickness": 0.1, "indices": [0, 1, 2]} for t in (0, 1, 2)]}, {"lines": [{"points": points, "colors": colors[:2]}, {}]}, {"triangles": [{"points": points, "colors": colors}, {}]},
+                 {"texts": [{"text": "a", "billboard": True, "font_size": 2}, {"text": "b", "scale_invariant": True}, {}]}, {"arrows": [{}]}, {"cylinders": [{}]}, {"models": [{}]}, {"lifetime": {"sec": -1, "nsec": -5}, "cubes": [{}]}):
+        put("foxglove", say({"entities": [entity("a", **what)]}))
+
+
+def e131(universe=1, source=0, priority=100, sequence=0, values=b"\1\2\3", sync=0, options=0):
+    out = bytearray(126) + values
+    out[:16] = b"\x00\x10\x00\x00ASC-E1.17\x00\x00\x00"
+    length = lambda at: struct.pack_into(">H", out, at, 0x7000 | len(out) - at)
+    length(16), length(38), length(115)
+    struct.pack_into(">I", out, 18, 4), struct.pack_into(">I", out, 40, 2)
+    out[22:38] = bytes([source]) * 16
+    struct.pack_into(">BHBBH", out, 108, priority, sync, sequence, options, universe)
+    out[117:125] = b"\x02\xa1\x00\x00\x00\x01" + struct.pack(">H", len(values) + 1)
+    return bytes(out)
+
+
+def e131_sync(address, sequence=0):
+    out = bytearray(49)
+    out[:16] = b"\x00\x10\x00\x00ASC-E1.17\x00\x00\x00"
+    struct.pack_into(">H", out, 16, 0x7000 | 33), struct.pack_into(">H", out, 38, 0x7000 | 11)
+    struct.pack_into(">I", out, 18, 8), struct.pack_into(">I", out, 40, 1)
+    out[44:47] = struct.pack(">BH", sequence, address)
+    return bytes(out)
+
+
+def lights(put, text):
+    sent = lambda *packets: b"".join(b"\x40" + text(p) for p in packets)
+    put("light_datagrams", b"\x01\x03\x01" + sent(*(e131(source=i) for i in range(18))))  # more sources than are told apart
+    put("light_datagrams", b"\x01\x03\x01" + sent(e131(), e131(sync=7), e131_sync(7), e131_sync(8), e131(sequence=1, sync=7), e131(options=0x40), e131(priority=201), e131(universe=0), e131(source=1, priority=150), e131(sequence=3)))
+    for protocol in range(4):
+        network = bytes([protocol, 0, 100, 2, 3, 3])  # first universe 1, sync universe 2, 4 slices of 4 pixels
+        packets = b"\x06" + text(e131_sync(2)) + b"\x06" + text(e131_sync(9)) + b"\x06" + text(e131_sync(2) + b"a") + b"".join(bytes([0, i, i == 3, 40]) for i in range(4)) + b"\x03\x04\x05\x00\x01\x01\x09"
+        put("network_packets", network + packets)
+
+
+def deltas(put, text):
+    """What a worker is sent, by words: sound, and with each word of it wrong in turn (gpu/delta.h)."""
+    record = lambda op, body: struct.pack("<IIQ", op, 0, len(body) + 16) + body
+    pad = lambda data: data + bytes(-len(data) % 16)
+
+    def head(kind, vertices=0, indices=0, mode=0, params=(0, 0, 0, 1, 1, 1, 0, 0), topology=0, texture=(0, 0), number=1):
+        return struct.pack("<Q11I", number, kind, 0xFFFFFF, mode, 0, 0, 0, topology, 0, 0, vertices, indices) + struct.pack("<8f", *params) + struct.pack("<IIHH", 0, 0, *texture)
+
+    def geometry(kind, vertices=0, indices=(), colors=(), mode=0, **more):
+        arrays = pad(struct.pack(f"<{3 * vertices}f", *[i % 4 for i in range(3 * vertices)])) + pad(struct.pack(f"<{len(indices)}I", *indices)) + pad(struct.pack(f"<{len(colors)}I", *colors))
+        return record(1, head(kind, vertices, len(indices), mode, **more) + arrays)
+
+    affine = struct.pack("<12d", 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0)
+    drawable = record(3, struct.pack("<3Q6I", 1, 1, 1, 1, 0, 0xFFFFFF, 0, 0, 0) + affine)
+    layer = record(5, struct.pack("<QiIIIIIIIQ", 1, 0, 1, 255, 0, 1, 1, 1, 1, 2) + affine + struct.pack("<4d", 1, 0, 0, 1) + bytes(19 * 32) + affine + bytes(3 * 96) + struct.pack("<6d", 0, 0, 0, 2, 2, 2))
+    program = (1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0)
+    kinds = [geometry(1, 2), geometry(1, 2, (), (1, 2), mode=1), geometry(2, 4, (0, 1, 2, 3)), geometry(2, 3, topology=1), geometry(3, 3, (0, 1, 2)), geometry(3, 6), geometry(4), geometry(5), geometry(6), geometry(7, 0, program), geometry(8, 4), geometry(8, 4, topology=1),
+             geometry(9, 16), geometry(10, 0, (0,) * 32), geometry(11, 3, (0, 1, 2)), geometry(3, 3, (), (0,) * 7, texture=(1, 1)), geometry(3, 3, (), (0,) * 22, texture=(4, 4))]
+    front = bytes([0, 0, 0, 0]) + bytes([1, 0, 0]) + text(b"") + bytes([1, 1, 0]) + text(b"")
+    target = bytes([3, 0, 0, 0, 0, 0, 0])
+    apply = lambda delta: b"\x05" + text(delta) + b"\x00\x00"
+    frame = bytes([6, 1, 1, 0, 0, 2, 0xC0, 0x00])
+    for kind in kinds:
+        put("worker_messages", front + target + apply(kind + layer + drawable) + frame)
+    bulk = lambda kind, **more: record(8, head(kind, 4, **more) + struct.pack("<4Q", 1, 0, 64, 0))
+    shown = bytes([8, 1, 0]) + text(struct.pack("<12f", *range(12)))
+    for ref in ((1, 0, 64, 0), (1, 16, 48, 0), (1, 8, 64, 0), (1, 0, 8, 0), (2, 0, 64, 0), (1, 16384, 64, 0), (1, 1 << 40, 1 << 62, 0)):
+        put("worker_messages", front + target + shown + apply(record(8, head(1, 4) + struct.pack("<4Q", *ref)) + layer + drawable) + frame + bytes([9, 1]) + frame + shown + shown + bytes([9, 3]))
+    put("worker_messages", front + shown + apply(record(8, head(7, 0, 14) + struct.pack("<4Q", 1, 0, 64, 0))))
+    drops = [record(op, struct.pack("<QQ", 1, 0)) for op in (2, 4, 6)] + [record(7, b"")]
+    whole = kinds[0] + layer + drawable
+    for delta in (whole + drops[1] + drops[0] + drops[2], whole + drops[0], whole + drops[2], whole + drops[3], record(7, bytes(16)), record(2, b""), record(9, b""), record(0, b""), b"abc", record(1, bytes(16)), record(3, bytes(16)), record(5, bytes(16)), record(8, bytes(16)),
+                  struct.pack("<IIQ", 7, 0, 8), struct.pack("<IIQ", 7, 0, 17), struct.pack("<IIQ", 7, 0, 1 << 40), kinds[0] + kinds[0], drawable, layer + drawable, geometry(4, 3), geometry(4, 0, (1,)), geometry(4, mode=1), geometry(7, 0, program, mode=1), geometry(10, 1, (0,) * 32),
+                  geometry(10, 0, (0,) * 32, mode=1), geometry(8, 4, (0,)), geometry(8, 5), geometry(8, 5, topology=1), geometry(8, 4, topology=2), geometry(9, 15), geometry(11, 3, (), (0,) * 3, mode=1), geometry(11, 4), geometry(3, 4), geometry(2, 3), geometry(1, 1, texture=(1, 1)),
+                  geometry(3, 3, texture=(1, 0)), geometry(3, 3, (0, 1, 9)), geometry(7, 1, program), geometry(7, 0, program, params=(0, 0, 0, 1, 1, 1, 1, 0)), geometry(7, 0, program, params=(2, 0, 0, 1, 1, 1, 1, 0)), geometry(7, 0, program, params=(2, 0, 0, 1, 1, 1, 5, 0)),
+                  geometry(7, 0, ()), geometry(10, 0, (1, 2)), kinds[0][:-16]):
+        put("worker_messages", front + target + apply(delta))
+    # Every word, in turn, a number that is not, or too great, or below zero.
+    for sound, size in ((kinds[0], 112), (kinds[2], 112), (kinds[7], 112), (drawable, len(drawable)), (layer, 16 + 48 + 96 + 32), (layer[:16 + 784], 16 + 784), (layer, len(layer))):
+        for at in range(0, size if size < 400 else 0, 4):
+            for word in (0, 1, 3, 300, 0x7FC00000, 0xBF800000, 0xFFFFFFFF):
+                put("worker_messages", front + apply(sound[:at] + struct.pack("<I", word) + sound[at + 4:]))
+    for at in (160, 176, 800, 888, 1184, 1192, 1208, 1224):
+        for number in (float("nan"), float("inf"), 9.0, 0.0):
+            put("worker_messages", front + apply(layer[:at] + struct.pack("<d", number) + layer[at + 8:]))
+
+
+def workers(put, text):
+    linked, front = bytes([0, 0x40, 0, 0]), bytes([0, 0, 0, 0])
+    message = lambda kind, body, how=0: bytes([10, kind, 9]) + text(body) + bytes([how])
+    invite = lambda library: message(11, bytes(4) + library)
+    join = lambda library, byte, rank, ranks: message(12, bytes([byte]) * 128 + struct.pack("<ii", rank, ranks) + library)
+    put("worker_messages", linked + invite(b"a") + invite(b"") + message(11, b"") + join(b"a", 97, 0, 2) + join(b"b", 97, 0, 2) + join(b"", 0, 0, 2) + message(12, b"short"))
+    put("worker_messages", linked + join(b"a", 97, 2, 2))
+    put("worker_messages", front + invite(b"a") + join(b"a", 97, 0, 2))
+    for kind in range(0, 14):  # too short, before an engine is open and after
+        put("worker_messages", message(kind, b""))
+        put("worker_messages", front + message(kind, b"ab"))
+        put("worker_messages", front + message(kind, bytes(200), 1))
+        put("worker_messages", front + message(kind, bytes(200), 4))
+        put("worker_messages", front + message(kind, bytes(200), 8))
+    put("worker_messages", front + message(5, b"", 2))
+    put("worker_messages", front + message(5, b"abc", 2))
+    put("worker_messages", bytes([0, 1, 0]) + bytes([0, 2, 1, 0, 0]) + bytes([0, 2, 0, 0, 0]))
+    segment = lambda number, choice, content=b"": bytes([1, number, choice]) + text(content)
+    target = lambda shape, formats=0: bytes([3, shape, 0, formats, 0, 0, 0])
+    frame = lambda number, size=192, pictures=0: bytes([6, 1, number, 0, 0, 2 + pictures]) + struct.pack("<H", size)
+    for shape in range(6):
+        for formats in range(5):
+            for staging in (0, 2, 3):  # each segment a second time, pinned and not
+                put("worker_messages", front + segment(0, 0) + segment(1, staging) + target(shape, formats) + frame(1) + segment(1, 0) + frame(2) + segment(1, 1, struct.pack("<Q", 16384)) + frame(3) + bytes([2, 1, 0]) + bytes([7, 0, 0, 0, 0, 4, 4, 4, 0, 64]))
+    put("worker_messages", front + segment(0, 0) + bytes([3, 0, 0, 0, 0, 0, 1]) + bytes([3, 0, 0, 0, 1, 0, 0, 9, 0, 0]) + bytes([3, 0, 0, 0, 0, 0, 2]) + bytes(8) + bytes([3, 0, 0, 0, 0, 3, 0]))
+
+
+def sessions(put, text):
+    for each in (foxglove, lights, deltas, workers):
+        each(put, text)
