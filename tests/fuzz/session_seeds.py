@@ -123,6 +123,28 @@ def workers(put, text):
     put("worker_messages", front + segment(0, 0) + bytes([3, 0, 0, 0, 0, 0, 1]) + bytes([3, 0, 0, 0, 1, 0, 0, 9, 0, 0]) + bytes([3, 0, 0, 0, 0, 0, 2]) + bytes(8) + bytes([3, 0, 0, 0, 0, 3, 0]))
 
 
+def viewers(put, text):
+    say = lambda page, *messages: b"".join(bytes([3 | page << 3]) + text(m.encode() if isinstance(m, str) else json.dumps(m).encode()) for m in messages)
+    show = b"\x01\x00\x01\x01\x01\xd0"
+    draw = b"\x02\x01\x03"
+    watch = lambda *ids, of="main": [{"watch": of, "id": i} for i in ids]
+    compare = lambda number, **more: {"compare": number, **more}
+    course = say(0, {"hello": True}, *watch(1), *watch(2, of="lights"), *watch(3, of="none"), {"watch": 5, "id": 4}, {"watch": "main"}, {"watch": "main", "id": 70000}, {"watch": "main", "id": -1}) + show + draw + show + say(
+        0, {"shown": 1}, {"shown": 9}, {"shown": "a"}, {"dark": 1}, {"dark": 9}, {"dark": []}, compare(1), compare(1, without=[{"owner": "1", "layer": "a"}]), compare(2), compare(9), compare("a"), compare(1, without=5), compare(1, without=[5]),
+        compare(1, without=[{"owner": 1, "layer": "a"}]), compare(1, without=[{"owner": "x", "layer": "a"}]), compare(1, without=[{"owner": "1", "layer": 2}]), compare(1, without=[{}] * 300)) + draw + show + b"\x83" + text(b'{"compare": 1}') + b"\x83" + text(
+        b'{"compare": 1}') + say(0, {"unwatch": 1}, {"unwatch": "a"}, {"unwatch": 9}, {"stats": 1}, {"layers": 1}, {"stop": 1}, {"none": 1}, 5, "{", "")
+    update = [{"update": u} for u in ({"name": "main", "brightness": 0.5}, {"name": "main", "brightness": 9}, {"name": "none", "brightness": 0.5}, {"name": "main"}, {"none": 1}, 5, {"name": "main", "blank": True}, {"name": "main", "view": {}},
+                                      {"name": "main", "brightness": "NaN"}, {"name": "\ud800"})]
+    clear = [{"clear": c} for c in ({"owner": "1", "layer": "a"}, {"owner": "9", "layer": "a"}, {"owner": "1", "layer": ""}, {}, [], {"owner": -1})]
+    lost = say(0, *watch(1, 2)) + show + b"\x01\xf0" + say(0, {"shown": 1}, {"hello": 1}, {"stats": 1}) + b"\x00\x40\x01\xe0" + draw + show + say(0, {"shown": 1}, compare(1))
+    for control in (b"\x00", b"\x01"):
+        put("viewer_messages", control + course)
+        put("viewer_messages", control + draw + say(0, *update, *clear))
+        put("viewer_messages", control + lost)
+        put("viewer_messages", control + say(0, *watch(*range(18))) + b"".join(say(page, *watch(*range(16))) for page in range(1, 5)))
+        put("viewer_messages", control + say(1, *watch(1)) + show + b"\xfb" + text(b'{"hello": 1}') + b"\x8b" + text(b'{"compare": 1}') + b"\xfb" + text(b"{}") + show)
+
+
 def sessions(put, text):
-    for each in (foxglove, lights, deltas, workers):
+    for each in (foxglove, lights, deltas, workers, viewers):
         each(put, text)
