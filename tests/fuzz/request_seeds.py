@@ -57,7 +57,7 @@ def wrong_values(field, value):
         return [b"", value[:-1], value[:-4], value + b"\0", value * 2, value + value[:4], bad + value[4:], value[:-4] + bad, b"\xff" * len(value), b"\x7f" * len(value), b"\0\0\x80\x7f" + value[4:], bytes(len(value))]
     signed = kind in (field.TYPE_INT32, field.TYPE_SINT32, field.TYPE_INT64, field.TYPE_SINT64, field.TYPE_SFIXED32, field.TYPE_SFIXED64)
     bits = 64 if "64" in str(field.GetOptions()) or kind in (field.TYPE_INT64, field.TYPE_UINT64, field.TYPE_FIXED64, field.TYPE_SINT64, field.TYPE_SFIXED64) else 32
-    return [0, 1, 2, value + 1, max(value - 1, 0), value * 2, 5, 127, 300, 70000] + ([-1, -(1 << bits - 1), (1 << bits - 1) - 1] if signed else [(1 << bits) - 1, 1 << bits - 1])
+    return [0, 1, 2, value + 1, max(value - 1, 0), value * 2, 5, 127, 300, 70000] + ([-1, -(1 << bits - 1), (1 << bits - 1) - 1, 7 << bits - 4] if signed else [(1 << bits) - 1, 1 << bits - 1])
 
 
 def one(field):

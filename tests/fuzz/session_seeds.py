@@ -1,7 +1,14 @@
 """Seeds by hand for sessions: what of a protocol's course is rare in real traffic, each refusal among it. As shape_seeds.py; `text` is
 make_seeds.text."""
 import json
+import pathlib
+import sqlite3
 import struct
+import tempfile
+
+from google.protobuf import text_format
+
+from request_seeds import classes
 
 
 def foxglove(put, text):
@@ -145,6 +152,112 @@ def viewers(put, text):
         put("viewer_messages", control + say(1, *watch(1)) + show + b"\xfb" + text(b'{"hello": 1}') + b"\x8b" + text(b'{"compare": 1}') + b"\xfb" + text(b"{}") + show)
 
 
+def states(put, _):
+    """Files of the daemon's state, with rows of every kind (daemon/state/state_file.cc), and others that are none."""
+    owner, thing, layer, entity = classes("KeptOwner", "KeptObject", "KeptLayer", "KeptEntity")
+    read = lambda kind, line: text_format.Parse(line, kind()).SerializeToString()
+    box = "primitive { box { size { x: 1 y: 1 z: 1 } } }"
+    rows = [(1, 1, "", "", owner(token=b"0123456789abcdef").SerializeToString()), (1, 2, "", "", owner(hidden=True).SerializeToString()), (1, 3, "", "", b"\xff")]
+    rows += [(2, 1, "a", "", read(thing, f"definition {{ parts {{ {box} }} }}")), (2, 9, "a", "", b""), (2, 1, "bad", "", b"\xff"), (2, 1, "none", "", b"")]
+    rows += [(2, 1, name, "", read(thing, f'definition {{ parts {{ primitive {{ instance {{ object: "{of}" }} }} }} }}')) for name, of in (("b", "c"), ("c", "a"), ("d", "d"), ("e", "f"), ("f", "e"))]
+    rows += [(3, 1, name, "", read(layer, f'info {{ layer: "{name}" number: {number} visible: true opacity: 255 client_name: "c" }}')) for name, number in (("l", 2), ("k", 1))]
+    rows += [(3, 9, "l", "", b""), (3, 1, "bad", "", b"\xff"), (3, 1, "none", "", b"")]
+    rows += [(4, 1, place, name, read(entity, f"entity {{ {what} }} {more}")) for place, name, what, more in (
+        ("l", "x", box, ""), ("l", "y", box, "expires_unix_ns: 2000000000000000000"), ("l", "z", box, "expires_unix_ns: -5"), ("k", "x", 'primitive { instance { object: "b" } }', ""), ("none", "x", box, ""), ("l", "bad", "", ""))]
+    rows += [(4, 1, "l", "bytes", b"\xff"), (0, 1, "", "", b""), (7, 1, "a\x01", "", b""), (1 << 40, 1, "", "", b"")]
+    table = ("CREATE TABLE rows(kind INTEGER NOT NULL, owner INTEGER NOT NULL, name BLOB NOT NULL, id BLOB NOT NULL,bytes BLOB NOT NULL, PRIMARY KEY(kind, owner, name, id)) WITHOUT ROWID")
+
+    def file(some, application=0x76786C64, version=1, table=table, more=""):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "state.db"
+            database = sqlite3.connect(path)
+            database.executescript(f"PRAGMA page_size=512; PRAGMA application_id={application}; PRAGMA user_version={version}; {table}; {more}")
+            if some:
+                database.executemany("INSERT INTO rows VALUES(?, ?, ?, ?, ?)", [(k, o, n.encode(), i.encode(), b) for k, o, n, i, b in some])
+            database.commit()
+            database.close()
+            return path.read_bytes()
+
+    whole = file(rows)
+    for data in (whole, file(rows[:2]), file([]), file([], 0), file([], 0, table=""), file([], 5), file([], version=2), file([], table="CREATE TABLE rows(a)"), file([], table="CREATE TABLE other(a)"), file([], table="CREATE VIEW rows AS SELECT 1 AS kind"), file([], table=""),
+                 file(rows, table=table.replace(" WITHOUT ROWID", "")), file(rows, table=table.replace("bytes BLOB", "bytes TEXT")), file([(4, i, "l", str(i), b"x" * 300) for i in range(20)]),
+                 file([], more="CREATE TRIGGER t BEFORE INSERT ON rows BEGIN SELECT RAISE(ABORT, 'no'); END"), file([], more="CREATE TRIGGER t BEFORE DELETE ON rows BEGIN SELECT RAISE(ABORT, 'no'); END"),
+                 file([], more="CREATE TRIGGER t AFTER INSERT ON rows BEGIN DELETE FROM rows; END"), file([], more="CREATE TRIGGER t AFTER INSERT ON rows BEGIN SELECT RAISE(ROLLBACK, 'no'); END"),
+                 file([], table=table.replace("id BLOB NOT NULL,", "id BLOB NOT NULL CHECK(length(id) > 5),")), whole[:512], whole[:1000], whole[:-512], b"SQLite format 3", b"", b"none", whole[:100] + b"\xff" * 40 + whole[140:],
+                 whole[:700] + b"\xff" * 20 + whole[720:], whole[:2000] + bytes(512) + whole[2512:]):
+        put("state_file", data, 16384)
+
+
+def devices(put, text):
+    ask = lambda kind, request, value=0, length=4096: bytes([0, kind, request]) + struct.pack("<HH", value, length) + text(b"")
+    begun = b"\x00\x02"
+    usb = b"".join(ask(0x80, 6, value) for value in (0x0100, 0x0200, 0x0201, 0x0300, 0x0301, 0x0309, 0x0F00, 0x0700)) + b"".join(ask(*a) for a in ((0x80, 0), (0x81, 0), (0x82, 0), (0x80, 8), (0x81, 10), (0xC0, 0x20), (0xC0, 0x21), (0xC1, 1), (0xC1, 99), (0xC1, 1, 9)))
+    set_ = b"".join(ask(*a) for a in ((0x00, 9, 1), (0x00, 9, 2), (0x00, 9, 0), (0x01, 11, 0), (0x01, 11, 1), (0x02, 1), (0x02, 3), (0x00, 5, 7), (0x41, 99), (0x41, 1)))
+    for target in ("voxlink_device", "voxlink_firmware"):
+        put(target, begun + usb + set_)
+        put(target, b"\x00" + usb + set_ + b"\x02" + usb)
+
+
+def hosts(put, _):
+    """A device that lies once, in each of the first things that it says."""
+    for holding in (0, 1):
+        for at in range(16):
+            tell = lambda *lie: put("voxlink_host", bytes([holding]) + bytes(at) + bytes(lie) + bytes(40) + bytes([0, 9, 2, 200, 9, 250]) + bytes(60))
+            for status in range(7):
+                tell(0x80, status)
+            for word in range(19):
+                for value in (0, 1, 5000, 30001, 0xFFFFFFFF):
+                    tell(0xC0, word, *struct.pack("<I", value))
+            tell(0xE0, 0x5C, 0)
+            tell(0xE0, *bytes(60), 0x5C, 0)
+
+
+def producers(put, text):
+    """Over the local socket: what is no packet, and packets that go with it."""
+    hello, release = b"\x00", lambda number: bytes([4, number])
+    hold = lambda number, size, seals=0: bytes([1]) + struct.pack("<H", size) + bytes([number, seals])
+    other = lambda choice, *more: bytes([7, choice, *more])
+    raw = lambda packet, descriptors=0: b"\x06" + text(packet) + bytes([descriptors])
+    put("local_packets", hello + hold(1, 4096) + other(0xA1) + other(0xA1) + release(1) + b"".join(hold(i, 4096) for i in range(1, 6)) + other(0xE0) + hold(6, 4096))
+    put("local_packets", hello + b"".join(hold(i, 4096) + other(0xA0 + i) + release(i) for i in range(4)) + b"".join(hold(i, 4096) for i in range(4)) + other(0xE0) + hold(3, 4096))
+    put("local_packets", hello + hold(1, 30000) + hold(2, 31000) + hold(3, 5000) + release(1) + hold(3, 5000) + other(0x00) + hello + hold(1, 100) + hold(1, 100))
+    put("local_packets", other(0x90) + other(0x60) + hello + other(0x61) + other(0x70) + hello + other(0x71) + hello + other(0x80, 40) + other(0x90))
+    for count in (5, 40, 255):
+        put("local_packets", other(0xA0, count) + hello + b"\x07\xa0" + bytes([count]) + other(0x80) + bytes([7, 0xA0, count]))
+    for packet in (hello, hold(1, 4096), release(1), raw(b"\x0a\x02ab", 1), raw(b"\x0a\x02ab", 2), raw(b"\x1a\x02\x08\x01", 1), raw(b"\x1a\x02\x08\x01", 2), raw(b"", 1), raw(b"\x0a\x10" + b"a" * 16), raw(b"\x7a\x00")):
+        put("local_packets", hello + packet + packet)
+        put("local_packets", other(0x40) + packet + hello + other(0x40) + packet + packet)
+    put("local_packets", hello + raw(b"a" * 4097), 8192)  # longer than a packet may be
+    for size, real in ((0, 0), (0, 50), (50, 0), (50, 100), (100, 100)):
+        put("local_packets", hello + bytes([1]) + struct.pack("<H", size) + bytes([1, 0x80]) + struct.pack("<H", real))
+    for seals in range(0x40, 0x60):
+        put("local_packets", hello + hold(1, 4096, seals))
+    put("local_packets", hello + bytes([3]) + struct.pack("<Q", 1 << 62) + bytes([1, 0]) + other(0x30) + hold(1, 64))
+
+
+def assets(put, text):
+    """Uploads, in memory, in a folder, and in one that is none or is damaged."""
+    begin = lambda content, choice=0, *more: bytes([0, content, choice, *more])
+    append = lambda upload, choice=0, size=8192, *more: bytes([2, upload, choice]) + struct.pack("<H", size) + bytes(more)
+    finish, abandon = lambda upload=0: bytes([4, upload]), lambda upload=0: bytes([5, upload])
+    wait = lambda choice, *more, time=0: bytes([6, choice, *more, time, 0])
+    find = lambda content, offset=0, size=50: bytes([7, content, 0, offset]) + struct.pack("<H", size)
+    whole = lambda content: begin(content) + append(0) + finish()
+    for where in (0, 1, 0x80, 0x81):
+        front = bytes([where])
+        put("asset_uploads", front + whole(2) + find(2) + whole(2) + find(2, 99, 9) + find(3) + whole(0) + begin(2, 1, *bytes(8)) + begin(3, 1, 255, 255, 0, 0, 0, 0, 0, 0) + begin(3, 2, 7, 0, 0, 0, 0, 0, 0, 0))
+        put("asset_uploads", front + begin(3) + append(0, 0, 100) + append(0, 2, 100, 9, 0, 0, 0, 0, 0, 0, 0) + append(0, 0, 0) + finish() + begin(3, 200) + append(0) + append(0, 1, 0) + text(b"too much") + finish() + find(3, 0, 4096))
+        put("asset_uploads", front + begin(3) + append(0, 1, 0) + text(b"wrong") + finish() + begin(1) + append(0, 1, 0) + text(b"z") + finish() + find(1))
+        put("asset_uploads", front + begin(2) + begin(2) + begin(3) + begin(4) + begin(5) + wait(99, time=90) + begin(5) + append(0) + finish() + append(1) + finish(1) + abandon() + abandon())
+        put("asset_uploads", front + b"".join(whole(i) for i in (1, 2, 3, 4, 5)) + b"".join(find(i) for i in range(6)) + whole(5) + begin(5) + begin(4) + begin(3) + begin(2) + wait(99, time=40) + begin(1))
+        put("asset_uploads", front + whole(3) + wait(20) + find(3) + wait(20) + whole(3) + begin(4) + append(0, 0, 100) + wait(20) + begin(4, 200) + append(0) + finish() + find(4))
+        for how in (0, 1, 64, 65, 66, 31, 100, 130, 200):
+            for file in (0, 1):
+                put("asset_uploads", front + whole(3) + whole(4) + find(3) + wait(5, how, file, 9, 0) + find(3) + find(4) + whole(3) + whole(4) + find(3, 200, 4000))
+                put("asset_uploads", front + whole(3) + begin(4) + append(0, 0, 100) + wait(40, how, file) + find(3) + find(3, 0, 4096) + append(0) + finish() + whole(3) + begin(2) + wait(40, how, file) + append(0) + finish() + begin(2) + append(0) + wait(40, how, file) + find(2))
+                put("asset_uploads", front + whole(3) + wait(20) + wait(40, how, file) + whole(3) + begin(3) + find(3) + begin(5) + append(0, 0, 200) + abandon() + wait(40, how, file) + begin(5, 200) + append(0) + finish())
+
+
 def sessions(put, text):
-    for each in (foxglove, lights, deltas, workers, viewers):
+    for each in (devices, hosts, producers, assets, states, foxglove, lights, deltas, workers, viewers):
         each(put, text)

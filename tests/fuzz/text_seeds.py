@@ -1,6 +1,10 @@
 """Seeds by hand for the readers of maps, points, molecules and drawings: every form that they know, and each of their refusals. As
 shape_seeds.py."""
 import json
+import pathlib
+import re
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 def maps(put):
@@ -109,6 +113,20 @@ def grants(put):
         put("grants", text.encode())
 
 
+def configurations(put):
+    """Each key of daemon/config/fields.h in its section, with values of every kind."""
+    section = ""
+    for word, name in re.findall(r'visitor\.(\w+)\("(\w+)"', (ROOT / "daemon/config/fields.h").read_text()):
+        if word == "Section":
+            section = name
+            continue
+        for value in ('"text"', '""', "true", "5", "-1", "9223372036854775807", "1e300", "nan", "0.5", "[]", '["127.0.0.1:1"]', "1979-05-27"):
+            put("config_text", f"[{section}]\n{name} = {value}\n".encode())
+    for text in ("display = 5", "display = [1]", "display = []", "[display]\nname = 'a'", "[[display]]", "[[display]]\nname = 'a'\ndriver = 'simulated'\n" * 2, "[[display]]\nname = 'a b'\ndriver = 'x'\nsize = [1, 2]\nmore = {}", "[none]\na = 1", "server = 1", "[server]\nnone = 1", "a = ",
+                 "[server]\nlocal_socket = 'tcp:5'", "[server]\nlocal_socket = '/run/a'", "[server]\nlocal_socket = 'off'", "[server]\nlocal_socket = '" + "a" * 200 + "'", "[server]\nhttp = 'off'", "[server]\nhttp = 'unix:/a'", "[server]\nhttp = ':::'", "[server]\nlisten = ['unix:/a', 5]", "[server]\nlisten = ['a']"):
+        put("config_text", text.encode())
+
+
 def texts(put):
-    for reader in (grants, maps, points, molecules, drawings):
+    for reader in (configurations, grants, maps, points, molecules, drawings):
         reader(put)

@@ -225,7 +225,7 @@ void Run(Script script) {
   const auto stray = store->FindAsset(StrayDigest(), 0, 1);
   ExpectSays(stray.status());
   EXPECT_THAT_HOLDS(!stray.ok(), "content is served that has not its hash");
-  const AssetFigures figures = store->figures();
+  const daemon::AssetFigures figures = store->figures();
   EXPECT_THAT_HOLDS(figures.count <= limits.max_assets && figures.bytes <= limits.max_bytes);
 }
 

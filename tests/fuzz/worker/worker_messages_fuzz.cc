@@ -143,8 +143,8 @@ class Owner {
       EngineOptions own = options;
       own.threads = 1;
       auto engine = CreateCpuEngine(own, "");
-      if (!engine.ok() || options.device == 0) return engine;
-      return std::make_unique<LinkedEngine>(*std::move(engine));
+      if (options.device == 0) return engine;
+      return std::make_unique<LinkedEngine>(std::move(engine));
     };
     hooks_.pin = hooks_.pin_read_only = [this](std::span<std::byte> memory) {
       EXPECT_THAT_HOLDS(!memory.empty() && pinned_.emplace(memory.data(), memory.size()).second,
