@@ -3,6 +3,7 @@ commit; and the same that are wrong in one place, each field in turn left out or
 reach something are kept by `tools/fuzz --merge`. As shape_seeds.py."""
 import functools
 import pathlib
+import re
 import struct
 import subprocess
 import tempfile
@@ -36,8 +37,12 @@ def classes(*names):
     return [classes_of()(pool().FindMessageTypeByName(f"voxeld.v1.{n}")) for n in names]
 
 
-def lines():
-    return [l for l in (ROOT / "tests/fuzz/wire/requests.txt").read_text().splitlines() if l and not l.startswith("#")]
+def lines(all_=False):
+    """Those whose fields are to be wrong in turn, or all."""
+    text = (ROOT / "tests/fuzz/wire/requests.txt").read_text()
+    if not all_:
+        text = text[:text.index("# Refusals")]
+    return [re.sub("@([0-9]+)@", lambda m: r"\000" * int(m[1]), l) for l in text.splitlines() if l and not l.startswith("#")]
 
 
 def wrong_values(field, value):
@@ -127,7 +132,7 @@ def requests(put, text):
     [request] = classes("StreamRequest")
     parse = lambda line: text_format.Parse(line, request())
     commit = b"\x08" + text(parse("commit { frame_id: 1 }").SerializeToString()) + b"\x00"
-    good = [parse(line) for line in lines()]
+    good = [parse(line) for line in lines(all_=True)]
     # Payloads that are large enough not to be copied with the message.
     zeros = lambda size: "\\000" * size
     for kind in (f'points {{ vertices {{ count: 300 position_type: ELEMENT_TYPE_F32 positions: "{zeros(3600)}" color_type: ELEMENT_TYPE_RGB8 colors: "{zeros(900)}" }} }}',
@@ -143,6 +148,49 @@ def requests(put, text):
         put("store", b"".join(m + commit for m in kinds[at:at + 12]), 16384)
     put("store", b"".join(message(r) + commit for r in good if r.WhichOneof("op") not in ("open", "upsert")), 16384)
     wrong(put, text, parse, commit)
+    scenes(put, text, parse)
+
+
+def scenes(put, text, parse):
+    """What a scene refuses, whoever asks: quotas, depths, transforms, frames. Of two clients, one of which may not erase."""
+    say = lambda client, *what: b"".join(bytes([8 | client]) + text(parse(line).SerializeToString()) + b"\x00" for line in what)
+    commit = "commit { frame_id: 1 }"
+    sphere = "primitive { sphere { radius: 1 } }"
+    upsert = lambda name, what=sphere, layer="a": f'upsert {{ layer: "{layer}" id: "{name}" entity {{ {what} }} }}'
+    of = lambda name: f'primitive {{ instance {{ object: "{name}" }} }}'
+    define = lambda name, *parts: f'define_object {{ object: "{name}" definition {{ {" ".join(f"parts {{ {p} }}" for p in parts)} }} }}'
+    matrix = lambda n: f"transform {{ m: [{n},0,0,0, 0,{n},0,0, 0,0,{n},0] }}"
+    state = lambda more, layer="a": f'layer_state {{ layer: "{layer}" {more} }}'
+    letters = lambda number: upsert(f"t{number}", f'primitive {{ text {{ text: "{"".join(chr(97 + (number * 7 + i) % 26) for i in range(14))}" height: 1 depth: 0.5 }} }}')
+    many = define("m", *[sphere] * 16)
+    for strict in ((), ("open { strict: true }",)):
+        for client in (0, 1):
+            front = say(client, *strict)
+            for course in (
+                    [*[upsert("x", layer=f"l{i}") for i in range(14)], commit], [many, *[upsert(f"i{i}", of("m")) for i in range(14)], commit], [letters(i) for i in range(5)] + [commit] + [letters(i) for i in range(5, 12)] + [commit] + [letters(i) for i in range(12, 20)] + [commit],
+                    [define("1", sphere), *[define(str(i), of(str(i - 1))) for i in range(2, 8)], commit], [define("1", of("1")), commit], [define("1", of("none")), commit], [define("2", sphere), define("1", of("2")), define("2", of("1")), commit],
+                    [define("1", sphere), *[define(str(i), of(str(i - 1)) + " " + matrix("1e150")) for i in range(2, 6)], commit], [define("1", sphere), upsert("x", of("1")), commit, *[define("1", *[sphere] * 16)], commit],
+                    [define("1", sphere), *[upsert(f"i{i}", of("1")) for i in range(40)], commit, define("1", *[sphere] * 16), commit], [define("1", sphere), upsert("x", of("1") + matrix("1e30")), commit, define("1", sphere + matrix("1e30")), commit],
+                    [define("1", sphere), define("2", of("1"), of("1")), upsert("x", of("2")), commit, 'delete_object { object: "1" }', commit, 'delete_object { object: "1" cascade: true }', commit, 'delete_object { object: "1" }', commit],
+                    [state(matrix("1e200")), upsert("x", sphere + matrix("1e200")), commit], [upsert("x", sphere + matrix("1e30")), commit, state(matrix("1e30")), commit], [upsert("x"), commit, 'set_transform { layer: "a" id: "x" transform { m: [1e38,0,0,0, 0,1e38,0,0, 0,0,1e38,0] } }', commit],
+                    [state("blend: BLEND_MODE_ERASE"), commit], [upsert("x", sphere + " erase: true"), commit], ['frame_begin { layer: "a" }', 'frame_begin { layer: "a" }', upsert("x"), 'frame_end { layer: "a" }', 'frame_end { layer: "a" }', commit], ['frame_begin { layer: "a" }', upsert("x"), commit],
+                    ['frame_begin { layer: "a" }', upsert("x", of("none")), 'frame_end { layer: "a" }', commit], [*[upsert("x", layer=f"l{i}") for i in range(12)], 'frame_begin { layer: "more" }', upsert("x", layer="more"), 'frame_end { layer: "more" }', state("visible: true", "more2"), commit],
+                    [upsert(f"{i}") for i in range(150)] + [commit], [state('mask_layer: "a"'), state('mask_layer: "b"'), state('mask_layer: "a"', "b"), commit]):
+                put("store", front + say(client, *course), 16384)
+                # Within what an operator has set, in few and in small ones; and beside another's.
+                put("store", front + bytes([4 | client, 6]) + say(client, *course), 16384)
+                put("store", front + bytes([4 | client, 4]) + say(client, *course), 16384)
+                both = say(client, *course) + say(1 - client, *course)
+                put("store", front + both, 16384)
+    update, = classes("ApplyUpdateRequest")
+    asked = lambda *what, **opened: text(update(operations=[parse(l) for l in what], **opened).SerializeToString())
+    put("store", b"\x06" + asked(*[upsert(str(i)) for i in range(130)]), 16384)
+    named = [l for l in lines() if "_in {" in l]
+    opened = parse('open { resume_token: "0123456789abcdef" }').open
+    put("store", b"\x06" + asked(upsert("x"), open=opened))
+    for line in (*named, *[l for l in lines(all_=True) if "text {" in l][:3]):
+        for how in (b"\x06", b"\x86"):
+            put("store", how + asked(line), 16384)
 
 
 def wrong(put, text, parse, commit):

@@ -148,7 +148,7 @@ def viewers(put, text):
         put("viewer_messages", control + course)
         put("viewer_messages", control + draw + say(0, *update, *clear))
         put("viewer_messages", control + lost)
-        put("viewer_messages", control + say(0, *watch(*range(18))) + b"".join(say(page, *watch(*range(16))) for page in range(1, 5)))
+        put("viewer_messages", control + say(0, *watch(*range(18))) + b"".join(say(page, *watch(*range(16))) for page in range(1, 5)), 8192)
         put("viewer_messages", control + say(1, *watch(1)) + show + b"\xfb" + text(b'{"hello": 1}') + b"\x8b" + text(b'{"compare": 1}') + b"\xfb" + text(b"{}") + show)
 
 
@@ -218,16 +218,17 @@ def producers(put, text):
     hold = lambda number, size, seals=0: bytes([1]) + struct.pack("<H", size) + bytes([number, seals])
     other = lambda choice, *more: bytes([7, choice, *more])
     raw = lambda packet, descriptors=0: b"\x06" + text(packet) + bytes([descriptors])
-    put("local_packets", hello + hold(1, 4096) + other(0xA1) + other(0xA1) + release(1) + b"".join(hold(i, 4096) for i in range(1, 6)) + other(0xE0) + hold(6, 4096))
-    put("local_packets", hello + b"".join(hold(i, 4096) + other(0xA0 + i) + release(i) for i in range(4)) + b"".join(hold(i, 4096) for i in range(4)) + other(0xE0) + hold(3, 4096))
-    put("local_packets", hello + hold(1, 30000) + hold(2, 31000) + hold(3, 5000) + release(1) + hold(3, 5000) + other(0x00) + hello + hold(1, 100) + hold(1, 100))
-    put("local_packets", other(0x90) + other(0x60) + hello + other(0x61) + other(0x70) + hello + other(0x71) + hello + other(0x80, 40) + other(0x90))
+    put("local_packets", hello + hold(1, 4096) + other(0xC1) + other(0xC1) + release(1) + b"".join(hold(i, 4096) for i in range(1, 6)) + other(0xE0) + hold(6, 4096))
+    put("local_packets", hello + b"".join(hold(i, 4096) + other(0xC0 + i) + release(i) for i in range(4)) + b"".join(hold(i, 4096) for i in range(4)) + other(0xE0) + hold(3, 4096))
+    put("local_packets", hello + hold(1, 30000) + hold(2, 32000) + hold(3, 5000) + release(1) + hold(3, 5000) + other(0x00) + hello + hold(1, 100) + hold(1, 100))
+    put("local_packets", other(0x90) + other(0x60) + hello + other(0x61) + other(0x70) + hello + other(0x71) + hello + other(0xA0, 40) + other(0x90))
     for count in (5, 40, 255):
-        put("local_packets", other(0xA0, count) + hello + b"\x07\xa0" + bytes([count]) + other(0x80) + bytes([7, 0xA0, count]))
+        put("local_packets", other(0xA0, count) + hello + other(0xA0, count) + other(0x80) + other(0xA0, count))
     for packet in (hello, hold(1, 4096), release(1), raw(b"\x0a\x02ab", 1), raw(b"\x0a\x02ab", 2), raw(b"\x1a\x02\x08\x01", 1), raw(b"\x1a\x02\x08\x01", 2), raw(b"", 1), raw(b"\x0a\x10" + b"a" * 16), raw(b"\x7a\x00")):
         put("local_packets", hello + packet + packet)
         put("local_packets", other(0x40) + packet + hello + other(0x40) + packet + packet)
     put("local_packets", hello + raw(b"a" * 4097), 8192)  # longer than a packet may be
+    put("local_packets", raw(b"\x0a\x00", 1) + raw(b"\x0a\x00", 2) + hello + raw(b"\x0a\x00", 1))
     for size, real in ((0, 0), (0, 50), (50, 0), (50, 100), (100, 100)):
         put("local_packets", hello + bytes([1]) + struct.pack("<H", size) + bytes([1, 0x80]) + struct.pack("<H", real))
     for seals in range(0x40, 0x60):

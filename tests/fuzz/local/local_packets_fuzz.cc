@@ -146,7 +146,9 @@ class Producer {
       ReadAnswer("packet");
       Connect();
     } else if (choice < 0x80) {  // it hears no answer
-      Send("packet", {});
+      v1::LocalMessage message;
+      message.mutable_release()->set_id(99);
+      Send(message.SerializeAsString(), {});
       close(std::exchange(socket_, -1));
       EXPECT_THAT_HOLDS(!connection_->Serve(tokens_), "nobody is there, and it goes on");
       Connect();
@@ -226,7 +228,7 @@ class Producer {
 
   void Look() {
     const local::LocalMemory& memory = *registered_.memory;
-    EXPECT_THAT_HOLDS(memory.memories() <= 4 && memory.bytes() <= 64 << 10);
+    EXPECT_THAT_HOLDS(memory.memories() <= 4 && memory.bytes() <= 64 << 10 && !memory.ended());
     for (uint64_t id = 0; id < 8; ++id) {
       for (const uint64_t offset : {uint64_t{0}, uint64_t{100}, UINT64_MAX}) {
         const auto range = memory.Find(id, offset, 16);
