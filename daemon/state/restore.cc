@@ -120,13 +120,25 @@ class Reader {
     for (auto& [owner, objects] : objects_) {
       std::set<std::string> begun;
       std::vector<Operation> operations;
-      const auto put = [&](const auto& self, const std::string& name) -> void {
+      // From each to what it refers to, however many there are one behind the other; and how many of those are done.
+      std::vector<std::pair<wire::KeptObjectRow*, size_t>> path;
+      const auto begin = [&](const std::string& name) {
         const auto found = objects.find(name);
         if (found == objects.end() || !begun.insert(name).second) return;
-        for (const std::string& other : found->second.refers_to) self(self, other);
-        operations.push_back(std::move(found->second.operation));
+        path.emplace_back(&found->second, 0);
       };
-      for (const auto& [name, row] : objects) put(put, name);
+      for (const auto& [name, row] : objects) {
+        begin(name);
+        while (!path.empty()) {
+          auto& [object, done] = path.back();
+          if (done < object->refers_to.size()) {
+            begin(object->refers_to[done++]);
+            continue;
+          }
+          operations.push_back(std::move(object->operation));
+          path.pop_back();
+        }
+      }
       out_.scene.steps.push_back({owner, "", std::move(operations)});
     }
   }

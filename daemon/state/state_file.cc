@@ -17,8 +17,9 @@ namespace {
 
 constexpr const char* kBeside[] = {"", "-wal", "-journal", "-shm"};
 
-constexpr char kSchema[] =
-    "CREATE TABLE IF NOT EXISTS rows("
+// As SQLite keeps it, behind CREATE TABLE.
+constexpr char kTable[] =
+    "rows("
     "kind INTEGER NOT NULL, owner INTEGER NOT NULL, name BLOB NOT NULL, id BLOB NOT NULL,"
     "bytes BLOB NOT NULL, PRIMARY KEY(kind, owner, name, id)) WITHOUT ROWID";
 
@@ -135,10 +136,22 @@ absl::Status StateFile::Prepare() {
                      kVersion, "; run the version that made it, or move it away"));
   }
   if (tables == 0) {
-    const std::string sql =
-        absl::StrCat("BEGIN IMMEDIATE;", kSchema, ";PRAGMA application_id=", kApplicationId,
-                     ";PRAGMA user_version=", kVersion, ";COMMIT");
+    const std::string sql = absl::StrCat("BEGIN IMMEDIATE;CREATE TABLE ", kTable,
+                                         ";PRAGMA application_id=", kApplicationId,
+                                         ";PRAGMA user_version=", kVersion, ";COMMIT");
     if (status = Run(sql.c_str()); !status.ok()) return status;
+  } else {
+    // Triggers, views and constraints of somebody else's would have a say in what is kept.
+    int64_t ours = 0;
+    const std::string sql =
+        absl::StrCat("SELECT count(*) FROM sqlite_schema WHERE type='table' AND sql='CREATE TABLE ",
+                     kTable, "'");
+    if (status = number(sql.c_str(), &ours); !status.ok()) return status;
+    if (tables != 1 || ours != 1) {
+      return absl::DataLossError(absl::StrCat("the state file ", options_.path, ": of its ", tables,
+                                              " tables, indices, views and triggers ", ours,
+                                              " is as it was made; one alone is to be there"));
+    }
   }
   statements_ = std::make_unique<Statements>(database_);
   for (const auto& [which, sql] :

@@ -1,6 +1,7 @@
 #include "daemon/wire/kept.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -78,7 +79,9 @@ absl::StatusOr<std::string> EncodeKept(const Entity& entity, const TwoClocks& no
   to->set_erase(entity.data.erase);
   to->set_label(entity.data.label);
   if (entity.expires_ns != sync::kNever) {
-    out.set_expires_unix_ns(now.unix_ns + (entity.expires_ns - now.monotonic_ns));
+    // Centuries ahead it is the last time that there is.
+    const int64_t left = entity.expires_ns - now.monotonic_ns;
+    out.set_expires_unix_ns(now.unix_ns + std::min(left, INT64_MAX - now.unix_ns));
   }
   return out.SerializeAsString();
 }
@@ -138,9 +141,8 @@ absl::StatusOr<std::optional<Operation>> DecodeKeptEntity(
   v1::KeptEntity in;
   if (absl::Status status = Parse(bytes, &in); !status.ok()) return status;
   if (in.expires_unix_ns() != 0) {
-    const int64_t left = in.expires_unix_ns() - now.unix_ns;
-    if (left <= 0) return std::optional<Operation>();
-    in.mutable_entity()->set_lifetime_ns(left);
+    if (in.expires_unix_ns() <= now.unix_ns) return std::optional<Operation>();
+    in.mutable_entity()->set_lifetime_ns(in.expires_unix_ns() - now.unix_ns);
   }
   v1::StreamRequest request;
   request.mutable_upsert()->set_layer(layer);

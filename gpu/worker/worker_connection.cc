@@ -147,6 +147,8 @@ class Connection final : public WorkerConnection {
         Segment::Adopt(std::exchange(message.fd, -1), named->size);
     if (!segment.ok()) return absl::InvalidArgumentError(segment.status().message());
     Mapped& mapped = segments_[named->segment];
+    Unpin(mapped);  // of one of that name before
+    mapped.pinned = {};
     mapped.segment = *std::move(segment);
     if (named->staging != 0) Pin(mapped, mapped.segment->bytes());
     return absl::OkStatus();
@@ -169,8 +171,10 @@ class Connection final : public WorkerConnection {
     absl::StatusOr<std::shared_ptr<Segment>> segment =
         Segment::AdoptReadOnly(std::exchange(message.fd, -1), named->size);
     if (!segment.ok()) return absl::InvalidArgumentError(segment.status().message());
-    if (hooks_.pin_read_only) hooks_.pin_read_only((*segment)->bytes());
-    bulk_.segments[named->segment] = *std::move(segment);
+    std::shared_ptr<Segment>& kept = bulk_.segments[named->segment];
+    if (kept != nullptr && hooks_.unpin) hooks_.unpin(kept->bytes());
+    kept = *std::move(segment);
+    if (hooks_.pin_read_only) hooks_.pin_read_only(kept->bytes());
     return absl::OkStatus();
   }
 

@@ -23,6 +23,8 @@ import time
 import zlib
 from concurrent import futures
 
+import request_seeds
+import session_seeds
 import shape_seeds
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -337,28 +339,6 @@ def pictures():
                 put("pictures", (pathlib.Path(folder) / name).read_bytes())
 
 
-def requests():
-    """Of every kind that the wire has, alone and one after another, each followed by a commit."""
-    encode = lambda line: subprocess.run(["protoc", "-I", ROOT / "proto", "--encode=voxeld.v1.StreamRequest", "voxeld/v1/scene.proto"],
-                                         input=line.encode(), cwd=ROOT / "proto", capture_output=True, check=True).stdout
-    lines = [l for l in (ROOT / "tests/fuzz/wire/requests.txt").read_text().splitlines() if l and not l.startswith("#")]
-    # Payloads that are large enough not to be copied with the message.
-    zeros = lambda size: "\\000" * size
-    for kind in (f'points {{ vertices {{ count: 300 position_type: ELEMENT_TYPE_F32 positions: "{zeros(3600)}" color_type: ELEMENT_TYPE_RGB8 colors: "{zeros(900)}" }} }}',
-                 f'mesh {{ vertices {{ count: 300 position_type: ELEMENT_TYPE_I16 positions: "{zeros(1800)}" index_type: ELEMENT_TYPE_U16 index_count: 300 indices: "{zeros(600)}" }} }}'):
-        lines.append(f'upsert {{ layer: "a" id: "large" entity {{ primitive {{ {kind} }} }} }}')
-        lines.append(f'batch {{ upserts {{ layer: "a" id: "large" entity {{ primitive {{ {kind} }} }} }} }}')
-        lines.append(f'define_object {{ object: "o" definition {{ parts {{ primitive {{ {kind} }} }} }} }}')
-    commit = b"\x08" + text(encode("commit { frame_id: 1 }")) + b"\x00"
-    messages = [b"\x08" + text(encode(line)) + b"\x50" for line in lines]
-    for message in messages:
-        put("store", message + commit, 12288)
-    kinds = [m for m, l in zip(messages, lines) if not l.startswith("open")]
-    for at in range(0, len(kinds), 12):
-        put("store", b"".join(m + commit for m in kinds[at:at + 12]), 16384)
-    put("store", b"".join(m + commit for m, l in zip(messages, lines) if l.split()[0] not in ("open", "upsert")), 16384)
-
-
 # ---- protocols, by hand
 
 def crc32c(data):
@@ -481,7 +461,8 @@ def main():
     parser.add_argument("--bin", type=pathlib.Path, default=ROOT / "build/host/bin", help="where voxeld and voxelctl are")
     args = parser.parse_args()
     texts()
-    requests()
+    request_seeds.requests(put, text)
+    session_seeds.sessions(put, text)
     voxlink()
     programs()
     sockets()

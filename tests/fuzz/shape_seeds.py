@@ -8,6 +8,7 @@ import struct
 import subprocess
 
 import file_seeds
+import text_seeds
 
 PROTO = pathlib.Path(__file__).resolve().parents[2] / "proto"
 
@@ -143,6 +144,7 @@ def encode(line):
 
 def shapes(put):
     file_seeds.files(put)
+    text_seeds.texts(put)
     file_seeds.recordings(put, encode)
     displays(put)
     meshes(put)

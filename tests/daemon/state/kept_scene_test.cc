@@ -1,10 +1,12 @@
 // What is kept comes back the same: random scenes through the file into another core.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <pthread.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <random>
 
 #include "absl/strings/str_cat.h"
@@ -15,10 +17,12 @@
 #include "daemon/state/kept_view.h"
 #include "daemon/state/restore.h"
 #include "daemon/wire/encode.h"
+#include "daemon/wire/kept.h"
 #include "display/sync/fake_clock.h"
 #include "tests/daemon/scene/random_scene.h"
 #include "tests/daemon/wire/random_primitive.h"
 #include "tests/daemon/wire/watched_scene.h"
+#include "voxeld/v1/state.pb.h"
 
 namespace voxeld::daemon::state {
 namespace {
@@ -103,6 +107,53 @@ class KeptScene : public ::testing::Test {
   const std::string folder_ = absl::StrCat(::testing::TempDir(), "/voxeld-kept-", getpid());
   sync::FakeClock clock_;
 };
+
+// `what` on a thread with a stack of 512 KiB.
+void OnSmallStack(std::function<void()> what) {
+  pthread_attr_t attributes;
+  ASSERT_EQ(pthread_attr_init(&attributes), 0);
+  ASSERT_EQ(pthread_attr_setstacksize(&attributes, 512 << 10), 0);
+  pthread_t thread;
+  const auto run = [](void* call) -> void* {
+    (*static_cast<std::function<void()>*>(call))();
+    return nullptr;
+  };
+  ASSERT_EQ(pthread_create(&thread, &attributes, run, &what), 0);
+  pthread_attr_destroy(&attributes);
+  pthread_join(thread, nullptr);
+}
+
+// As a file that somebody wrote may have them; the stack does not grow with it.
+TEST_F(KeptScene, ObjectsInALongChainAreRead) {
+  constexpr int kObjects = 50'000;
+  const auto name = [](int i) { return absl::StrCat("o", 1'000'000 + i); };
+  const auto file = OpenFile();
+  bool given = false;
+  const absl::Status put = file->Apply([&] {
+    std::vector<Change> changes;
+    if (std::exchange(given, true)) return changes;
+    changes.push_back(
+        {Change::What::kPut, {RowKind::kOwner, 1, "", ""}, wire::EncodeKept(OwnerRecord{})});
+    for (int i = 0; i < kObjects; ++i) {
+      v1::KeptObject object;
+      object.mutable_definition()->add_parts()->mutable_primitive()->mutable_instance()->set_object(
+          name(i + 1));
+      changes.push_back(
+          {Change::What::kPut, {RowKind::kObject, 1, name(i), ""}, object.SerializeAsString()});
+    }
+    return changes;
+  });
+  ASSERT_TRUE(put.ok()) << put;
+  absl::StatusOr<RestoredState> state = absl::UnknownError("not read");
+  OnSmallStack([&] { state = ReadState(*file, {0, kUnixNs}, Limits(), nullptr, nullptr); });
+  ASSERT_TRUE(state.ok()) << state.status();
+  EXPECT_EQ(state->objects, uint64_t{kObjects});
+  ASSERT_FALSE(state->scene.steps.empty());
+  const auto& operations = state->scene.steps.front().operations;
+  ASSERT_EQ(operations.size(), size_t{kObjects});
+  EXPECT_EQ(std::get<DefineObject>(operations.front().op).object, name(kObjects - 1));
+  EXPECT_EQ(std::get<DefineObject>(operations.back().op).object, name(0));
+}
 
 TEST_F(KeptScene, RandomScenesComeBackTheSame) {
   const auto records = std::make_shared<const OwnerRecords>(OwnerRecords{

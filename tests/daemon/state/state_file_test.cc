@@ -116,6 +116,25 @@ TEST_F(StateFileTest, WhatIsNoDatabaseIsPutAside) {
   EXPECT_TRUE(Put(**file, {PutOf(kEntity, "x")}).ok());
 }
 
+TEST_F(StateFileTest, TriggersAndTablesOfOthersHaveNoSay) {
+  for (const char* sql :
+       {"CREATE TRIGGER t AFTER INSERT ON rows BEGIN DELETE FROM rows; END", "CREATE TABLE more(a)",
+        "DROP TABLE rows; CREATE TABLE rows(kind, owner, name, id, bytes CHECK(bytes = 'a'))"}) {
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directory(folder_);
+    ASSERT_TRUE(Open().ok());
+    sqlite3* database = nullptr;
+    ASSERT_EQ(sqlite3_open(path_.c_str(), &database), SQLITE_OK);
+    ASSERT_EQ(sqlite3_exec(database, sql, nullptr, nullptr, nullptr), SQLITE_OK) << sql;
+    sqlite3_close(database);
+    const auto file = Open();
+    ASSERT_TRUE(file.ok()) << file.status();
+    EXPECT_THAT((*file)->quarantined(), HasSubstr(path_ + ".damaged-1234")) << sql;
+    ASSERT_TRUE(Put(**file, {PutOf(kEntity, "x")}).ok()) << sql;
+    EXPECT_EQ(AllRows(**file).size(), 1u) << sql;
+  }
+}
+
 TEST_F(StateFileTest, WhatSomebodyElseOrALaterVersionMadeIsLeftAlone) {
   for (const char* sql : {"CREATE TABLE theirs(a)", "PRAGMA user_version=2"}) {
     std::filesystem::remove(path_);

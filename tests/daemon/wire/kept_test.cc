@@ -131,6 +131,7 @@ TEST(Kept, AnEntityLivesAsLongAsItHasLeft) {
   EXPECT_EQ(lifetime(1001), 1);
   EXPECT_EQ(lifetime(1000), -1) << "it is over";
   EXPECT_EQ(lifetime(1), -1);
+  EXPECT_EQ(lifetime(std::numeric_limits<int64_t>::min()), -1) << "from a file that is damaged";
   row.set_expires_unix_ns(0);
   row.mutable_entity()->mutable_primitive()->mutable_sphere()->set_radius(0);
   const absl::Status wrong =

@@ -30,6 +30,9 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace voxeld;                  // NOLINT(google-build-using-namespace)
   using namespace voxeld::daemon::access;  // NOLINT(google-build-using-namespace)
   const std::string_view text(reinterpret_cast<const char*>(data), size);
+  const std::string hash = HashOf(text);  // as of a token that somebody shows
+  EXPECT_THAT_HOLDS(
+      hash.size() == 64 && hash.find_first_not_of("0123456789abcdef") == std::string::npos, hash);
   const absl::StatusOr<Scopes> scopes = ParseScopes(text);
   if (scopes.ok()) {
     EXPECT_THAT_HOLDS(*ParseScopes(scopes->ToString()) == *scopes);

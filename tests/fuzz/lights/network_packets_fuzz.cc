@@ -25,6 +25,8 @@ void Run(Script script) {
   stream.priority = static_cast<uint8_t>(script.Byte() % 201);
   stream.sync_universe = script.Byte() % 3;
   const int32_t slices = 1 + script.Byte() % 4, pixels = 1 + script.Byte() % 32;
+  EXPECT_THAT_HOLDS(pixels <= network::MostPixels(stream.protocol) &&
+                    slices <= network::MostSlices(stream));
   const display::FrameLayout layout{.slices = slices, .width = pixels, .height = 1};
   network::NetworkDecoder decoder(layout, stream, {});
   network::PacketWriter writer(stream, pixels);

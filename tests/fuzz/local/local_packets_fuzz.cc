@@ -1,8 +1,10 @@
-// The local socket, and a producer that means harm: packets over a real socket, with memfds of every size and seal. Each packet has
-// one answer; what is held counts, and goes with the connection.
+// The local socket, and a producer that means harm: packets over a real socket, with memfds of every size and seal, read or left
+// unread, while the server has descriptors and memory left, or not. Each packet has one answer; what is held counts, and goes with the
+// connection.
 
 #include <fcntl.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -10,6 +12,7 @@
 #include <cstdint>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,6 +21,7 @@
 #include "daemon/local/connection.h"
 #include "daemon/local/doorbell.h"
 #include "daemon/local/tokens.h"
+#include "daemon/log/logger.h"
 #include "tests/fuzz/exchanges.h"
 #include "tests/fuzz/expect.h"
 #include "tests/fuzz/script.h"
@@ -28,11 +32,33 @@ namespace {
 
 using namespace voxeld::daemon;  // NOLINT(google-build-using-namespace)
 
+Logger& Log() {
+  static const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
+  static Logger log(Logger::Level::kInfo, Logger::Format::kText, nowhere);
+  return log;
+}
+
+// While it is there this process can open nothing.
+class NoDescriptors {
+ public:
+  NoDescriptors() {
+    getrlimit(RLIMIT_NOFILE, &before_);
+    const rlimit none = {0, before_.rlim_max};
+    setrlimit(RLIMIT_NOFILE, &none);
+  }
+  ~NoDescriptors() { setrlimit(RLIMIT_NOFILE, &before_); }
+  NoDescriptors(const NoDescriptors&) = delete;
+  NoDescriptors& operator=(const NoDescriptors&) = delete;
+
+ private:
+  rlimit before_ = {};
+};
+
 class Producer {
  public:
   Producer()
       : tokens_({.max_memories = 4, .max_bytes = 64 << 10, .max_memories_total = 6},
-                *local::Doorbell::Make(), nullptr) {
+                *local::Doorbell::Make(), budget_) {
     registered_ = *tokens_.Register(1);
     Connect();
   }
@@ -40,6 +66,8 @@ class Producer {
     connection_ = nullptr;
     close(socket_);
     EXPECT_THAT_HOLDS(registered_.memory->memories() == 0, "memory outlives its connection");
+    kept_.clear();
+    EXPECT_THAT_HOLDS(budget_->used_bytes() == 0, budget_->used_bytes(), " bytes are nobody's");
   }
 
   void Run(Script script) {
@@ -53,7 +81,9 @@ class Producer {
     EXPECT_THAT_HOLDS(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends) ==
                       0);
     socket_ = ends[0];
-    connection_ = std::make_unique<local::Connection>(Descriptor(ends[1]), 0, nullptr);
+    const int least = 1;  // few answers have room
+    setsockopt(ends[1], SOL_SOCKET, SO_SNDBUF, &least, sizeof(least));
+    connection_ = std::make_unique<local::Connection>(Descriptor(ends[1]), 0, &Log());
   }
 
   void Step(Script& script) {
@@ -89,18 +119,69 @@ class Producer {
       packet = script.Text();
       for (int i = script.Byte() % 3; i > 0; --i) descriptors.push_back(dup(socket_));
     } else {
-      if (script.Byte() < 0x40) {
-        tokens_.Unregister(registered_.token);
-        registered_ = *tokens_.Register(1);
-      }
+      Happen(script);
       return Look();
     }
     Send(packet, descriptors);
     for (const int descriptor : descriptors) close(descriptor);
+    std::optional<NoDescriptors> scarce;
+    if (std::exchange(scarce_, false)) scarce.emplace();
     const bool open = connection_->Serve(tokens_);
+    scarce.reset();
     ReadAnswer(packet);
     if (!open) Connect();
     Look();
+  }
+
+  // What is no packet.
+  void Happen(Script& script) {
+    const uint8_t choice = script.Byte();
+    if (choice < 0x40) {
+      tokens_.Unregister(registered_.token);
+      registered_ = *tokens_.Register(1);
+    } else if (choice < 0x60) {
+      scarce_ = true;
+    } else if (choice < 0x70) {
+      connection_->Refuse("there is no more room");
+      ReadAnswer("packet");
+      Connect();
+    } else if (choice < 0x80) {  // it hears no answer
+      v1::LocalMessage message;
+      message.mutable_release()->set_id(99);
+      Send(message.SerializeAsString(), {});
+      close(std::exchange(socket_, -1));
+      EXPECT_THAT_HOLDS(!connection_->Serve(tokens_), "nobody is there, and it goes on");
+      Connect();
+    } else if (choice < 0xA0) {  // without a packet
+      EXPECT_THAT_HOLDS(connection_->Serve(tokens_) && !connection_->wants_to_write());
+    } else if (choice < 0xC0) {
+      PileUp(script.Byte());
+    } else if (choice < 0xE0) {  // somebody reads it for longer than it is held
+      auto range = registered_.memory->Find(choice % 8u, 0, 1);
+      if (range.ok() && kept_.size() < 4) kept_.push_back(*std::move(range));
+    } else {
+      kept_.clear();
+    }
+  }
+
+  // Packets whose answers are left unread until the server cannot send any more; then they are read.
+  void PileUp(int packets) {
+    if (connection_->memory() == nullptr) return;
+    v1::LocalMessage message;
+    message.mutable_release()->set_id(99);
+    const std::string packet = message.SerializeAsString();
+    int sent = 0, answers = 0;
+    for (; sent < packets && !connection_->wants_to_write(); ++sent) {
+      Send(packet, {});
+      EXPECT_THAT_HOLDS(connection_->Serve(tokens_));
+    }
+    for (int i = 0; connection_->wants_to_write() && i <= packets; ++i) {
+      EXPECT_THAT_HOLDS(ReadAnswer(packet, false));
+      ++answers;
+      EXPECT_THAT_HOLDS(connection_->Serve(tokens_));
+    }
+    while (ReadAnswer(packet, false)) ++answers;
+    EXPECT_THAT_HOLDS(answers == sent, answers, " answers to ", sent, " packets");
   }
 
   void Send(const std::string& packet, const std::vector<int>& descriptors) {
@@ -122,10 +203,15 @@ class Producer {
   }
 
   void ReadAnswer(const std::string& packet) {
+    const bool answered = ReadAnswer(packet, true);
+    EXPECT_THAT_HOLDS(answered || packet.empty(), "a packet has no answer");
+  }
+
+  // `last`: there is no other. False: there is none.
+  bool ReadAnswer(const std::string& packet, bool last) {
     char bytes[8192];
     const ssize_t got = recv(socket_, bytes, sizeof(bytes), 0);
-    if (packet.empty()) return;  // that is the end
-    EXPECT_THAT_HOLDS(got > 0, "a packet has no answer");
+    if (packet.empty() || got <= 0) return false;  // an empty one is the end
     v1::LocalAnswer answer;
     EXPECT_THAT_HOLDS(answer.ParseFromArray(bytes, static_cast<int>(got)));
     EXPECT_THAT_HOLDS(answer.what_case() != v1::LocalAnswer::WHAT_NOT_SET);
@@ -134,12 +220,15 @@ class Producer {
       ExpectSays(absl::InvalidArgumentError(answer.refused().message()));
       EXPECT_THAT_HOLDS(!answer.refused().message().empty());
     }
-    EXPECT_THAT_HOLDS(recv(socket_, bytes, sizeof(bytes), 0) <= 0, "a packet has two answers");
+    if (last) {
+      EXPECT_THAT_HOLDS(recv(socket_, bytes, sizeof(bytes), 0) <= 0, "a packet has two answers");
+    }
+    return true;
   }
 
   void Look() {
     const local::LocalMemory& memory = *registered_.memory;
-    EXPECT_THAT_HOLDS(memory.memories() <= 4 && memory.bytes() <= 64 << 10);
+    EXPECT_THAT_HOLDS(memory.memories() <= 4 && memory.bytes() <= 64 << 10 && !memory.ended());
     for (uint64_t id = 0; id < 8; ++id) {
       for (const uint64_t offset : {uint64_t{0}, uint64_t{100}, UINT64_MAX}) {
         const auto range = memory.Find(id, offset, 16);
@@ -153,8 +242,11 @@ class Producer {
     }
   }
 
+  const std::shared_ptr<Budget> budget_ = std::make_shared<Budget>(60 << 10);
   local::Tokens tokens_;
   local::Tokens::Registered registered_;
+  std::vector<wire::MappedRange> kept_;
+  bool scarce_ = false;  // when the next packet comes there is no descriptor left
   int socket_ = -1;
   std::unique_ptr<local::Connection> connection_;
 };

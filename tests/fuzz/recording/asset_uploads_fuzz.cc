@@ -1,5 +1,7 @@
 // Assets: uploads that overlap, break off, go on and lie. What is whole has its hash; figures add up; nothing beyond the limits.
 
+#include <fcntl.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -12,6 +14,7 @@
 
 #include "daemon/assets/asset_file.h"
 #include "daemon/assets/asset_store.h"
+#include "daemon/log/logger.h"
 #include "display/sync/fake_clock.h"
 #include "tests/fuzz/expect.h"
 #include "tests/fuzz/script.h"
@@ -48,13 +51,31 @@ const std::string& StrayDigest() {
   return digest;
 }
 
-// Of one of the files a byte is another, or its end is gone; or there is a file more.
-void Damage(const std::string& folder, Script& script) {
+daemon::Logger& Log() {
+  static const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
+  static daemon::Logger log(daemon::Logger::Level::kInfo, daemon::Logger::Format::kText, nowhere);
+  return log;
+}
+
+// Of one of the files a byte is another, or its end is gone; or there is a file more. `runs`: while the store is there, which looks at all
+// of an asset once; then it is gone, or its end is.
+void Damage(const std::string& folder, Script& script, bool runs) {
   std::vector<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(folder))
-    files.push_back(entry.path());
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.is_regular_file()) files.push_back(entry.path());
+  }
   std::sort(files.begin(), files.end());
-  const uint8_t how = script.Byte();
+  uint8_t how = script.Byte();
+  if (runs) {
+    if (files.empty()) return;
+    if (how >= 64) {
+      const std::filesystem::path path = files[script.Byte() % files.size()];
+      std::filesystem::remove(path);
+      if (how >= 128) std::filesystem::create_directory(path);  // in its place
+      return;
+    }
+    how = 64;
+  }
   if (files.empty() || how < 32) {
     std::ofstream(folder + "/" + std::string(how % 80, 'a') + (how % 2 == 0 ? ".part" : ""))
         << "stray";
@@ -76,9 +97,13 @@ void Run(Script script) {
                            .max_assets = 4,
                            .max_uploads = 3,
                            .idle_limit_ns = sync::kSecond};
-  // In memory, or in a folder, which somebody may have put something into.
-  const std::string folder = script.Flag() ? Folder() : "";
-  std::unique_ptr<AssetStore> store = AssetStore::Open(folder, limits, clock, nullptr);
+  // In memory, or in a folder, which somebody may have put something into, or which is none.
+  const uint8_t where = script.Byte();
+  const std::string folder = (where & 1) != 0 ? Folder() : "";
+  const std::string none = Folder() + "/none";
+  if ((where & 0x80) != 0) std::ofstream(none) << "no folder";
+  std::unique_ptr<AssetStore> store =
+      AssetStore::Open((where & 0x80) != 0 ? none : folder, limits, clock, &Log());
   std::string contents[kContents], digests[kContents];
   for (size_t i = 0; i < kContents; ++i) {
     contents[i] = ContentOf(i);
@@ -155,10 +180,13 @@ void Run(Script script) {
           store = nullptr;
           uploads.clear();
           if (!folder.empty() && choice < 16) {
-            Damage(folder, script);
+            Damage(folder, script, false);
             damaged = true;
           }
-          store = AssetStore::Open(folder, limits, clock, nullptr);
+          store = AssetStore::Open(folder, limits, clock, &Log());
+        } else if (choice < 48 && !folder.empty()) {
+          Damage(folder, script, true);
+          damaged = true;
         }
         clock.Advance(script.Byte() * 20 * sync::kMillisecond);
         const auto it = any();
@@ -197,6 +225,8 @@ void Run(Script script) {
   const auto stray = store->FindAsset(StrayDigest(), 0, 1);
   ExpectSays(stray.status());
   EXPECT_THAT_HOLDS(!stray.ok(), "content is served that has not its hash");
+  const daemon::AssetFigures figures = store->figures();
+  EXPECT_THAT_HOLDS(figures.count <= limits.max_assets && figures.bytes <= limits.max_bytes);
 }
 
 }  // namespace

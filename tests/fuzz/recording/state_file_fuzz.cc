@@ -72,6 +72,27 @@ void Run(const uint8_t* data, size_t size) {
     found = found || (row == key && bytes == "bytes");
   });
   EXPECT_THAT_HOLDS(!read.ok() || found, "a row that was put is not there");
+  // It is nobody else's meanwhile.
+  const auto other = StateFile::Open({.path = path, .vfs = "", .now = [&] { return ++second; }});
+  EXPECT_THAT_HOLDS(absl::IsAlreadyExists(other.status()), other.status().ToString());
+  for (const Change::What what :
+       {Change::What::kRemove, Change::What::kRemoveLayer, Change::What::kRemoveAll}) {
+    given = false;
+    const absl::Status removed = file.Apply([&]() -> std::vector<Change> {
+      if (std::exchange(given, true)) return {};
+      return {{.what = Change::What::kPut, .key = key, .bytes = "bytes"},
+              {.what = what, .key = key}};
+    });
+    ExpectSays(removed);
+    if (!removed.ok()) continue;
+    size_t left = 0, all = 0;
+    const absl::Status again = file.Read([&](const RowKey& row, std::string_view) {
+      left += row == key ? 1 : 0;
+      ++all;
+    });
+    EXPECT_THAT_HOLDS(!again.ok() || left == 0, "a row that was removed is there");
+    if (what == Change::What::kRemoveAll) EXPECT_THAT_HOLDS(!again.ok() || all == 0, all, " rows");
+  }
 }
 
 }  // namespace

@@ -2,11 +2,13 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <variant>
 
 #include "daemon/scene/commit_applier.h"
+#include "daemon/scene/scene_store.h"
 #include "daemon/text/fonts.h"
 #include "daemon/wire/kept.h"
 #include "tests/fuzz/exchanges.h"
@@ -22,6 +24,21 @@ void Refused(const absl::Status& status) {
   EXPECT_THAT_HOLDS(absl::IsDataLoss(status) || absl::IsInvalidArgument(status), status.ToString());
   ExpectSays(status);
   CountExchange(ExchangeKind::kKeptRow, false);
+}
+
+// The row of the layer in a scene that it is put into; nothing if it is refused.
+std::optional<std::string> KeptWhenApplied(const Operation& operation, const Limits& limits) {
+  SceneStore store(limits);
+  Author author;
+  author.owner = 1;
+  auto writer = std::make_shared<Writer>();
+  writer->session = 1;
+  author.writer = std::move(writer);
+  store.Apply(author, {operation}, sync::kSecond, false, 0);
+  const OwnedName key{1, std::get<LayerState>(operation.op).layer};
+  const Layer* const layer = store.snapshot()->FindLayer(key);
+  if (layer == nullptr) return std::nullopt;
+  return wire::EncodeKept(key, *layer);
 }
 
 void Run(Script script) {
@@ -52,6 +69,12 @@ void Run(Script script) {
       CountExchange(ExchangeKind::kKeptRow, true);
       CheckAlone(layer->operation, limits);
       EXPECT_THAT_HOLDS(std::holds_alternative<LayerState>(layer->operation.op));
+      const auto once = KeptWhenApplied(layer->operation, limits);
+      if (!once.has_value()) break;
+      const auto again = wire::DecodeKeptLayer(*once, limits);
+      EXPECT_THAT_HOLDS(again.ok(), again.status().ToString());
+      EXPECT_THAT_HOLDS(KeptWhenApplied(again->operation, limits) == once,
+                        "what is kept of a layer is another when it is read");
       break;
     }
     case 2: {

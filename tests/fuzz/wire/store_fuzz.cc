@@ -14,6 +14,7 @@
 #include <variant>
 #include <vector>
 
+#include "daemon/core/budget.h"
 #include "daemon/core/intake.h"
 #include "daemon/scene/engine_delta.h"
 #include "daemon/scene/scene_changes.h"
@@ -39,8 +40,8 @@ Limits SmallLimits() {
   limits.max_entities = 300;
   limits.max_layers_per_owner = 12;
   limits.max_layers = 20;
-  limits.max_bytes_per_owner = 1 << 20;
-  limits.max_scene_bytes = 3 << 19;
+  limits.max_bytes_per_owner = 128 << 10;
+  limits.max_scene_bytes = 192 << 10;
   limits.max_vertices_per_entity = 2048;
   limits.max_indices_per_entity = 4096;
   limits.max_id_bytes = 32;
@@ -53,6 +54,17 @@ Limits SmallLimits() {
   limits.max_expression_depth = 16;
   limits.max_boundary_points = 64;
   limits.max_texture_texels = 64 << 10;
+  return limits;
+}
+
+// What a server may have that was configured anew.
+Limits TinyLimits() {
+  Limits limits = SmallLimits();
+  limits.max_vertices_per_entity = 2;
+  limits.max_indices_per_entity = 2;
+  limits.max_parts_per_object = 1;
+  limits.max_clip_planes = 1;
+  limits.max_clip_cylinders = 0;
   return limits;
 }
 
@@ -267,14 +279,24 @@ class Session {
               [&](const OwnedName& key, const Layer&) { return key.owner == client.author.owner; },
               script.Flag());
           break;
-        case 2:
-          client.author.suppressed = script.Flag();
+        case 2: {  // an operator's doing
+          const uint8_t choice = script.Byte();
+          client.author.suppressed = (choice & 1) != 0;
           store_.Suppress(client.author.owner, client.author.suppressed);
+          client.author.max_entities = (choice & 2) != 0 ? 3 : UINT64_MAX;
+          client.author.max_bytes = (choice & 4) != 0 ? 2000 : UINT64_MAX;
           break;
+        }
         case 3: {
           const std::string bytes = script.Text();
           const std::string_view slices[] = {bytes};
-          Take(client, wire::DecodeUpdate(slices, limits_, nullptr, Sources(), Fonts()), true);
+          // An update brings no memory; a server may keep no assets, and have no fonts.
+          const bool bare = (what & 0x80) != 0;
+          const wire::Sources sources = {.assets = bare ? nullptr : &named_, .budget = &budget_};
+          Take(client,
+               wire::DecodeUpdate(slices, limits_, nullptr, sources, bare ? nullptr : Fonts()),
+               true);
+          EXPECT_THAT_HOLDS(budget_.used_bytes() == 0);
           break;
         }
         default:
@@ -291,7 +313,7 @@ class Session {
     static text::Fonts fonts;
     return &fonts;
   }
-  wire::Sources Sources() { return {.memory = &named_, .assets = &named_}; }
+  wire::Sources Sources() { return {.memory = &named_, .assets = &named_, .budget = &budget_}; }
 
   void Stream(Client& client, Script& script) {
     const std::string bytes = script.Text();
@@ -337,6 +359,7 @@ class Session {
         EXPECT_THAT_HOLDS(operation.sequence > client.sequence || operation.sequence == 0 ||
                           operation.sequence == decoded.sequence);
       }
+      if (const auto issue = CheckAlone(operation, tiny_)) CheckIssue(*issue);
       if (const auto issue = CheckAlone(operation, limits_)) {
         CheckIssue(*issue);
         ++client.refused;
@@ -398,6 +421,8 @@ class Session {
   }
 
   const Limits limits_;
+  const Limits tiny_ = TinyLimits();
+  Budget budget_{2000};  // for what is read of assets
   SceneStore store_;
   Named named_;
   sync::TimeNs now_ = sync::kSecond;

@@ -65,7 +65,9 @@ inline void PutGeometry(Script& script, gpu::DeltaWriter& writer) {
     }
   }
   std::vector<uint32_t> colors;
-  if (g.color_mode == gpu::ColorMode::kPerVertex) colors.assign(g.vertex_count, script.Byte());
+  // A texture's are many more.
+  const uint64_t colored = gpu::ColorCount(g);
+  if (colored != 0) colors.assign(colored, script.Byte());
   writer.PutGeometry(g, positions, indices, colors);
 }
 

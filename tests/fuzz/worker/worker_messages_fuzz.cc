@@ -1,5 +1,5 @@
 // An engine's worker, and an owner that means harm or is broken: messages one after another, over a real socket, with real segments.
-// Each call has one answer, under its own number, and no descriptor is left.
+// Each call has one answer, under its own number; no descriptor is left, and what a device was shown is taken from it while it is there.
 
 #include <dirent.h>
 #include <fcntl.h>
@@ -12,6 +12,7 @@
 #include <map>
 #include <memory>
 #include <set>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -90,6 +91,49 @@ bool IsSmall(const Target& target) {
          target.layout.sub_frames <= 4;
 }
 
+// An engine that is linked with others.
+class LinkedEngine final : public Engine, public RankLink {
+ public:
+  explicit LinkedEngine(std::unique_ptr<Engine> engine) : engine_(std::move(engine)) {}
+
+  const EngineInfo& info() const override { return engine_->info(); }
+  void SetTarget(Target target, Done done) override {
+    engine_->SetTarget(std::move(target), std::move(done));
+  }
+  absl::StatusOr<StagingBlock> AcquireStaging(size_t size) override {
+    return engine_->AcquireStaging(size);
+  }
+  void Apply(StagingBlock block, size_t size, Done done) override {
+    engine_->Apply(std::move(block), size, std::move(done));
+  }
+  void SubmitFrame(const FrameRequest& request, FrameBuffer buffer, FrameDone done) override {
+    engine_->SubmitFrame(request, buffer, std::move(done));
+  }
+  void ReadVoxels(VoxelBox box, std::span<uint32_t> out, Done done) override {
+    engine_->ReadVoxels(box, out, std::move(done));
+  }
+  RankLink* link() override { return this; }
+
+  absl::StatusOr<Invitation> Invite(const std::string& library) override {
+    if (library.size() != 1) return absl::FailedPreconditionError("no such library");
+    Invitation invitation;
+    invitation.fill(static_cast<std::byte>(library[0]));
+    return invitation;
+  }
+  absl::Status Join(const std::string& library, const Invitation& invitation, int rank,
+                    int ranks) override {
+    const auto mine = Invite(library);
+    if (!mine.ok()) return mine.status();
+    if (*mine != invitation || rank < 0 || rank >= ranks) {
+      return absl::DataLossError("the ranks are not each other's");
+    }
+    return absl::OkStatus();
+  }
+
+ private:
+  const std::unique_ptr<Engine> engine_;
+};
+
 class Owner {
  public:
   Owner() {
@@ -98,15 +142,31 @@ class Owner {
       if (options.kind != EngineKind::kCpu) return absl::FailedPreconditionError("no such engine");
       EngineOptions own = options;
       own.threads = 1;
-      return CreateCpuEngine(own, "");
+      auto engine = CreateCpuEngine(own, "");
+      if (options.device == 0) return engine;
+      return std::make_unique<LinkedEngine>(std::move(engine));
+    };
+    hooks_.pin = hooks_.pin_read_only = [this](std::span<std::byte> memory) {
+      EXPECT_THAT_HOLDS(!memory.empty() && pinned_.emplace(memory.data(), memory.size()).second,
+                        "pinned twice");
+    };
+    hooks_.unpin = [this](std::span<std::byte> memory) {
+      const auto it = pinned_.find(memory.data());
+      EXPECT_THAT_HOLDS(it != pinned_.end() && it->second == memory.size(), "was never pinned");
+      const volatile std::byte* const there = memory.data();
+      (void)*there;  // it is mapped still
+      pinned_.erase(it);
     };
     EXPECT_THAT_HOLDS(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends_) == 0);
     fcntl(ends_[0], F_SETFL, O_NONBLOCK);
+    const int least = 1;  // few messages have room
+    setsockopt(ends_[0], SOL_SOCKET, SO_SNDBUF, &least, sizeof(least));
     worker_ = NewWorkerConnection(ends_[1], hooks_);
   }
   ~Owner() {
     worker_ = nullptr;
-    close(ends_[0]);
+    EXPECT_THAT_HOLDS(pinned_.empty(), pinned_.size(), " stay pinned");
+    if (ends_[0] >= 0) close(ends_[0]);
     close(ends_[1]);
   }
 
@@ -125,6 +185,7 @@ class Owner {
         const uint8_t choice = script.Byte();
         if (choice == 1) open.protocol = script.Byte();
         if (choice == 2) open.kind = static_cast<EngineKind>(script.Byte() % 3);
+        open.device = choice >> 6 & 1;
         if (choice >= 3) {
           open.part = {.begin = static_cast<int8_t>(script.Byte()),
                        .end = static_cast<int8_t>(script.Byte()),
@@ -185,17 +246,62 @@ class Owner {
         const BulkSegmentMessage named{.segment = script.Byte() % 4u, .size = 0};
         return Send(MakeMessage(MessageType::kDropBulkSegment, 0, named), false);
       }
-      default: {  // any message, with a descriptor or without
+      default: {  // any message, with a descriptor or without; or what is none
         Message message;
         message.type = static_cast<MessageType>(script.Byte());
         message.call = script.Byte();
         const std::string text = script.Text();
         const auto* const data = reinterpret_cast<const std::byte*>(text.data());
         message.body.assign(data, data + std::min<size_t>(text.size(), 4096));
-        if (script.Flag()) message.fd = ends_[0];
+        const uint8_t how = script.Byte();
+        if ((how & 1) != 0) message.fd = ends_[0];
+        if ((how & 2) != 0) return SendNone(std::move(message), text);
+        if ((how & 4) != 0) return Leave(message);
+        if ((how & 8) != 0) return SendMany(message);
         return Send(std::move(message), {});
       }
     }
+  }
+
+  // Too long, or too short to be a message. As for its end, a worker ends.
+  bool SendNone(Message message, const std::string& text) {
+    if (text.empty()) {
+      message.body.resize(4097);
+      EXPECT_THAT_HOLDS(SendMessage(ends_[0], message).ok());
+    } else {
+      EXPECT_THAT_HOLDS(send(ends_[0], text.data(), std::min<size_t>(text.size(), 15), 0) >= 0);
+    }
+    const absl::StatusOr<Message> received = ReceiveMessage(ends_[1]);
+    EXPECT_THAT_HOLDS(absl::IsUnavailable(received.status()), "what is no message passes for one");
+    return false;
+  }
+
+  // Gone before the answer.
+  bool Leave(const Message& message) {
+    EXPECT_THAT_HOLDS(SendMessage(ends_[0], message).ok());
+    close(std::exchange(ends_[0], -1));
+    absl::StatusOr<Message> received = ReceiveMessage(ends_[1]);
+    EXPECT_THAT_HOLDS(received.ok());
+    ExpectSays(worker_->Handle(*received));
+    EXPECT_THAT_HOLDS(received->fd < 0, "a descriptor is left");
+    return false;
+  }
+
+  // The same until there is no room for it.
+  bool SendMany(const Message& message) {
+    int sent = 0;
+    absl::Status status;
+    while (sent < 1000 && (status = SendMessage(ends_[0], message)).ok()) ++sent;
+    EXPECT_THAT_HOLDS(absl::IsResourceExhausted(status), status.ToString());
+    bool goes_on = true;
+    for (; sent > 0; --sent) {
+      absl::StatusOr<Message> received = ReceiveMessage(ends_[1]);
+      EXPECT_THAT_HOLDS(received.ok() && received->body == message.body);
+      if (goes_on) goes_on = worker_->Handle(*received).ok();
+      if (received->fd >= 0) close(received->fd);
+      (void)ReceiveMessage(ends_[0]);
+    }
+    return goes_on;
   }
 
   bool TellSegment(Script& script, bool bulk) {
@@ -259,6 +365,7 @@ class Owner {
   int ends_[2] = {-1, -1};
   std::unique_ptr<WorkerConnection> worker_;
   std::map<uint32_t, std::shared_ptr<Segment>> segments_;
+  std::map<const std::byte*, size_t> pinned_;
   uint64_t call_ = 0;
 };
 

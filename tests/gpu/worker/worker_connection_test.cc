@@ -7,7 +7,9 @@
 #include <unistd.h>
 
 #include <cstring>
+#include <map>
 #include <memory>
+#include <span>
 #include <utility>
 
 #include "display/crc/crc32c.h"
@@ -116,6 +118,31 @@ TEST_F(WorkerConnectionTest, AnEngineThatCannotBeOpenedLeavesTheOneThatIs) {
   Open(EngineKind::kCuda, {.begin = 40, .end = 80});
   EXPECT_EQ(Answered().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_TRUE(Frame(1).ok());
+}
+
+// What is pinned is unpinned while it is mapped, also if another takes its name.
+TEST_F(WorkerConnectionTest, ASegmentInAnothersPlaceLeavesNothingPinned) {
+  std::map<const std::byte*, size_t> pinned;
+  hooks_.pin = hooks_.pin_read_only = [&](std::span<std::byte> memory) {
+    EXPECT_TRUE(pinned.emplace(memory.data(), memory.size()).second);
+  };
+  hooks_.unpin = [&](std::span<std::byte> memory) { EXPECT_EQ(pinned.erase(memory.data()), 1u); };
+  for (const uint32_t staging : {1u, 1u, 0u}) {
+    const auto segment = *Segment::Create(4096);
+    Message message = MakeMessage(MessageType::kSegment, 0, SegmentMessage{1, staging, 4096});
+    message.fd = dup(segment->fd());
+    ASSERT_TRUE(Handle(std::move(message)).ok());
+    EXPECT_EQ(pinned.size(), staging);
+  }
+  for (int i = 0; i < 2; ++i) {
+    const auto segment = *Segment::CreateReadOnlyForOthers(4096);
+    Message message = MakeMessage(MessageType::kBulkSegment, 0, BulkSegmentMessage{1, 4096});
+    message.fd = dup(segment->fd());
+    ASSERT_TRUE(Handle(std::move(message)).ok());
+    EXPECT_EQ(pinned.size(), 1u);
+  }
+  connection_ = nullptr;
+  EXPECT_TRUE(pinned.empty());
 }
 
 TEST_F(WorkerConnectionTest, MoreVoxelsThanCanBeCountedInBytesAreInNoSegment) {
