@@ -234,6 +234,27 @@ TEST(LocalMemory, WhatIsMappedIsChargedToTheBudget) {
   EXPECT_EQ(budget->used_bytes(), 30u);
 }
 
+// More than a process has addresses for: a memfd may be said to be so large without any memory.
+TEST(LocalMemory, ThatCannotBeMappedCostsNothing) {
+  constexpr uint64_t kHuge = uint64_t{1} << 60;
+  const Descriptor fd(memfd_create("huge", MFD_CLOEXEC | MFD_ALLOW_SEALING));
+  ASSERT_EQ(ftruncate(fd.get(), static_cast<off_t>(kHuge)), 0);
+  ASSERT_EQ(fcntl(fd.get(), F_ADD_SEALS, kAllSeals), 0);
+  const auto budget = std::make_shared<Budget>(kMost);
+  for (const auto& charged : {budget, std::shared_ptr<Budget>()}) {
+    Held held({.max_bytes = kMost}, charged);
+    const absl::Status status = held.memory.Hold(4, kHuge, fd.get());
+    EXPECT_TRUE(absl::IsResourceExhausted(status)) << status;
+    EXPECT_THAT(std::string(status.message()),
+                HasSubstr("memory 4 of 1152921504606846976 bytes cannot be mapped: "));
+    EXPECT_EQ(held.memory.memories(), 0u);
+    EXPECT_EQ(held.memory.bytes(), 0u);
+    EXPECT_EQ(*held.mapped, 0u);
+    EXPECT_EQ(budget->used_bytes(), 0u);
+    EXPECT_TRUE(held.Hold(4, "four").ok());
+  }
+}
+
 TEST(LocalMemory, TakesNothingOnceEnded) {
   Held held;
   ASSERT_TRUE(held.Hold(1, "x").ok());

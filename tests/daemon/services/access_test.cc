@@ -176,6 +176,22 @@ TEST_F(ServicesAccess, AHeaderThatIsNoneIsRefused) {
   EXPECT_THAT(status.error_message(), HasSubstr("Bearer"));
 }
 
+// Which of two would count is nothing to guess at.
+TEST_F(ServicesAccess, TwoHeadersAreRefused) {
+  Start();
+  const auto stub = v1::DisplayService::NewStub(Plain());
+  for (const char* second : {"viewer", "guess"}) {
+    grpc::ClientContext context;
+    SetDeadline(context);
+    context.AddMetadata("authorization", "Bearer viewer");
+    context.AddMetadata("authorization", absl::StrCat("Bearer ", second));
+    v1::ListDisplaysResponse response;
+    const grpc::Status status = stub->ListDisplays(&context, {}, &response);
+    EXPECT_EQ(status.error_code(), StatusCode::UNAUTHENTICATED);
+    EXPECT_THAT(status.error_message(), HasSubstr("is not one of"));
+  }
+}
+
 TEST_F(ServicesAccess, AUnixSocketsUserIsKnownByTheKernelsWord) {
   Start();
   const auto channel = daemon_->NewChannel();
