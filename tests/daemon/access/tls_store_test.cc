@@ -107,6 +107,9 @@ TEST_F(TlsStoreTest, AKeyOfWhatAllMayDoAnythingWithIsRefused) {
     EXPECT_TRUE(absl::IsFailedPrecondition(ReadTls(files_, now_).status())) << mode;
   }
   PutFile(files_.key, issued.key, 0640);
+  // What goes to whoever asks is nobody's secret.
+  PutFile(files_.certificate, issued.certificate, 0644);
+  PutFile(files_.client_ca, authority_.certificate(), 0644);
   EXPECT_TRUE(ReadTls(files_, now_).ok());
 }
 
@@ -173,7 +176,10 @@ TEST_F(TlsStoreTest, TellsOfTheEndBeforeItComes) {
   now_ += 20 * 86400;
   EXPECT_THAT((*store)->trouble(),
               HasSubstr("expires in 2"));  // 240 hours, less what the test takes
-  now_ += 20 * 86400;
+  const int64_t end = (*store)->current().material->expires_s;
+  now_ = end - 1;
+  EXPECT_THAT((*store)->trouble(), HasSubstr("expires in 0 hours"));
+  now_ = end;
   EXPECT_THAT((*store)->trouble(), HasSubstr("has expired"));
 }
 

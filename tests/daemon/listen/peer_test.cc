@@ -77,6 +77,13 @@ TEST(Peer, EveryEncodedByteIsDecodedAndNothingElse) {
   }
 }
 
+TEST(Peer, NothingIsReadBehindTheName) {
+  const std::string text = "%41%41";
+  EXPECT_EQ(PeerName(std::string_view(text).substr(0, 1)), "%");
+  EXPECT_EQ(PeerName(std::string_view(text).substr(0, 2)), "%4");
+  EXPECT_EQ(PeerName(std::string_view(text).substr(0, 5)), "A%4");
+}
+
 TEST(Peer, NamesThatAreNoneStayAsTheyAre) {
   for (const char* text : {"", "%", "%5", "%zz", "ipv6:%5"}) EXPECT_EQ(PeerName(text), text);
 }

@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
+#include <fstream>
 #include <limits>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -232,6 +234,23 @@ TEST(LocalMemory, WhatIsMappedIsChargedToTheBudget) {
   }
   EXPECT_EQ(budget->used_bytes(kLocal), 0u);
   EXPECT_EQ(budget->used_bytes(), 30u);
+}
+
+TEST(LocalMemory, WhatIsReleasedIsNotMappedAnyMore) {
+  const auto mapped = [] {
+    std::ifstream maps("/proc/self/maps");
+    size_t found = 0;
+    for (std::string line; std::getline(maps, line);) {
+      if (line.find("memfd:voxeld-test") != std::string::npos) ++found;
+    }
+    return found;
+  };
+  Held held;
+  ASSERT_EQ(mapped(), 0u);
+  ASSERT_TRUE(held.Hold(1, "one").ok());
+  EXPECT_EQ(mapped(), 1u);
+  ASSERT_TRUE(held.memory.Release(1).ok());
+  EXPECT_EQ(mapped(), 0u);
 }
 
 // More than a process has addresses for: a memfd may be said to be so large without any memory.

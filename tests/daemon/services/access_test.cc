@@ -388,6 +388,10 @@ TEST_F(ServicesTls, BothSidesAreVerified) {
   // Signed by the right authority, and named by nobody.
   EXPECT_EQ(Ask(authority_.Issue("other.example"), ca).error_code(), StatusCode::PERMISSION_DENIED);
   EXPECT_TRUE(Ask(authority_.Issue("other.example"), ca, "viewer").ok());
+  // Of one without a subject the name is the first that it is for.
+  EXPECT_TRUE(Ask(authority_.IssueWithoutSubject("cube.example"), ca).ok());
+  EXPECT_EQ(Ask(authority_.IssueWithoutSubject("other.example"), ca).error_code(),
+            StatusCode::PERMISSION_DENIED);
   // By none, by another, expired, not valid yet; and a server that the client does not know.
   EXPECT_EQ(Ask({}, ca, "viewer").error_code(), StatusCode::UNAVAILABLE);
   EXPECT_EQ(Ask(stranger_.Issue("cube.example"), ca, "viewer").error_code(),

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
@@ -81,6 +82,10 @@ TEST_F(MessageTest, ComesAsItWasSent) {
   ASSERT_GE(got->fd, 0);
   EXPECT_FALSE(before.contains(got->fd));
   EXPECT_EQ(fcntl(got->fd, F_GETFD), FD_CLOEXEC);
+  struct stat here, there;
+  ASSERT_EQ(fstat(ends_[1], &here), 0);
+  ASSERT_EQ(fstat(got->fd, &there), 0);
+  EXPECT_EQ(there.st_ino, here.st_ino);
   close(got->fd);
   EXPECT_EQ(Open(), before);
 }
