@@ -177,6 +177,10 @@ TEST_F(TlsStoreTest, TellsOfTheEndBeforeItComes) {
   EXPECT_THAT((*store)->trouble(),
               HasSubstr("expires in 2"));  // 240 hours, less what the test takes
   const int64_t end = (*store)->current().material->expires_s;
+  now_ = end - 3600;
+  EXPECT_THAT((*store)->trouble(), HasSubstr("expires in 1 hours"));
+  now_ = end - 3599;
+  EXPECT_THAT((*store)->trouble(), HasSubstr("expires in 0 hours"));
   now_ = end - 1;
   EXPECT_THAT((*store)->trouble(), HasSubstr("expires in 0 hours"));
   now_ = end;

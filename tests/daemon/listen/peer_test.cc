@@ -60,6 +60,8 @@ TEST(Peer, OfAUnixSocketHasTheNameThatItsClientGaveIt) {
 TEST(Peer, TheMachineItselfIsCountedByItself) {
   EXPECT_EQ(V6("::1", 1).address, "::1");
   EXPECT_EQ(V6("::2", 1).address, "::/64");
+  EXPECT_FALSE(V6("::1", 1).unix_socket);
+  EXPECT_FALSE(V4("127.0.0.1", 1).unix_socket);
 }
 
 // RFC 3986, 2.1: two hexadecimal digits of either case.
@@ -82,6 +84,7 @@ TEST(Peer, NothingIsReadBehindTheName) {
   EXPECT_EQ(PeerName(std::string_view(text).substr(0, 1)), "%");
   EXPECT_EQ(PeerName(std::string_view(text).substr(0, 2)), "%4");
   EXPECT_EQ(PeerName(std::string_view(text).substr(0, 5)), "A%4");
+  EXPECT_EQ(PeerName(text), "AA") << "up to its end";
 }
 
 TEST(Peer, NamesThatAreNoneStayAsTheyAre) {

@@ -277,6 +277,15 @@ TEST_F(KeptScene, RowsThatAreWrongAreLeftOutAndTheOthersCome) {
   ASSERT_TRUE(state.ok());
   EXPECT_EQ(state->left_out, 3u);
   EXPECT_EQ(state->entities, 1u);
+  ASSERT_EQ(state->why.size(), 3u);
+  EXPECT_TRUE(state->why[2].ends_with("its layer is not there")) << state->why[2];
+  EXPECT_EQ(state->layers, 1u);
+  // What a message may be now is no limit of what was taken before.
+  Limits small;
+  small.max_message_bytes = 1;
+  state = ReadState(*file, {clock_.Now(), kUnixNs}, small, nullptr, nullptr);
+  ASSERT_TRUE(state.ok());
+  EXPECT_EQ(state->entities, 1u);
 }
 
 // Rows of every kind that cannot be read, and rows of owners that are not there.
@@ -300,6 +309,8 @@ TEST_F(KeptScene, EachRowThatIsLeftOutIsToldUpToALimit) {
   EXPECT_EQ(begins, (std::vector<std::string>{"entity 1/l/", "layer 1/l\\n/", "object 1/o/",
                                               "object 9/o/", "owner 2//"}));
   EXPECT_EQ(state->scene.owners.size(), 1u);
+  EXPECT_EQ(state->objects, 0u);
+  EXPECT_EQ(state->layers, 0u);
 
   for (uint64_t owner = 100; owner < 130; ++owner) {
     changes.push_back({Change::What::kPut, {RowKind::kLayer, owner, "l", ""}, ""});

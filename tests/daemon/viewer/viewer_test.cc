@@ -126,13 +126,15 @@ TEST_F(ViewerTest, ThePageIsServedForThisMachineAlone) {
   } else {
     EXPECT_EQ(page.result_int(), 200u);
     EXPECT_EQ(page["Content-Encoding"], "gzip");
+    const auto type = page["Content-Type"];
+    EXPECT_THAT(std::string(type.data(), type.size()), StartsWith("text/html"));
     EXPECT_EQ(Unpack(page.body()), Get("/").body());
     EXPECT_THAT(Get("/").body(), StartsWith("<!doctype html>"));
     const auto policy = page["Content-Security-Policy"];
     EXPECT_THAT(std::string(policy.data(), policy.size()), StartsWith("default-src 'none'"));
   }
-  for (const char* host :
-       {"localhost", "127.0.0.1:9", "[::1]:9", "192.0.2.7", "Screen.Example:80"}) {
+  for (const char* host : {"localhost", "LocalHost:9", "127.0.0.1:9", "[::1]:9",
+                           "[::ffff:192.0.2.7]:9", "192.0.2.7", "Screen.Example:80"}) {
     EXPECT_NE(Get("/", {{"Host", host}}).result_int(), 403u) << host;
   }
   for (const char* host :
@@ -287,8 +289,11 @@ TEST_F(ViewerTest, NothingButTheCookieThatWasGivenControls) {
   std::string other = cookie;
   other.back() = other.back() == '0' ? '1' : '0';
   const std::string name = cookie.substr(0, cookie.find('=') + 1);
-  for (const std::string& wrong : {other, name, cookie + "0", cookie.substr(0, cookie.size() - 1),
-                                   "x" + cookie, name + "; " + cookie.substr(name.size())}) {
+  std::string first = cookie;
+  first[name.size()] = first[name.size()] == '0' ? '1' : '0';
+  for (const std::string& wrong :
+       {other, first, name, cookie + "0", cookie.substr(0, cookie.size() - 1), "x" + cookie,
+        name + "; " + cookie.substr(name.size())}) {
     EXPECT_FALSE(controls(wrong)) << wrong;
   }
   EXPECT_TRUE(controls(other + "; " + cookie));
