@@ -26,7 +26,6 @@ using access::Access;
 using access::HashOf;
 using access::ParseScopes;
 using access::PutFile;
-using access::Scope;
 using grpc::StatusCode;
 using ::testing::HasSubstr;
 

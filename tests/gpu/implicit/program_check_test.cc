@@ -111,8 +111,8 @@ TEST(ProgramCheck, EachFaultIsNamed) {
       {[](Program& p) { p.color[1] = Make(static_cast<Op>(255), 1); },
        "color, instruction 1: op is 255"},
       {[](Program& p) { p.surface[0] = Make(Op::kX, 24); }, "slot is 24, must be 0 to 23"},
-      {[](Program& p) { p.surface[0] = Make(Op::kX, 0, 25); }, "slot is 25, must be 0 to 23"},
-      {[](Program& p) { p.surface[0] = Make(Op::kX, 0, 0, 26); }, "slot is 26, must be 0 to 23"},
+      {[](Program& p) { p.surface[0] = Make(Op::kX, 0, 24); }, "slot is 24, must be 0 to 23"},
+      {[](Program& p) { p.surface[0] = Make(Op::kX, 0, 0, 24); }, "slot is 24, must be 0 to 23"},
       {[](Program& p) { p.surface[3] = Make(Op::kAdd, 2, 3, 1); },
        "instruction 3: slot read is 3, must be one that has been written"},
       {[](Program& p) { p.surface[3] = Make(Op::kAdd, 2, 1, 3); },
@@ -132,9 +132,9 @@ TEST(ProgramCheck, EachFaultIsNamed) {
       {[](Program& p) { p.color_slots[2] = 0xFFFFFFFF; },
        "color, slot of the result is 4294967295"},
       {[](Program& p) {
-         p.rings = {2, 1};
+         p.rings = {2, 1, 3};
        },
-       "ring end is 1"},
+       "program: ring end is 1, must be no less"},
       {[](Program& p) {
          p.rings = {1, 2};
        },
@@ -149,6 +149,17 @@ TEST(ProgramCheck, EachFaultIsNamed) {
     one.spoil(program);
     EXPECT_THAT(Why(program), HasSubstr(one.words));
   }
+}
+
+TEST(ProgramCheck, AColoursResultIsAskedForOfEitherKind) {
+  Program program = Good();
+  program.color_by = 2;
+  program.table.resize(256);
+  program.color = {Make(Op::kX, 7)};
+  program.color_slots[0] = 7;
+  EXPECT_EQ(Why(program), "");
+  program.color_slots[0] = 6;
+  EXPECT_THAT(Why(program), HasSubstr("color, slot of the result is 6"));
 }
 
 TEST(ProgramCheck, AProgramThatIsCutIsRefused) {
