@@ -2,10 +2,13 @@
 """Writes docs/security/advisories.md and docs/security/voxeld.openvex.json from docs/security/advisories.toml.
 
     tools/advisories.py            writes them
-    tools/advisories.py --check    exit status 1 if they are not what would be written
+    tools/advisories.py --check    writes nothing
 
-Either way every file and every test that the source or SECURITY.md names must exist.
+The source lists what is known to be wrong with what voxeld is linked with, and what that means for voxeld; its own comments say
+how. The page is for people, the other file is OpenVEX, for scanners. Every file and every test that the source or SECURITY.md names
+must exist. Exit status 1 and a line for each fault otherwise, or, with --check, if a file is not what would be written.
 """
+import argparse
 import functools
 import hashlib
 import json
@@ -129,15 +132,16 @@ def vex(source):
 
 
 def main():
-    if sys.argv[1:] not in ([], ["--check"]):
-        sys.exit(__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--check", action="store_true", help="write nothing; exit status 1 if a file is not what would be written")
+    args = parser.parse_args()
     with open(SOURCE, "rb") as file:
         source = tomllib.load(file)
     if wrong := faults(source):
         sys.exit("\n".join(f"advisories: {line}" for line in wrong))
     for name, text in (("advisories.md", page(source)), ("voxeld.openvex.json", vex(source))):
         path = FOLDER / name
-        if sys.argv[1:] == ["--check"]:
+        if args.check:
             if not path.exists() or path.read_text() != text:
                 sys.exit(f"advisories: docs/security/{name} is not what tools/advisories.py writes; run it")
         else:

@@ -229,9 +229,8 @@ absl::StatusOr<Grants> ReadGrants(const std::string& path) {
   }
   std::ifstream file(path, std::ios::binary);
   std::ostringstream text;
-  text << file.rdbuf();
-  // An empty file gives the stream nothing, which it calls a failure.
-  if (!file.is_open() || (found.st_size > 0 && !file)) {
+  file >> std::noskipws >> text.rdbuf();
+  if (!file.eof()) {  // could not be opened, or failed before its end
     return absl::UnavailableError(absl::StrCat("the grants file ", path, " cannot be read"));
   }
   return ParseGrants(text.str(), path);

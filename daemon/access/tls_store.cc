@@ -51,8 +51,10 @@ absl::StatusOr<std::string> ReadPem(const char* what, const std::string& path, b
   }
   std::ifstream file(path, std::ios::binary);
   std::ostringstream text;
-  text << file.rdbuf();
-  if (!file) return absl::UnavailableError(absl::StrCat(what, " ", path, " cannot be read"));
+  file >> std::noskipws >> text.rdbuf();
+  if (!file.eof()) {  // could not be opened, or failed before its end
+    return absl::UnavailableError(absl::StrCat(what, " ", path, " cannot be read"));
+  }
   return text.str();
 }
 

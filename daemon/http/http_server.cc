@@ -129,7 +129,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void Answer() {
     const auto& request = parser_->get();
     head_ = request.method() == wire::verb::head;
-    const bool close = request.need_eof() || !request.keep_alive();
+    const bool close = !request.keep_alive();
     if (request.method() != wire::verb::get && !head_) {
       return Write(Plain(405, "only GET and HEAD are answered"), close);
     }

@@ -75,7 +75,7 @@ absl::StatusOr<Message> ReceiveMessage(int socket) {
   in.msg_iovlen = 2;
   alignas(cmsghdr) char control[CMSG_SPACE(sizeof(int))] = {};
   in.msg_control = control;
-  in.msg_controllen = sizeof(control);
+  in.msg_controllen = CMSG_LEN(sizeof(int));  // with its padding there would be room for a second
   ssize_t got = 0;
   do {
     got = recvmsg(socket, &in, MSG_CMSG_CLOEXEC);

@@ -42,6 +42,10 @@ class Reader {
       ok_ = false;
       return;
     }
+    if (std::is_same_v<T, bool> && in_.front() > std::byte{1}) {
+      ok_ = false;  // a bool has no other values
+      return;
+    }
     std::memcpy(&value, in_.data(), sizeof(T));
     in_ = in_.subspan(sizeof(T));
   }

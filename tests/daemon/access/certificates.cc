@@ -46,9 +46,11 @@ X509* NewCertificate(const std::string& name, EVP_PKEY* key, int64_t from_s, int
   X509_gmtime_adj(X509_getm_notBefore(out), from_s);
   X509_gmtime_adj(X509_getm_notAfter(out), until_s);
   X509_set_pubkey(out, key);
-  X509_NAME_add_entry_by_txt(X509_get_subject_name(out), "CN", MBSTRING_UTF8,
-                             reinterpret_cast<const unsigned char*>(name.data()),
-                             static_cast<int>(name.size()), -1, 0);
+  if (!name.empty()) {
+    X509_NAME_add_entry_by_txt(X509_get_subject_name(out), "CN", MBSTRING_UTF8,
+                               reinterpret_cast<const unsigned char*>(name.data()),
+                               static_cast<int>(name.size()), -1, 0);
+  }
   return out;
 }
 
@@ -74,8 +76,17 @@ TestAuthority::TestAuthority(const std::string& name) : keys_(std::make_unique<K
 TestAuthority::~TestAuthority() = default;
 
 Issued TestAuthority::Issue(const std::string& name, int64_t from_s, int64_t until_s) {
+  return Issue(name, name, from_s, until_s);
+}
+
+Issued TestAuthority::IssueWithoutSubject(const std::string& name) {
+  return Issue("", name, -3600, 3600);
+}
+
+Issued TestAuthority::Issue(const std::string& subject, const std::string& name, int64_t from_s,
+                            int64_t until_s) {
   EVP_PKEY* key = EVP_EC_gen("P-256");
-  X509* certificate = NewCertificate(name, key, from_s, until_s);
+  X509* certificate = NewCertificate(subject, key, from_s, until_s);
   X509_set_issuer_name(certificate, X509_get_subject_name(keys_->certificate));
   Extend(certificate, keys_->certificate, NID_subject_alt_name,
          ("DNS:" + name + ",IP:127.0.0.1").c_str());

@@ -19,8 +19,12 @@ class TestAuthority {
   const std::string& certificate() const { return certificate_; }  // PEM
   // For the DNS name `name` and 127.0.0.1. Valid from and until so many seconds from now.
   Issued Issue(const std::string& name, int64_t from_s = -3600, int64_t until_s = 3600);
+  // For the same, with nothing in the subject: what many authorities issue now.
+  Issued IssueWithoutSubject(const std::string& name);
 
  private:
+  Issued Issue(const std::string& subject, const std::string& name, int64_t from_s,
+               int64_t until_s);
   struct Keys;
   std::unique_ptr<Keys> keys_;
   std::string certificate_;

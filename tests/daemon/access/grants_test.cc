@@ -267,6 +267,12 @@ TEST_F(GrantsFile, ThatCannotBeReadIsAnError) {
   EXPECT_THAT(std::string(status.message()), HasSubstr("cannot be read"));
 }
 
+// A process' own memory is a file that can be opened, and not read where it begins.
+TEST_F(GrantsFile, ThatFailsAsItIsReadIsAnError) {
+  const absl::StatusOr<Grants> grants = ReadGrants("/proc/self/mem");
+  EXPECT_TRUE(absl::IsUnavailable(grants.status())) << grants.status();
+}
+
 TEST(Scopes, ReadBackAsTheyAreWritten) {
   for (const char* text :
        {"view", "draw", "control", "view draw", "view control", "view draw control"}) {

@@ -2,12 +2,17 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
+#include <cstdio>
 #include <ctime>
 #include <filesystem>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
+#include "daemon/log/logger.h"
 #include "tests/daemon/access/certificates.h"
 
 namespace voxeld::daemon::access {
@@ -68,6 +73,76 @@ TEST_F(TlsStoreTest, SaysWhatIsWrong) {
               HasSubstr("TLS needs tls_certificate, tls_key and tls_client_ca"));
 }
 
+TEST_F(TlsStoreTest, AFileIsOneAndNotTooLarge) {
+  TlsFiles files = files_;
+  files.certificate = folder_;
+  const auto why = [&] { return std::string(ReadTls(files, now_).status().message()); };
+  EXPECT_THAT(why(), HasSubstr("is no file of at most 1048576 bytes"));
+  files.certificate = folder_ + "/great.pem";
+  const std::string good = authority_.Issue("display.example").certificate;
+  PutFile(files.certificate, good + std::string((1 << 20) - good.size(), '\n'));
+  EXPECT_THAT(why(), HasSubstr("is not the key of the certificate")) << "it has been read";
+  PutFile(files.certificate, good + std::string((1 << 20) + 1 - good.size(), '\n'));
+  EXPECT_THAT(why(), HasSubstr("is no file of at most 1048576 bytes"));
+}
+
+TEST_F(TlsStoreTest, WhatCannotBeReadIsNotTakenForAnEmptyFile) {
+  TlsFiles files = files_;
+  files.client_ca = "/proc/self/mem";  // can be opened, and not read where it begins
+  EXPECT_TRUE(absl::IsUnavailable(ReadTls(files, now_).status()));
+  rlimit limit;
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &limit), 0);
+  const rlimit none{0, limit.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &none), 0);
+  const absl::Status status = ReadTls(files_, now_).status();
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &limit), 0);
+  EXPECT_TRUE(absl::IsUnavailable(status)) << status;
+}
+
+TEST_F(TlsStoreTest, AKeyOfWhatAllMayDoAnythingWithIsRefused) {
+  const Issued issued = authority_.Issue("display.example");
+  PutFile(files_.certificate, issued.certificate);
+  for (const unsigned mode : {0604u, 0602u, 0601u}) {
+    PutFile(files_.key, issued.key, mode);
+    EXPECT_TRUE(absl::IsFailedPrecondition(ReadTls(files_, now_).status())) << mode;
+  }
+  PutFile(files_.key, issued.key, 0640);
+  // What goes to whoever asks is nobody's secret.
+  PutFile(files_.certificate, issued.certificate, 0644);
+  PutFile(files_.client_ca, authority_.certificate(), 0644);
+  EXPECT_TRUE(ReadTls(files_, now_).ok());
+}
+
+TEST_F(TlsStoreTest, IsValidFromItsFirstSecondToBeforeItsLast) {
+  Put(authority_.Issue("display.example", -3600, 3600));
+  const int64_t expires = ReadTls(files_, now_)->expires_s, begins = expires - 7200;
+  EXPECT_TRUE(ReadTls(files_, begins).ok());
+  EXPECT_THAT(std::string(ReadTls(files_, begins - 1).status().message()),
+              HasSubstr("is not valid yet"));
+  EXPECT_TRUE(ReadTls(files_, expires - 1).ok());
+  EXPECT_THAT(std::string(ReadTls(files_, expires).status().message()), HasSubstr("has expired"));
+}
+
+// The end of what cannot be read as a time is no end far away.
+TEST_F(TlsStoreTest, OfATimeThatIsNoneHasExpired) {
+  const Issued issued = authority_.Issue("display.example");
+  std::string pem = issued.certificate;
+  const size_t begin = pem.find('\n') + 1, end = pem.find("-----END");
+  std::string der;
+  ASSERT_TRUE(absl::Base64Unescape(
+      absl::StrReplaceAll(pem.substr(begin, end - begin), {{"\n", ""}}), &der));
+  const std::string utc_time("\x17\x0d", 2);  // X.690: tag and length
+  const size_t second = der.find(utc_time, der.find(utc_time) + 1);
+  ASSERT_NE(second, std::string::npos);
+  der.replace(second + 2, 6, "xxxxxx");
+  std::string lines;
+  const std::string coded = absl::Base64Escape(der);
+  for (size_t at = 0; at < coded.size(); at += 64) lines += coded.substr(at, 64) + "\n";
+  PutFile(files_.certificate, pem.substr(0, begin) + lines + pem.substr(end));
+  PutFile(files_.key, issued.key);
+  EXPECT_THAT(Why(), HasSubstr("has expired"));
+}
+
 TEST_F(TlsStoreTest, TheLastThatWasRightStays) {
   auto store = TlsStore::Open(
       files_, [this] { return now_; }, nullptr);
@@ -101,8 +176,66 @@ TEST_F(TlsStoreTest, TellsOfTheEndBeforeItComes) {
   now_ += 20 * 86400;
   EXPECT_THAT((*store)->trouble(),
               HasSubstr("expires in 2"));  // 240 hours, less what the test takes
-  now_ += 20 * 86400;
+  const int64_t end = (*store)->current().material->expires_s;
+  now_ = end - 3600;
+  EXPECT_THAT((*store)->trouble(), HasSubstr("expires in 1 hours"));
+  now_ = end - 3599;
+  EXPECT_THAT((*store)->trouble(), HasSubstr("expires in 0 hours"));
+  now_ = end - 1;
+  EXPECT_THAT((*store)->trouble(), HasSubstr("expires in 0 hours"));
+  now_ = end;
   EXPECT_THAT((*store)->trouble(), HasSubstr("has expired"));
+}
+
+TEST_F(TlsStoreTest, EachThingIsLoggedOnce) {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::tmpfile(), &std::fclose);
+  Logger log(Logger::Level::kInfo, Logger::Format::kText, fileno(file.get()));
+  const auto count = [&](const std::string& what) {
+    size_t found = 0;
+    char part[1 << 14];
+    const ssize_t got = pread(fileno(file.get()), part, sizeof(part), 0);
+    const std::string all(part, got < 0 ? 0 : static_cast<size_t>(got));
+    for (size_t at = all.find(what); at != std::string::npos; at = all.find(what, at + 1)) ++found;
+    return found;
+  };
+  auto store = TlsStore::Open(
+      files_, [this] { return now_; }, &log);
+  ASSERT_TRUE(store.ok());
+  EXPECT_EQ(count("TLS"), 0u);
+  PutFile(files_.key, "nothing");
+  EXPECT_FALSE((*store)->Look(true).ok());
+  EXPECT_FALSE((*store)->Look(true).ok());
+  EXPECT_EQ(count("TLS files are wrong"), 1u);
+  PutFile(files_.key, authority_.Issue("other").key);
+  EXPECT_FALSE((*store)->Look(true).ok());
+  EXPECT_EQ(count("TLS files are wrong"), 2u) << "another fault";
+  Put(authority_.Issue("display.example", -3600, 30 * 86400));
+  EXPECT_TRUE((*store)->Look(true).ok());
+  EXPECT_EQ(count("TLS files were read again"), 1u);
+  EXPECT_EQ(count("expires soon"), 0u);
+  const int64_t warns = (*store)->current().material->expires_s - TlsStore::kWarnSeconds;
+  now_ = warns - 1;
+  EXPECT_TRUE((*store)->Look().ok());
+  EXPECT_EQ((*store)->trouble(), "");
+  EXPECT_EQ(count("expires soon"), 0u);
+  now_ = warns;
+  EXPECT_TRUE((*store)->Look().ok());
+  EXPECT_TRUE((*store)->Look().ok());
+  EXPECT_EQ(count("expires soon"), 1u);
+  EXPECT_EQ(count(absl::StrCat("seconds=", TlsStore::kWarnSeconds)), 1u);
+  EXPECT_THAT((*store)->trouble(), HasSubstr("expires in 336 hours"));
+  // Of another one it is said anew.
+  Put(authority_.Issue("display.example", -3600, 20 * 86400));
+  EXPECT_TRUE((*store)->Look(true).ok());
+  EXPECT_EQ(count("expires soon"), 2u);
+}
+
+TEST_F(TlsStoreTest, WhatExpiresSoonIsTakenWithoutALogToo) {
+  auto store = TlsStore::Open(
+      files_, [this] { return now_; }, nullptr);
+  ASSERT_TRUE(store.ok());
+  now_ += 20 * 86400;
+  EXPECT_TRUE((*store)->Look().ok());
 }
 
 TEST_F(TlsStoreTest, DoesNotOpenWithoutWhatIsRight) {

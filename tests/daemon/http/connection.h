@@ -41,6 +41,8 @@ class Connection {
   void Send(const std::string& text) {
     EXPECT_EQ(send(fd_, text.data(), text.size(), MSG_NOSIGNAL), static_cast<ssize_t>(text.size()));
   }
+  // Nothing more comes from here.
+  void FinishSending() { EXPECT_EQ(shutdown(fd_, SHUT_WR), 0); }
   // Up to and with `end`, or to the end of the connection.
   std::string ReadTo(const std::string& end) {
     std::string text;

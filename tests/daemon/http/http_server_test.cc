@@ -98,6 +98,69 @@ TEST_F(HttpServer, RefusesWhatIsNoRequest) {
   EXPECT_THAT(Ask(Get("/hello")), StartsWith("HTTP/1.1 200 ")) << "the others are served";
 }
 
+TEST_F(HttpServer, WhatEndsInItsMidstIsNotAnswered) {
+  Start();
+  for (const char* part :
+       {"", "GET /hel", "POST /hello HTTP/1.1\r\nHost: x\r\nContent-Length: 9\r\n\r\nabc"}) {
+    Connection connection(server_->address());
+    connection.Send(part);
+    connection.FinishSending();
+    EXPECT_EQ(connection.ReadAll(), "") << part;
+  }
+}
+
+TEST_F(HttpServer, ABodyThatIsThrownAwayHasALimit) {
+  Start();
+  const auto post = [&](size_t size) {
+    return Ask(absl::StrCat("POST /hello HTTP/1.1\r\nHost: x\r\nContent-Length: ", size, "\r\n\r\n",
+                            std::string(size, 'b')));
+  };
+  EXPECT_THAT(post(4096), StartsWith("HTTP/1.1 405 "));
+  EXPECT_THAT(Ask("POST /hello HTTP/1.1\r\nHost: x\r\nContent-Length: 4097\r\n\r\n"),
+              StartsWith("HTTP/1.1 413 "));
+  // Of a length that nobody has said.
+  Connection chunks(server_->address());
+  chunks.Send("POST /hello HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\n2000\r\n");
+  EXPECT_THAT(chunks.ReadTo("\r\n\r\n"), StartsWith("HTTP/1.1 413 "));
+}
+
+TEST_F(HttpServer, TheConnectionEndsWhereTheRequestSaysSo) {
+  Start();
+  Connection old(server_->address());
+  old.Send("GET /hello HTTP/1.0\r\n\r\n");
+  EXPECT_THAT(old.ReadAll(), EndsWith("hello\n"));
+  Connection kept(server_->address());
+  kept.Send("GET /hello HTTP/1.0\r\nConnection: keep-alive\r\n\r\n");
+  EXPECT_THAT(kept.ReadTo("hello\n"), StartsWith("HTTP/1."));
+  kept.Send("GET /hello HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n");
+  EXPECT_THAT(kept.ReadAll(), EndsWith("hello\n"));
+}
+
+TEST_F(HttpServer, WhatIsAskedIsTakenApart) {
+  std::vector<std::string> asked;
+  auto server = Server::Start(
+      {.listen = *ParseAddress("127.0.0.1:0")}, [&](const Request& request, const Done& done) {
+        asked = {std::string(request.path),   std::string(request.query),
+                 std::string(request.host),   std::string(request.origin),
+                 std::string(request.cookie), std::string(request.accept_encoding)};
+        done({.body = "yes\n"});
+        return true;
+      });
+  ASSERT_TRUE(server.ok()) << server.status();
+  Connection connection((*server)->address());
+  const auto ask = [&](const std::string& request) {
+    connection.Send(request);
+    EXPECT_THAT(connection.ReadTo("yes\n"), StartsWith("HTTP/1.1 200 "));
+    return asked;
+  };
+  using Parts = std::vector<std::string>;
+  EXPECT_EQ(ask("GET /a?b=c?d HTTP/1.1\r\nHost: h:1\r\nOrigin: http://o\r\nCookie: k=v; "
+                "l=w\r\nAccept-Encoding: gzip\r\n\r\n"),
+            (Parts{"/a", "b=c?d", "h:1", "http://o", "k=v; l=w", "gzip"}));
+  EXPECT_EQ(ask("GET /a? HTTP/1.1\r\nHost: h\r\n\r\n"), (Parts{"/a", "", "h", "", "", ""}));
+  EXPECT_EQ(ask("GET ?x HTTP/1.1\r\n\r\n"), (Parts{"", "x", "", "", "", ""}));
+}
+
 TEST_F(HttpServer, AnswersMayComeLaterFromAnotherThread) {
   Start();
   Connection connection(server_->address());
@@ -159,6 +222,26 @@ TEST_F(HttpServer, ABusyPortIsAnError) {
   const auto second =
       Server::Start({.listen = server_->address()}, [](const Request&, Done) { return false; });
   EXPECT_TRUE(absl::IsAlreadyExists(second.status())) << second.status();
+}
+
+TEST_F(HttpServer, AnAddressThatCannotBeListenedOnIsNamed) {
+  const auto why = [](const std::string& address) {
+    ServerOptions options{.listen = *ParseAddress("127.0.0.1:0")};
+    if (address.starts_with("unix:")) {
+      options.listen = *ParseAddress(address);
+    } else {
+      options.listen.host = address;
+    }
+    return Server::Start(options, [](const Request&, const Done&) { return false; }).status();
+  };
+  // For documentation alone (RFC 5737): of no machine.
+  EXPECT_THAT(std::string(why("192.0.2.1").message()),
+              HasSubstr("192.0.2.1:0 cannot be listened on"));
+  // A name of which a part is too long is none (RFC 1035).
+  const absl::Status unknown = why(std::string(64, 'x') + ".invalid");
+  EXPECT_TRUE(absl::IsInvalidArgument(unknown)) << unknown;
+  EXPECT_THAT(std::string(unknown.message()), HasSubstr("is not known"));
+  EXPECT_FALSE(why(absl::StrCat("unix:", ::testing::TempDir(), "/no/such/folder/socket")).ok());
 }
 
 }  // namespace

@@ -6,8 +6,10 @@
 #include <netinet/in.h>
 #include <sys/un.h>
 
+#include <cctype>
 #include <cstddef>
 #include <cstring>
+#include <string>
 
 namespace voxeld::daemon::listen {
 namespace {
@@ -53,6 +55,36 @@ TEST(Peer, OfAUnixSocketHasTheNameThatItsClientGaveIt) {
   const Peer named = PeerOf(storage, offsetof(sockaddr_un, sun_path) + 4);
   EXPECT_EQ(named.name, "unix:\\x00xy\\n");
   EXPECT_TRUE(named.unix_socket);
+}
+
+TEST(Peer, TheMachineItselfIsCountedByItself) {
+  EXPECT_EQ(V6("::1", 1).address, "::1");
+  EXPECT_EQ(V6("::2", 1).address, "::/64");
+  EXPECT_FALSE(V6("::1", 1).unix_socket);
+  EXPECT_FALSE(V4("127.0.0.1", 1).unix_socket);
+}
+
+// RFC 3986, 2.1: two hexadecimal digits of either case.
+TEST(Peer, EveryEncodedByteIsDecodedAndNothingElse) {
+  for (int a = 1; a < 256; ++a) {
+    for (int b = 1; b < 256; ++b) {
+      const std::string text{'%', static_cast<char>(a), static_cast<char>(b)};
+      if (std::isxdigit(a) != 0 && std::isxdigit(b) != 0) {
+        const int byte = std::stoi(text.substr(1), nullptr, 16);
+        EXPECT_EQ(PeerName(text + "x"), std::string(1, static_cast<char>(byte)) + "x") << text;
+      } else {
+        EXPECT_EQ(PeerName(text), text);
+      }
+    }
+  }
+}
+
+TEST(Peer, NothingIsReadBehindTheName) {
+  const std::string text = "%41%41";
+  EXPECT_EQ(PeerName(std::string_view(text).substr(0, 1)), "%");
+  EXPECT_EQ(PeerName(std::string_view(text).substr(0, 2)), "%4");
+  EXPECT_EQ(PeerName(std::string_view(text).substr(0, 5)), "A%4");
+  EXPECT_EQ(PeerName(text), "AA") << "up to its end";
 }
 
 TEST(Peer, NamesThatAreNoneStayAsTheyAre) {

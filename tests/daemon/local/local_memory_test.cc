@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
+#include <fstream>
 #include <limits>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -232,6 +234,44 @@ TEST(LocalMemory, WhatIsMappedIsChargedToTheBudget) {
   }
   EXPECT_EQ(budget->used_bytes(kLocal), 0u);
   EXPECT_EQ(budget->used_bytes(), 30u);
+}
+
+TEST(LocalMemory, WhatIsReleasedIsNotMappedAnyMore) {
+  const auto mapped = [] {
+    std::ifstream maps("/proc/self/maps");
+    size_t found = 0;
+    for (std::string line; std::getline(maps, line);) {
+      if (line.find("memfd:voxeld-test") != std::string::npos) ++found;
+    }
+    return found;
+  };
+  Held held;
+  ASSERT_EQ(mapped(), 0u);
+  ASSERT_TRUE(held.Hold(1, "one").ok());
+  EXPECT_EQ(mapped(), 1u);
+  ASSERT_TRUE(held.memory.Release(1).ok());
+  EXPECT_EQ(mapped(), 0u);
+}
+
+// More than a process has addresses for: a memfd may be said to be so large without any memory.
+TEST(LocalMemory, ThatCannotBeMappedCostsNothing) {
+  constexpr uint64_t kHuge = uint64_t{1} << 60;
+  const Descriptor fd(memfd_create("huge", MFD_CLOEXEC | MFD_ALLOW_SEALING));
+  ASSERT_EQ(ftruncate(fd.get(), static_cast<off_t>(kHuge)), 0);
+  ASSERT_EQ(fcntl(fd.get(), F_ADD_SEALS, kAllSeals), 0);
+  const auto budget = std::make_shared<Budget>(kMost);
+  for (const auto& charged : {budget, std::shared_ptr<Budget>()}) {
+    Held held({.max_bytes = kMost}, charged);
+    const absl::Status status = held.memory.Hold(4, kHuge, fd.get());
+    EXPECT_TRUE(absl::IsResourceExhausted(status)) << status;
+    EXPECT_THAT(std::string(status.message()),
+                HasSubstr("memory 4 of 1152921504606846976 bytes cannot be mapped: "));
+    EXPECT_EQ(held.memory.memories(), 0u);
+    EXPECT_EQ(held.memory.bytes(), 0u);
+    EXPECT_EQ(*held.mapped, 0u);
+    EXPECT_EQ(budget->used_bytes(), 0u);
+    EXPECT_TRUE(held.Hold(4, "four").ok());
+  }
 }
 
 TEST(LocalMemory, TakesNothingOnceEnded) {

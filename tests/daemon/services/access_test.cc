@@ -26,7 +26,6 @@ using access::Access;
 using access::HashOf;
 using access::ParseScopes;
 using access::PutFile;
-using access::Scope;
 using grpc::StatusCode;
 using ::testing::HasSubstr;
 
@@ -174,6 +173,22 @@ TEST_F(ServicesAccess, AHeaderThatIsNoneIsRefused) {
   const grpc::Status status = stub->ListDisplays(&context, {}, &response);
   EXPECT_EQ(status.error_code(), StatusCode::UNAUTHENTICATED);
   EXPECT_THAT(status.error_message(), HasSubstr("Bearer"));
+}
+
+// Which of two would count is nothing to guess at.
+TEST_F(ServicesAccess, TwoHeadersAreRefused) {
+  Start();
+  const auto stub = v1::DisplayService::NewStub(Plain());
+  for (const char* second : {"viewer", "guess"}) {
+    grpc::ClientContext context;
+    SetDeadline(context);
+    context.AddMetadata("authorization", "Bearer viewer");
+    context.AddMetadata("authorization", absl::StrCat("Bearer ", second));
+    v1::ListDisplaysResponse response;
+    const grpc::Status status = stub->ListDisplays(&context, {}, &response);
+    EXPECT_EQ(status.error_code(), StatusCode::UNAUTHENTICATED);
+    EXPECT_THAT(status.error_message(), HasSubstr("is not one of"));
+  }
 }
 
 TEST_F(ServicesAccess, AUnixSocketsUserIsKnownByTheKernelsWord) {
@@ -372,6 +387,10 @@ TEST_F(ServicesTls, BothSidesAreVerified) {
   // Signed by the right authority, and named by nobody.
   EXPECT_EQ(Ask(authority_.Issue("other.example"), ca).error_code(), StatusCode::PERMISSION_DENIED);
   EXPECT_TRUE(Ask(authority_.Issue("other.example"), ca, "viewer").ok());
+  // Of one without a subject the name is the first that it is for.
+  EXPECT_TRUE(Ask(authority_.IssueWithoutSubject("cube.example"), ca).ok());
+  EXPECT_EQ(Ask(authority_.IssueWithoutSubject("other.example"), ca).error_code(),
+            StatusCode::PERMISSION_DENIED);
   // By none, by another, expired, not valid yet; and a server that the client does not know.
   EXPECT_EQ(Ask({}, ca, "viewer").error_code(), StatusCode::UNAVAILABLE);
   EXPECT_EQ(Ask(stranger_.Issue("cube.example"), ca, "viewer").error_code(),

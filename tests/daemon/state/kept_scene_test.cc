@@ -328,6 +328,105 @@ TEST_F(KeptScene, RowsThatAreWrongAreLeftOutAndTheOthersCome) {
   ASSERT_TRUE(state.ok());
   EXPECT_EQ(state->left_out, 3u);
   EXPECT_EQ(state->entities, 1u);
+  ASSERT_EQ(state->why.size(), 3u);
+  EXPECT_TRUE(state->why[2].ends_with("its layer is not there")) << state->why[2];
+  EXPECT_EQ(state->layers, 1u);
+  // What a message may be now is no limit of what was taken before.
+  Limits small;
+  small.max_message_bytes = 1;
+  state = ReadState(*file, {clock_.Now(), kUnixNs}, small, nullptr, nullptr);
+  ASSERT_TRUE(state.ok());
+  EXPECT_EQ(state->entities, 1u);
+}
+
+// Rows of every kind that cannot be read, and rows of owners that are not there.
+TEST_F(KeptScene, EachRowThatIsLeftOutIsToldUpToALimit) {
+  const auto file = OpenFile();
+  const std::string wrong = "\xff\xff\xff";
+  std::vector<Change> changes = {{Change::What::kPut, {RowKind::kOwner, 1, "", ""}, ""},
+                                 {Change::What::kPut, {RowKind::kOwner, 2, "", ""}, wrong},
+                                 {Change::What::kPut, {RowKind::kObject, 1, "o", ""}, wrong},
+                                 {Change::What::kPut, {RowKind::kObject, 9, "o", ""}, ""},
+                                 {Change::What::kPut, {RowKind::kLayer, 1, "l\n", ""}, wrong},
+                                 {Change::What::kPut, {static_cast<RowKind>(77), 1, "l", ""}, ""}};
+  ASSERT_TRUE(file->Apply([&] { return std::exchange(changes, {}); }).ok());
+  auto state = ReadState(*file, {clock_.Now(), kUnixNs}, Limits(), nullptr, nullptr);
+  ASSERT_TRUE(state.ok()) << state.status();
+  EXPECT_EQ(state->left_out, 5u);
+  ASSERT_EQ(state->why.size(), 5u);
+  std::vector<std::string> begins;
+  for (const std::string& why : state->why) begins.push_back(why.substr(0, why.find(':')));
+  std::sort(begins.begin(), begins.end());
+  EXPECT_EQ(begins, (std::vector<std::string>{"entity 1/l/", "layer 1/l\\n/", "object 1/o/",
+                                              "object 9/o/", "owner 2//"}));
+  EXPECT_EQ(state->scene.owners.size(), 1u);
+  EXPECT_EQ(state->objects, 0u);
+  EXPECT_EQ(state->layers, 0u);
+
+  for (uint64_t owner = 100; owner < 130; ++owner) {
+    changes.push_back({Change::What::kPut, {RowKind::kLayer, owner, "l", ""}, ""});
+  }
+  ASSERT_TRUE(file->Apply([&] { return std::exchange(changes, {}); }).ok());
+  state = ReadState(*file, {clock_.Now(), kUnixNs}, Limits(), nullptr, nullptr);
+  ASSERT_TRUE(state.ok()) << state.status();
+  EXPECT_EQ(state->left_out, 35u);
+  EXPECT_EQ(state->why.size(), RestoredState::kMostSaid);
+}
+
+// Steps are of a bounded size; what they hold is what was kept, in whole.
+TEST_F(KeptScene, ALargeLayerComesInSeveralSteps) {
+  constexpr size_t kEntities = 4096 + 1;
+  StoreFixture f;
+  std::vector<Operation> operations;
+  for (size_t i = 0; i < kEntities; ++i) {
+    operations.push_back(testing::Put("a", absl::StrCat("e", i)));
+  }
+  Author author = AuthorOf(1, true);
+  f.CommitAll(author, std::move(operations));
+  auto keeper = MakeKeeper();
+  keeper->Offer(f.store.snapshot(),
+                std::make_shared<const OwnerRecords>(OwnerRecords{{1, {.token = "one"}}}), true);
+  ASSERT_TRUE(keeper->Stop().ok());
+  const auto file = OpenFile();
+  auto state = ReadState(*file, {clock_.Now(), kUnixNs}, Limits(), nullptr, nullptr);
+  ASSERT_TRUE(state.ok()) << state.status();
+  EXPECT_EQ(state->entities, kEntities);
+  size_t most = 0, all = 0;
+  for (const RestoredScene::Step& step : state->scene.steps) {
+    most = std::max(most, step.operations.size());
+    all += step.operations.size();
+  }
+  EXPECT_EQ(most, 4096u);
+  EXPECT_EQ(all, kEntities + 1) << "and the layer";
+}
+
+// What is made of an object whose row is lost is refused by name, and nothing else is.
+TEST_F(KeptScene, WhatRefersToALostObjectIsNotRestored) {
+  StoreFixture f;
+  f.CommitAll(
+      AuthorOf(1, true),
+      testing::Sequence(0, testing::Define("leaf", {{testing::Dots(0), {}}}),
+                        testing::Define("tree", {{InstanceRef{"leaf"}, {}}}),
+                        testing::PutInstance("a", "of-tree", "tree"), testing::Put("a", "alone")));
+  auto keeper = MakeKeeper();
+  keeper->Offer(f.store.snapshot(),
+                std::make_shared<const OwnerRecords>(OwnerRecords{{1, {.token = "one"}}}), true);
+  ASSERT_TRUE(keeper->Stop().ok());
+  const auto file = OpenFile();
+  std::vector<Change> changes = {{Change::What::kRemove, {RowKind::kObject, 1, "leaf", ""}, ""}};
+  ASSERT_TRUE(file->Apply([&] { return std::exchange(changes, {}); }).ok());
+  Core core({.version = "test", .threads = false}, clock_);
+  auto state = ReadState(*file, {clock_.Now(), kUnixNs}, core.limits(), nullptr, nullptr);
+  ASSERT_TRUE(state.ok()) << state.status();
+  EXPECT_EQ(state->objects, 1u);
+  EXPECT_EQ(state->left_out, 0u);
+  const std::vector<Issue> issues = core.Restore(std::move(state->scene));
+  ASSERT_EQ(issues.size(), 2u);
+  EXPECT_NE(issues[0].message.find("leaf"), std::string::npos) << issues[0].message;
+  EXPECT_NE(issues[1].message.find("tree"), std::string::npos) << issues[1].message;
+  const SnapshotPtr snapshot = core.scene_watch().newest();
+  EXPECT_NE(snapshot->FindEntity({1, "a"}, "alone"), nullptr);
+  EXPECT_EQ(snapshot->FindEntity({1, "a"}, "of-tree"), nullptr);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "absl/strings/str_cat.h"
 #include "daemon/viewer/page_files.h"
@@ -21,6 +22,7 @@ namespace {
 namespace asio = boost::asio;
 namespace beast = boost::beast;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 using Json = nlohmann::json;
 
@@ -124,13 +126,15 @@ TEST_F(ViewerTest, ThePageIsServedForThisMachineAlone) {
   } else {
     EXPECT_EQ(page.result_int(), 200u);
     EXPECT_EQ(page["Content-Encoding"], "gzip");
+    const auto type = page["Content-Type"];
+    EXPECT_THAT(std::string(type.data(), type.size()), StartsWith("text/html"));
     EXPECT_EQ(Unpack(page.body()), Get("/").body());
     EXPECT_THAT(Get("/").body(), StartsWith("<!doctype html>"));
     const auto policy = page["Content-Security-Policy"];
     EXPECT_THAT(std::string(policy.data(), policy.size()), StartsWith("default-src 'none'"));
   }
-  for (const char* host :
-       {"localhost", "127.0.0.1:9", "[::1]:9", "192.0.2.7", "Screen.Example:80"}) {
+  for (const char* host : {"localhost", "LocalHost:9", "127.0.0.1:9", "[::1]:9",
+                           "[::ffff:192.0.2.7]:9", "192.0.2.7", "Screen.Example:80"}) {
     EXPECT_NE(Get("/", {{"Host", host}}).result_int(), 403u) << host;
   }
   for (const char* host :
@@ -273,6 +277,90 @@ TEST_F(ViewerTest, ControlIsForTheAddressThatServesOnce) {
   Say(*controlling, {{"update", {{"no_such_field", 7}}}});
   EXPECT_TRUE(HearOf(*controlling, "error").is_string());
   EXPECT_NO_THROW(Open({{"Cookie", "voxeld_control=wrong"}}));
+}
+
+TEST_F(ViewerTest, NothingButTheCookieThatWasGivenControls) {
+  const std::string cookie = Cookie();
+  const auto controls = [&](const std::string& cookies) {
+    const auto socket = Open({{"Cookie", cookies}});
+    Say(*socket, {{"hello", true}});
+    return HearOf(*socket, "hello")["control"].get<bool>();
+  };
+  std::string other = cookie;
+  other.back() = other.back() == '0' ? '1' : '0';
+  const std::string name = cookie.substr(0, cookie.find('=') + 1);
+  std::string first = cookie;
+  first[name.size()] = first[name.size()] == '0' ? '1' : '0';
+  for (const std::string& wrong :
+       {other, first, name, cookie + "0", cookie.substr(0, cookie.size() - 1), "x" + cookie,
+        name + "; " + cookie.substr(name.size())}) {
+    EXPECT_FALSE(controls(wrong)) << wrong;
+  }
+  EXPECT_TRUE(controls(other + "; " + cookie));
+}
+
+TEST_F(ViewerTest, OriginsAreOfBothKindsAndWhole) {
+  for (const char* origin : {"http://localhost:8088", "https://localhost:8088"}) {
+    EXPECT_NE(Get("/", {{"Origin", origin}}).result_int(), 403u) << origin;
+  }
+  for (const char* origin : {"http://localhost", "ftp://localhost:8088", "http://localhost:80880",
+                             "localhost:8088", "null"}) {
+    EXPECT_EQ(Get("/", {{"Origin", origin}}).result_int(), 403u) << origin;
+  }
+}
+
+TEST_F(ViewerTest, FilesAreTakenFromPagesThatControlAlone) {
+  const std::string cookie = Cookie();
+  const http::Receive receive = viewer_->Receive();
+  const auto refusal = [&](const http::Request& request) {
+    const std::optional<http::Reception> reception = receive(request);
+    return reception.has_value() ? reception->refusal.body : "not its own";
+  };
+  http::Request request{.path = "/play",
+                        .query = "name=a.obj",
+                        .host = "localhost:8088",
+                        .origin = "http://localhost:8088",
+                        .cookie = cookie};
+  EXPECT_THAT(refusal(request), Not(HasSubstr("page"))) << "as far as nothing is played";
+  request.path = "/other";
+  EXPECT_EQ(refusal(request), "not its own");
+  request.path = "/play";
+  request.cookie = "";
+  EXPECT_THAT(refusal(request), HasSubstr("may only look"));
+  request.origin = "";
+  EXPECT_THAT(refusal(request), HasSubstr("files are taken from pages"));
+  request.host = "evil.example";
+  EXPECT_THAT(refusal(request), HasSubstr("evil.example"));
+  EXPECT_EQ(Get("/play").result_int(), 405u);
+}
+
+TEST_F(ViewerTest, ThereIsNoKeyWhereNobodyIsToControl) {
+  auto viewer = Viewer::Make(*core_, clock_, {.version = "1.2", .control = false});
+  ASSERT_TRUE(viewer.ok());
+  EXPECT_EQ((*viewer)->ControlAddress(server_->address()), "");
+  // Nor does the empty key open anything.
+  std::optional<http::Response> response;
+  const http::Handler handler =
+      (*viewer)->Handler([](const http::Request&, const http::Done&) { return false; });
+  EXPECT_TRUE(handler({.path = "/control", .query = "key=", .host = "localhost"},
+                      [&](http::Response answer) { response = std::move(answer); }));
+  ASSERT_TRUE(response.has_value());
+  EXPECT_EQ(response->status, 403u);
+  const Address local = *ParseAddress("unix:/run/voxeld/http");
+  EXPECT_EQ(viewer_->ControlAddress(local), "");
+  EXPECT_EQ(Viewer::PageAddress(local), "");
+  EXPECT_EQ(Viewer::PageAddress(*ParseAddress("127.0.0.1:8088")), "http://127.0.0.1:8088/");
+}
+
+TEST_F(ViewerTest, WhatIsNotItsOwnGoesToOthers) {
+  std::string path;
+  const http::Handler handler =
+      viewer_->Handler([&](const http::Request& request, const http::Done&) {
+        path = request.path;
+        return true;
+      });
+  EXPECT_TRUE(handler({.path = "/healthz", .host = "evil.example"}, [](const http::Response&) {}));
+  EXPECT_EQ(path, "/healthz");
 }
 
 }  // namespace

@@ -255,8 +255,26 @@ TEST(ValidateTest, Helices) {
        {[](Helix& h, VoxelGrid&) { h.hub_mm = 8; }, {"hub_mm is 8", "below radius_mm"}},
        {[](Helix& h, VoxelGrid&) { h.radius_mm = NAN; }, {"radius_mm is nan"}},
        {[](Helix& h, VoxelGrid&) { h.phase_turns = 1; }, {"phase_turns is 1"}},
+       {[](Helix& h, VoxelGrid&) { h.phase_turns = -0.25; }, {"phase_turns is -0.25"}},
        {[](Helix& h, VoxelGrid&) { h.width_px = h.height_px = h.slices_per_turn = 1024; },
         {"at most 134217728", "pixel by pixel"}}});
+}
+
+TEST(ValidateTest, StrokesAreOneOrTwo) {
+  for (const int strokes : {-1, 0, 3}) {
+    Geometry bad = GoodStack();
+    std::get<PlanarStack>(bad.shape).strokes = strokes;
+    const absl::Status status = ValidateGeometry(bad);
+    EXPECT_THAT(std::string(status.message()), testing::HasSubstr("must be 1 or 2")) << strokes;
+  }
+}
+
+TEST(ValidateTest, ACorrectionIsAskedForWithTheGridToo) {
+  Geometry bad = GoodStack();
+  bad.correction.emplace();
+  bad.correction->affine[0] = NAN;
+  EXPECT_EQ(ValidateGeometry(bad).code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(ValidateGeometry(bad), ValidateShape(bad));
 }
 
 TEST(ValidateTest, TiltsAndAxes) {
@@ -288,6 +306,11 @@ TEST(Validate, FormatsThatDoNotGoTogetherAreRefused) {
   EXPECT_EQ(refusal({.format = PixelFormat::kPlanes24, .bits = 8}),
             "layout.bits is 8, must be 0 or 1, as planes24 has");
   EXPECT_EQ(refusal({.bits = 9}), "layout.bits is 9, must be 0 to 8");
+  EXPECT_EQ(refusal({.bits = -1}), "layout.bits is -1, must be 0 to 8");
+  EXPECT_TRUE(ValidateFormat({.format = PixelFormat::kRgb332, .bits = 3}).ok());
+  EXPECT_TRUE(ValidateFormat({.format = PixelFormat::kRgb332, .bits = 0}).ok());
+  EXPECT_TRUE(ValidateFormat({.format = PixelFormat::kPlanes24, .bits = 1}).ok());
+  EXPECT_TRUE(ValidateFormat({.format = PixelFormat::kPlanes24, .bits = 0}).ok());
   EXPECT_EQ(refusal({.format = static_cast<PixelFormat>(5)}), "layout.format is 5, must be 0 to 4");
 }
 

@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <cstring>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "gpu/bulk/segment.h"
 #include "gpu/worker/target_codec.h"
@@ -93,6 +95,69 @@ TEST(TargetCodec, RefusesALatticeOfMoreLightsThanBytes) {
   bytes = good;
   bytes[0] = std::byte{3};  // the kind of shape
   EXPECT_FALSE(DecodeTarget(bytes).ok());
+}
+
+// Of every kind of shape, with a table of displacements and one homography for each panel.
+std::vector<Target> TargetsOfAllShapes() {
+  std::vector<Target> targets(4);
+  display::PlanarStack stack{.width_px = 3, .height_px = 5, .mirror_v = true};
+  stack.positions_mm = {1, 2.5};
+  targets[0].geometry.shape = stack;
+  targets[1].geometry.shape =
+      display::Rotor{.slices_per_turn = 7, .panels = {{.tilt_deg = 3}, {}}, .clockwise = true};
+  targets[2] = LatticeTarget();
+  targets[3].geometry.shape = display::Helix{.slices_per_turn = 9, .left_handed = true};
+  display::Correction correction;
+  correction.homographies.resize(2);
+  correction.displacement.emplace();
+  correction.displacement->at_mm = {{1, 2, 3}, {4, 5, 6}};
+  targets[1].geometry.correction = correction;
+  return targets;
+}
+
+TEST(TargetCodec, EveryCutAndEveryByteMoreIsRefused) {
+  for (const Target& target : TargetsOfAllShapes()) {
+    auto bytes = EncodeTarget(target);
+    const auto decoded = DecodeTarget(bytes);
+    ASSERT_TRUE(decoded.ok()) << decoded.status();
+    EXPECT_EQ(decoded->geometry, target.geometry);
+    for (size_t cut = 0; cut < bytes.size(); ++cut) {
+      EXPECT_FALSE(DecodeTarget(std::span(bytes).first(cut)).ok()) << cut;
+    }
+    bytes.push_back(std::byte{0});
+    EXPECT_FALSE(DecodeTarget(bytes).ok());
+  }
+}
+
+// Whatever stands in a byte: what is taken is what comes out again, and yes and no are 1 and 0.
+TEST(TargetCodec, WhatIsTakenHasNoOtherMeaning) {
+  for (const Target& target : TargetsOfAllShapes()) {
+    const auto good = EncodeTarget(target);
+    for (size_t at = 0; at < good.size(); ++at) {
+      for (const unsigned value : {2u, 0xFFu}) {
+        auto bytes = good;
+        bytes[at] = static_cast<std::byte>(value);
+        const auto decoded = DecodeTarget(bytes);
+        if (decoded.ok()) {
+          EXPECT_EQ(EncodeTarget(*decoded), bytes) << at;
+        }
+      }
+    }
+  }
+  // The last byte of a stack's own is mirror_v; the grid follows.
+  auto bytes = EncodeTarget(TargetsOfAllShapes()[0]);
+  constexpr size_t kMirrorV = 8 + 1 + 2 * 4 + 2 * 8 + 8 + 2 * 8 + 4 + 8 + 1;
+  ASSERT_EQ(bytes[kMirrorV], std::byte{1});
+  for (const unsigned wrong : {2u, 3u, 0xFFu}) {
+    bytes[kMirrorV] = static_cast<std::byte>(wrong);
+    EXPECT_FALSE(DecodeTarget(bytes).ok()) << wrong;
+  }
+  bytes[kMirrorV] = std::byte{0};
+  EXPECT_TRUE(DecodeTarget(bytes).ok());
+  for (const unsigned wrong : {4u, 5u, 0xFFu}) {
+    bytes[0] = static_cast<std::byte>(wrong);
+    EXPECT_EQ(DecodeTarget(bytes).status().message(), "a target of an unknown shape");
+  }
 }
 
 }  // namespace
