@@ -57,7 +57,8 @@ void TimeWatch::Look() {
     log_.Warn("the daemon did not run",
               {{"seconds", absl::StrFormat("%.1f", Seconds(pauses_.length))},
                {"hint",
-                "it was stopped, its machine was, or it had no time for it; displays went dark"}});
+                "it was stopped, its machine was, or it had no time for it; devices with a "
+                "watchdog went dark"}});
   }
   if (step >= kStep || step <= -kStep) {
     steps_ = {steps_.count + 1, now.running, step};
