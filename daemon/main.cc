@@ -36,7 +36,7 @@
 #include "daemon/play/setup.h"
 #include "daemon/process/end_limit.h"
 #include "daemon/process/process.h"
-#include "daemon/process/reserve_watch.h"
+#include "daemon/process/process_watch.h"
 #include "daemon/process/spare_threads.h"
 #include "daemon/process/supervisor.h"
 #include "daemon/reload/reloader.h"
@@ -201,8 +201,7 @@ absl::StatusOr<std::vector<listen::ListeningSocket>> AdoptSockets(const Config& 
     if (tls && !config.security.tls.any()) {
       return absl::InvalidArgumentError(
           "a socket that the daemon was given is to speak TLS, and security.tls_certificate, "
-          "tls_key "
-          "and tls_client_ca are not given");
+          "tls_key and tls_client_ca are not given");
     }
     sockets.push_back(*std::move(socket));
   }
@@ -219,7 +218,8 @@ void FeedWatchdog(Core& core, const Supervisor& supervisor) {
 int Serve(const Config& config, const CommandLine& command_line, Displays displays,
           const sigset_t& signals, sync::Clock& clock, Supervisor& supervisor, Logger& log) {
   std::optional<EndLimit> end_limit;  // of all that is below, to its last destructor
-  ReserveWatch reserve(config.server.memory_reserve_bytes, clock, log);
+  ProcessWatch process(config.server.memory_reserve_bytes, clock, log);
+  access::Ticker turns(clock, TimeWatch::kTurn, [&process] { process.LookAtTime(); });
   const absl::StatusOr<access::AccessOptions> access_options = AccessOf(config.security);
   if (!access_options.ok()) return Fail(1, access_options.status());
   absl::StatusOr<std::unique_ptr<access::Security>> opened =
@@ -251,6 +251,8 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
              .state_event =
                  [&watch](const std::string& display, display::DisplayState state,
                           const std::string& reason) { watch.OnDisplay(display, state, reason); },
+             .transfers_event = [&watch](const auto& display,
+                                         uint64_t n) { watch.OnTransfers(display, n); },
              .state = kept == nullptr ? nullptr : kept->sink(),
              .state_figures =
                  [kept = kept.get()] { return kept == nullptr ? StateFigures() : kept->figures(); },
@@ -258,11 +260,13 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
                  [assets = assets.get()] {
                    return assets == nullptr ? AssetFigures() : assets->figures();
                  },
-             .process_figures = [&reserve] { return reserve.figures(); },
+             .process_figures = [&process] { return process.figures(); },
              .connections =
-                 [counters, security = security.get(), &reloads] {
-                   ListenFigures figures = counters->Read();
+                 [counters, security = security.get(), &reloads, &clock] {
+                   ListenFigures figures = counters->Read(clock.Now());
                    figures.access_trouble = security->trouble();
+                   const access::TlsStore::Counts tls = security->tls_counts();
+                   figures.tls_taken = tls.taken, figures.tls_refused = tls.refused;
                    const reload::Reloader* reloader = reloads;
                    if (reloader != nullptr) figures.config_trouble = reloader->trouble();
                    return figures;
@@ -365,11 +369,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   });
   auto ticker = std::make_unique<access::Ticker>(clock, access::Security::kLookInterval, [&] {
     security->Look();
-    if (const uint64_t taken = SpareThreads::Refill(); taken > 0) {
-      log.Warn("the system gave no thread: spare ones were taken",
-               {{"threads", absl::StrCat(taken)}});
-    }
-    reserve.Look();
+    process.Look();
   });
 
   watch.Tell([server = server->get()](bool serving) { server->SetServing(serving); });

@@ -32,6 +32,9 @@ class Security {
 
   Access& access() { return *access_; }
   const TlsStore* tls() const { return tls_.get(); }  // may be none
+  TlsStore::Counts tls_counts() const {
+    return tls_ == nullptr ? TlsStore::Counts() : tls_->counts();
+  }
   Audit& audit() { return *audit_; }
 
   // What is wrong with any of it, or will soon be; empty: nothing.

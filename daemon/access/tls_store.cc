@@ -149,14 +149,18 @@ absl::Status TlsStore::Look(bool again) {
         std::exchange(wrong_, material.ok() ? "" : std::string(material.status().message()));
     const bool first = current_.material == nullptr;
     if (material.ok()) {
-      current_ = {std::make_shared<const TlsMaterial>(*std::move(material)),
-                  current_.generation + 1};
+      current_.material = std::make_shared<const TlsMaterial>(*std::move(material));
+      ++current_.generation;
       warned_ = false;
       if (log_ != nullptr && !first) {
         log_->Info("TLS files were read again", {{"certificate", files_.certificate}});
       }
-    } else if (log_ != nullptr && !first && wrong_ != before) {
-      log_->Error("TLS files are wrong: the last that were right stay in force", {{"why", wrong_}});
+    } else {
+      ++refused_;
+      if (log_ != nullptr && !first && wrong_ != before) {
+        log_->Error("TLS files are wrong: the last that were right stay in force",
+                    {{"why", wrong_}});
+      }
     }
   }
   if (!wrong_.empty()) return absl::FailedPreconditionError(wrong_);
@@ -172,6 +176,11 @@ absl::Status TlsStore::Look(bool again) {
 TlsStore::Current TlsStore::current() const {
   sync::MutexLock lock(mutex_);
   return current_;
+}
+
+TlsStore::Counts TlsStore::counts() const {
+  sync::MutexLock lock(mutex_);
+  return {.taken = current_.generation, .refused = refused_};
 }
 
 std::string TlsStore::trouble() const {

@@ -49,9 +49,15 @@ class TlsStore {
 
   struct Current {
     std::shared_ptr<const TlsMaterial> material;
-    uint64_t generation = 0;  // greater with each that was taken
+    uint64_t generation = 0;  // greater by one with each that was taken
   };
   Current current() const;
+
+  // Times that the files were read and taken, the first included, and that they were wrong.
+  struct Counts {
+    uint64_t taken = 0, refused = 0;
+  };
+  Counts counts() const;
 
   // What is wrong, or will soon be; empty: nothing.
   std::string trouble() const;
@@ -68,6 +74,7 @@ class TlsStore {
   mutable sync::Mutex mutex_;
   Stamps stamps_ VOXELD_GUARDED_BY(mutex_);
   Current current_ VOXELD_GUARDED_BY(mutex_);
+  uint64_t refused_ VOXELD_GUARDED_BY(mutex_) = 0;
   std::string wrong_ VOXELD_GUARDED_BY(mutex_);
   bool warned_ VOXELD_GUARDED_BY(mutex_) = false;
 };

@@ -85,6 +85,10 @@ void Core::GiveBack(SessionId session, std::vector<Receipt> receipts) {
   });
 }
 
+void Core::CountAsleep() {
+  impl_->loop().Post([impl = impl_.get()] { impl->CountAsleep(); });
+}
+
 void Core::CountOverrun() {
   impl_->loop().Post([impl = impl_.get()] { impl->CountOverrun(); });
 }

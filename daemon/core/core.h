@@ -64,6 +64,8 @@ struct CoreOptions {
   std::function<void(const std::string& display, display::DisplayState state,
                      const std::string& reason)>
       state_event;
+  // Transfers to a display's device that failed, not oftener than LinkWatch says; on the core's thread. May be empty.
+  std::function<void(const std::string& display, uint64_t failed)> transfers_event;
   // Keeps what outlives the daemon, and lives longer than the core; none: nothing does.
   StateSink* state = nullptr;
   std::function<StateFigures()> state_figures;      // for Stats; from any thread. May be empty
@@ -209,6 +211,8 @@ class Core {
   void OnDurable(uint64_t snapshot);
   // A session's stream was ended because its client did not read: for the figures.
   void CountOverrun();
+  // A watcher of volumes does not take them, and is sent no more until it does: for the figures. Any thread.
+  void CountAsleep();
 
   // ---- queries
   // The newest snapshot, and word of the next; at once, in any thread, whatever the core is busy

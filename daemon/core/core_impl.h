@@ -50,6 +50,7 @@ class Core::Impl {
                                           std::shared_ptr<SessionSink> sink);
   void CloseSession(SessionId id, uint64_t incarnation, bool gone, std::function<void()> done);
   void CountOverrun() { ++streams_overrun_; }
+  void CountAsleep() { ++volume_watches_asleep_; }
 
   // ---- outcomes (outcomes.cc)
   void GiveBack(SessionId id, const Receipt& receipt);
@@ -291,6 +292,7 @@ class Core::Impl {
       std::make_shared<std::atomic<uint64_t>>(0);
   uint64_t outcomes_undelivered_ = 0;
   uint64_t client_drops_ = 0, streams_overrun_ = 0, frames_dropped_ = 0;
+  uint64_t volume_watches_asleep_ = 0;
   uint64_t timed_dropped_ = 0, must_show_timeouts_ = 0, sessions_resumed_ = 0;
   SlidingLatency sending_, decoding_, applying_;
 

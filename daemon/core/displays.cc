@@ -93,6 +93,12 @@ absl::Status Core::Impl::AddDisplay(std::unique_ptr<display::Display> display,
       loop->Post([tell, name, state, reason] { tell(name, state, reason); });
     };
   }
+  if (options_.transfers_event) {
+    options.tell_transfers = [loop = loop_, tell = options_.transfers_event,
+                              name = info.name](uint64_t failed) {
+      loop->Post([tell, name, failed] { tell(name, failed); });
+    };
+  }
   auto host = std::make_shared<Host>();
   host->work = options.work;
   absl::StatusOr<std::unique_ptr<FramePipeline>> pipeline =
@@ -218,6 +224,7 @@ void Core::Impl::GetStats(Reply<Stats> reply) {
   stats.outcomes_undelivered = outcomes_undelivered_;
   stats.client_drops = client_drops_;
   stats.streams_overrun = streams_overrun_;
+  stats.volume_watches_asleep = volume_watches_asleep_;
   stats.frames_dropped = frames_dropped_;
   stats.timed_pending = timed_.size();
   stats.timed_dropped = timed_dropped_;

@@ -28,6 +28,7 @@ struct DisplayFigures {
   double volumes_per_second = 0;
   uint64_t bytes_out = 0, slices_sent = 0, slices_resent = 0, underruns = 0, attaches = 0;
   uint64_t transfers_failed = 0;  // overcome, or the device was lost
+  std::string device_trouble;  // that it was lost or transfers failed just now; empty: all is well
   // Of the engine's part: drawing the volume; slicing it; copying pictures from the device. Where they
   // are packed as the volume is drawn there is no slicing.
   uint64_t volumes_late = 0;  // they missed the sweep before which their sending began
@@ -46,6 +47,7 @@ struct DisplayFigures {
   std::string engine_degraded;  // empty: the engine is as was asked for; else what is not, and why
   bool volume_held = false;     // the engine was lost or failed, and nothing has been drawn since
   uint64_t engine_faults = 0, engine_returns = 0;
+  uint64_t engine_out_of_memory = 0;  // times that its device had no memory, and the CPU took over
   uint64_t engine_mismatches =
       0;  // it came back with other bytes than the CPU's, and was sent away
   // From the beginning of the volume that the loss interrupted to the CPU's in its place; from the
@@ -78,7 +80,10 @@ struct ListenFigures {
   uint64_t probe_failures = 0;   // of connections to itself
   // Calls whose callers may not make them; those ended since their callers may not any more.
   uint64_t calls_turned_away = 0, calls_revoked = 0;
+  uint64_t tls_taken = 0,
+           tls_refused = 0;    // certificate and key: times that they were read, and were wrong
   std::string unreachable;     // empty: they work; else why they do not
+  std::string accept_trouble;  // that none could be accepted just now, and why; empty: all is well
   std::string access_trouble;  // what is wrong with grants, certificate or key; empty: nothing
   std::string config_trouble;  // why the configuration was not taken when it was read again
 };
@@ -103,7 +108,11 @@ struct ProcessFigures {
   uint64_t allocations_failed = 0;   // that the system had no memory for, at first
   uint64_t allocations_refused = 0;  // of them those that the reserve did not help either
   uint64_t reserve_bytes = 0, reserve_held_bytes = 0;  // that it is to have, and has
-  std::string trouble;  // that there was no memory just now; empty: all is well
+  uint64_t segments_refused = 0;  // memory for arrays and engines that the system did not have
+  std::string trouble;            // that there was no memory just now; empty: all is well
+  uint64_t pauses = 0;            // times that the process did not run for a second or more
+  uint64_t clock_steps = 0;       // times that the wall clock stepped by half a second or more
+  std::string time_trouble;       // of the last of these, if it was just now; empty: all is well
 };
 
 struct Stats {
@@ -117,9 +126,11 @@ struct Stats {
   uint64_t outcomes_undelivered = 0;
   uint64_t client_drops = 0;     // frames that clients dropped themselves, by their own word
   uint64_t streams_overrun = 0;  // ended because their client did not read
-  uint64_t frames_dropped = 0;   // immediate frames given up by FlowPolicy
-  uint64_t timed_pending = 0;    // commits that wait for their present_at
-  uint64_t timed_dropped = 0;    // waiting still when their session ended
+  uint64_t volume_watches_asleep =
+      0;                        // that were sent no more volumes, since nobody took them: times
+  uint64_t frames_dropped = 0;  // immediate frames given up by FlowPolicy
+  uint64_t timed_pending = 0;   // commits that wait for their present_at
+  uint64_t timed_dropped = 0;   // waiting still when their session ended
   uint64_t must_show_timeouts = 0;
   uint64_t sessions_dormant = 0;  // gone, can be resumed
   uint64_t sessions_resumed = 0;

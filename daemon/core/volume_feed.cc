@@ -57,6 +57,7 @@ void VolumeFeed::OnVolume(const absl::StatusOr<display::DecodedVolume>& volume, 
       newest_.reset();
       taken_.clear();
       asleep_ = true;
+      core_.CountAsleep();
       return;
     } else {
       if (!newest_.has_value()) waits_since_ = now;

@@ -52,10 +52,21 @@ Response HealthResponse(const std::vector<DisplayDescription>& displays, const S
   if (!stats.connections.config_trouble.empty()) {
     reasons.push_back({{"what", "configuration"}, {"why", stats.connections.config_trouble}});
   }
+  if (!stats.connections.accept_trouble.empty()) {
+    reasons.push_back({{"what", "connections"}, {"why", stats.connections.accept_trouble}});
+  }
   if (!stats.process.trouble.empty()) {
     reasons.push_back({{"what", "memory"}, {"why", stats.process.trouble}});
   }
+  if (!stats.process.time_trouble.empty()) {
+    reasons.push_back({{"what", "time"}, {"why", stats.process.time_trouble}});
+  }
   for (const DisplayFigures& figures : stats.displays) {
+    const bool lost = figures.state == display::DisplayState::kLost;  // which is told above
+    if (!figures.device_trouble.empty() && !lost) {
+      reasons.push_back(
+          {{"display", figures.name}, {"what", "device"}, {"why", figures.device_trouble}});
+    }
     held = held || figures.volume_held;
     if (figures.engine_degraded.empty()) continue;
     Json reason = {

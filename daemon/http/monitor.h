@@ -13,7 +13,7 @@ namespace voxeld::daemon::http {
 // 200 while every display is there and is drawn for and the daemon is not shutting down, else 503:
 // {"status":"failing","reasons":[{"display":"sim","what":"lost","why":"…"}]}. A display that is
 // being looked for for the first time fails nothing. An engine that is not as was asked for, while
-// the CPU draws in its place, is 200 and "degraded"; 503 and "degraded" while it has not drawn yet
+// the CPU draws in its place, and what went wrong within the last minute, is 200 and "degraded"; 503 and "degraded" while it has not drawn yet
 // and the last volume is held.
 Response HealthResponse(const std::vector<DisplayDescription>& displays, const Stats& stats,
                         bool draining);

@@ -6,7 +6,9 @@
 #include <string>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "daemon/core/stats.h"
+#include "display/sync/clock.h"
 #include "display/sync/mutex.h"
 
 namespace voxeld::daemon::listen {
@@ -15,6 +17,9 @@ namespace voxeld::daemon::listen {
 class Counters {
  public:
   using Count = std::atomic<uint64_t>;
+  // How long Read tells that no connection could be accepted.
+  static constexpr sync::TimeNs kTold = 60 * sync::kSecond;
+
   Count open = 0;
   Count accepted = 0;
   Count refused_in_all = 0, refused_by_address = 0, refused_after_cut = 0;
@@ -30,7 +35,16 @@ class Counters {
     unreachable_ = std::move(why);
   }
 
-  ListenFigures Read() const {
+  // No connection could be accepted, at `now`.
+  void NoteAcceptFailure(sync::TimeNs now, std::string why) {
+    ++accept_failures;
+    sync::MutexLock lock(mutex_);
+    accept_failed_ns_ = now;
+    accept_failed_why_ = std::move(why);
+  }
+
+  // `now`: by which accept_trouble is told; 0: without it.
+  ListenFigures Read(sync::TimeNs now = 0) const {
     ListenFigures out{.open = open,
                       .accepted = accepted,
                       .refused_in_all = refused_in_all,
@@ -47,12 +61,19 @@ class Counters {
                       .calls_revoked = calls_revoked};
     sync::MutexLock lock(mutex_);
     out.unreachable = unreachable_;
+    if (!accept_failed_why_.empty() && now > 0 && now - accept_failed_ns_ < kTold) {
+      out.accept_trouble = absl::StrCat(
+          "no connection could be accepted ", (now - accept_failed_ns_) / sync::kSecond, " s ago (",
+          out.accept_failures, " times since the start): ", accept_failed_why_);
+    }
     return out;
   }
 
  private:
   mutable sync::Mutex mutex_;
   std::string unreachable_ VOXELD_GUARDED_BY(mutex_);
+  std::string accept_failed_why_ VOXELD_GUARDED_BY(mutex_);  // empty: it never did
+  sync::TimeNs accept_failed_ns_ VOXELD_GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace voxeld::daemon::listen

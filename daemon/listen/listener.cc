@@ -325,7 +325,7 @@ class Listener::Impl {
   }
 
   void Pause(const std::string& why) {
-    ++counters_.accept_failures;
+    counters_.NoteAcceptFailure(clock_.Now(), why);
     if (retry_ == sync::kNever && options_.log != nullptr) {
       rlimit limit = {};
       getrlimit(RLIMIT_NOFILE, &limit);

@@ -81,7 +81,7 @@ void EngineCare::Retire(std::shared_ptr<const void> what) const {
 
 void EngineCare::OnLost(const absl::Status& why, sync::TimeNs since) {
   const sync::TimeNs now = clock_.Now();
-  if (absl::IsDataLoss(why)) ++faults_;
+  ++(absl::IsDataLoss(why) ? faults_ : out_of_memory_);
   if (frames_since_return_ >= kWellFrames) pause_ = kFirstPause;
   why_ = std::string(why.message());
   away_because_.clear();
@@ -358,6 +358,7 @@ void EngineCare::AddTo(DisplayFigures& figures) const {
   }
   figures.volume_held = holding_told_ && holding_since_.has_value();
   figures.engine_faults = faults_;
+  figures.engine_out_of_memory = out_of_memory_;
   figures.engine_returns = returns_;
   figures.engine_mismatches = mismatches_;
   figures.takeover_last_ns = takeover_last_ns_;

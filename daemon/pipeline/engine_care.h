@@ -158,6 +158,7 @@ class EngineCare {
   std::vector<Pin> pins_;
 
   uint64_t faults_ = 0, mismatches_ = 0, returns_ = 0;
+  uint64_t out_of_memory_ = 0;
   int64_t redraw_last_ns_ = 0, redraw_max_ns_ = 0;
   int64_t takeover_last_ns_ = 0, takeover_max_ns_ = 0, return_last_ns_ = 0, return_max_ns_ = 0;
 };

@@ -36,6 +36,7 @@ FramePipeline::FramePipeline(Options options)
       tell_(std::move(options.tell)),
       retire_(std::move(options.retire)),
       tell_state_(std::move(options.tell_state)),
+      tell_transfers_(std::move(options.tell_transfers)),
       genlock_(std::move(options.genlock)),
       setup_(options.setup),
       wanted_limit_w_(options.setup.power_limit_w),
@@ -84,7 +85,7 @@ sync::TimeNs FramePipeline::Step() {
   do {
     if (genlock_ != nullptr) next_round = StepGenlock();
     if (limiter_.Rise(clock_.Now())) target_stale_ = settings_changed_ = true;
-    next_tick_ = display_->Tick();
+    Tick();
     ServeCaptures();
   } while (MaybeDraw());
   sweeps_->Set(showing() ? display_->ComingSweeps(2) : std::vector<sync::TimeNs>());
@@ -102,7 +103,13 @@ sync::TimeNs FramePipeline::Step() {
 }
 
 void FramePipeline::Breathe() {
-  if (clock_.Now() >= next_tick_) next_tick_ = display_->Tick();
+  if (clock_.Now() >= next_tick_) Tick();
+}
+
+void FramePipeline::Tick() {
+  next_tick_ = display_->Tick();
+  const uint64_t failed = link_.Failed(display_->stats().transfers_failed, clock_.Now());
+  if (failed > 0 && tell_transfers_) tell_transfers_(failed);
 }
 
 void FramePipeline::Retire(std::shared_ptr<const void> what) {
@@ -359,6 +366,10 @@ void FramePipeline::OnOutcome(const display::VolumeOutcome& outcome) {
 }
 
 void FramePipeline::OnState(display::DisplayState state, const std::string& reason) {
+  if (state == display::DisplayState::kLost) link_.Lost(reason);
+  if (state == display::DisplayState::kShowing || state == display::DisplayState::kBlanked) {
+    link_.There(clock_.Now());
+  }
   if (tell_state_) tell_state_(state, reason);
   if (genlock_ != nullptr) {
     const bool present = state == display::DisplayState::kShowing;

@@ -48,6 +48,7 @@
 #include "daemon/pipeline/engine_event.h"
 #include "daemon/pipeline/frame_pool.h"
 #include "daemon/pipeline/genlock.h"
+#include "daemon/pipeline/link_watch.h"
 #include "daemon/pipeline/loop.h"
 #include "daemon/pipeline/power_limiter.h"
 #include "daemon/pipeline/rider_book.h"
@@ -85,6 +86,8 @@ class FramePipeline final : private display::Display::Listener {
     std::function<void(EngineEvent)> tell_engine;  // what becomes of the engine; may be empty
     // The display's state, whenever it or its reason changes; may be empty.
     std::function<void(display::DisplayState, const std::string&)> tell_state;
+    // Transfers to its device that failed since the last call, or that this was last told of; may be empty.
+    std::function<void(uint64_t)> tell_transfers;
     // Whose member the display is, which can hold volumes; null: it goes by itself.
     std::shared_ptr<Genlock> genlock;
   };
@@ -209,6 +212,7 @@ class FramePipeline final : private display::Display::Listener {
   void KeepScene(uint64_t volume);
   sync::TimeNs LetGoOfScenes();
   void Breathe();
+  void Tick();
   void Retire(std::shared_ptr<const void> what);
   void Told(const Rider& rider, const CommitOutcome& outcome);
   // `method` on this thread with what a call of the engine's ended in, unless the drawing that the
@@ -225,6 +229,7 @@ class FramePipeline final : private display::Display::Listener {
   const RiderBook::Tell tell_;
   const std::function<void(std::shared_ptr<const void>)> retire_;
   const std::function<void(display::DisplayState, const std::string&)> tell_state_;
+  const std::function<void(uint64_t)> tell_transfers_;
 
   uint64_t engines_made_ = 0;
   EngineCare::Made made_;
@@ -276,6 +281,7 @@ class FramePipeline final : private display::Display::Listener {
   std::map<uint64_t, DrawnFrom> scenes_;  // by volume, from the one told last on
   sync::TimeNs keep_scenes_until_ = 0;
   sync::TimeNs next_tick_ = 0;
+  LinkWatch link_;
 
   RiderBook riders_;
   uint64_t lit_voxels_ = 0, singular_drawables_ = 0;

@@ -104,6 +104,7 @@ DisplayFigures FramePipeline::Figures() const {
   figures.underruns = display.underruns;
   figures.attaches = display.attaches;
   figures.transfers_failed = display.transfers_failed;
+  figures.device_trouble = link_.trouble(now);
   figures.volumes_late = display.volumes_late;
   figures.sweeps = display_->Sweeps().value_or(sync::SweepLock());
   if (genlock_ != nullptr) {

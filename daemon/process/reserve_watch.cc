@@ -4,8 +4,14 @@
 
 namespace voxeld::daemon {
 
-ReserveWatch::ReserveWatch(size_t bytes, sync::Clock& clock, Logger& log, MemoryReserve& reserve)
-    : reserve_(reserve), bytes_(bytes), clock_(clock), log_(log) {
+ReserveWatch::ReserveWatch(size_t bytes, sync::Clock& clock, Logger& log, MemoryReserve& reserve,
+                           uint64_t (*segments_refused)())
+    : reserve_(reserve),
+      segments_refused_(segments_refused),
+      bytes_(bytes),
+      clock_(clock),
+      log_(log),
+      segments_told_(segments_refused()) {
   Look();
 }
 
@@ -23,6 +29,15 @@ void ReserveWatch::Look() {
     told_ = before.failed;
     failed_ns_ = clock_.Now();
   }
+  if (const uint64_t refused = segments_refused_(); refused != segments_told_) {
+    log_.Warn("the system had no memory for arrays or engines",
+              {{"times", absl::StrCat(refused - segments_told_)},
+               {"hint",
+                "clients were refused theirs: give the machine more, or the daemon a "
+                "higher limit"}});
+    segments_told_ = refused;
+    segments_ns_ = clock_.Now();
+  }
   if (was_whole && !whole_) {
     const MemoryReserve::Figures now = reserve_.figures();
     log_.Error("there is no memory for the reserve; it is tried again",
@@ -39,7 +54,7 @@ ProcessFigures ReserveWatch::figures() const {
                          .allocations_refused = now.refused,
                          .reserve_bytes = now.wanted_bytes,
                          .reserve_held_bytes = now.held_bytes,
-                         .trouble = ""};
+                         .segments_refused = segments_refused_()};
   if (now.held_bytes < now.wanted_bytes) {
     figures.trouble = absl::StrCat("the system has no memory: of its reserve of ", now.wanted_bytes,
                                    " bytes the daemon has ", now.held_bytes,
@@ -50,6 +65,12 @@ ProcessFigures ReserveWatch::figures() const {
                      " s ago (", now.failed, " allocations since the start, the last of ",
                      now.last_bytes, " bytes); the reserve helped ",
                      now.refused == 0 ? "them all" : absl::StrCat("all but ", now.refused));
+  }
+  if (segments_ns_ > 0 && clock_.Now() - segments_ns_ < kTold) {
+    absl::StrAppend(&figures.trouble, figures.trouble.empty() ? "" : "; ",
+                    "the system had no memory for arrays or engines ",
+                    (clock_.Now() - segments_ns_) / sync::kSecond, " s ago (",
+                    figures.segments_refused, " times since the start)");
   }
   return figures;
 }

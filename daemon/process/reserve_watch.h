@@ -9,6 +9,7 @@
 #include "daemon/process/memory_reserve.h"
 #include "display/sync/clock.h"
 #include "display/sync/mutex.h"
+#include "gpu/bulk/segment.h"
 
 namespace voxeld::daemon {
 
@@ -18,9 +19,11 @@ class ReserveWatch {
   // How long figures().trouble tells of allocations that failed.
   static constexpr sync::TimeNs kTold = 60 * sync::kSecond;
 
-  // Fills the reserve with `bytes`, if there are so many. All are to outlive it.
+  // Fills the reserve with `bytes`, if there are so many. All are to outlive it. `segments_refused`: how often the
+  // system had no memory for arrays or engines so far, which the reserve is too small to help; from any thread.
   ReserveWatch(size_t bytes, sync::Clock& clock, Logger& log,
-               MemoryReserve& reserve = MemoryReserve::OfProcess());
+               MemoryReserve& reserve = MemoryReserve::OfProcess(),
+               uint64_t (*segments_refused)() = &gpu::Segment::Refused);
 
   // Every second or so.
   void Look();
@@ -29,6 +32,7 @@ class ReserveWatch {
 
  private:
   MemoryReserve& reserve_;
+  uint64_t (*const segments_refused_)();
   const size_t bytes_;
   sync::Clock& clock_;
   Logger& log_;
@@ -36,6 +40,8 @@ class ReserveWatch {
   uint64_t told_ VOXELD_GUARDED_BY(mutex_) = 0;  // of the allocations that failed
   bool whole_ VOXELD_GUARDED_BY(mutex_) = true;
   sync::TimeNs failed_ns_ VOXELD_GUARDED_BY(mutex_) = 0;  // when that was seen last; 0: never
+  uint64_t segments_told_ VOXELD_GUARDED_BY(mutex_) = 0;
+  sync::TimeNs segments_ns_ VOXELD_GUARDED_BY(mutex_) = 0;  // the same of segments
 };
 
 }  // namespace voxeld::daemon

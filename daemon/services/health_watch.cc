@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "display/sync/clock.h"
 
@@ -43,6 +44,12 @@ void HealthWatch::OnDisplay(const std::string& display, display::DisplayState st
     lost_.erase(display);
   }
   Changed();
+}
+
+void HealthWatch::OnTransfers(const std::string& display, uint64_t failed) {
+  log_.Warn("transfers failed", {{"display", display},
+                                 {"transfers", absl::StrCat(failed)},
+                                 {"hint", "look at its cable and power"}});
 }
 
 void HealthWatch::Changed() {

@@ -24,6 +24,8 @@ class HealthWatch {
   void OnEngine(const EngineEvent& event);
   void OnDisplay(const std::string& display, display::DisplayState state,
                  const std::string& reason);
+  // Transfers to its device failed. For the log alone: the display is there.
+  void OnTransfers(const std::string& display, uint64_t failed);
 
  private:
   void Changed() VOXELD_REQUIRES(mutex_);

@@ -198,9 +198,10 @@ void StreamSession::OnOpened(const absl::StatusOr<SessionInfo>& info) {
       WriteNext();
       Read();
       if (context_.log != nullptr) {
-        context_.log->Info("session opened", {{"session", std::to_string(session_)},
-                                              {"owner", std::to_string(info->owner)},
-                                              {"client", client_name_}});
+        context_.log->Info(incarnation_ > 0 ? "session taken up again" : "session opened",
+                           {{"session", std::to_string(session_)},
+                            {"owner", std::to_string(info->owner)},
+                            {"client", client_name_}});
       }
     }
   }

@@ -44,6 +44,8 @@ void EncodeFigures(const DisplayFigures& in, v1::DisplayStats* out) {
   out->set_underruns(in.underruns);
   out->set_attaches(in.attaches);
   out->set_transfers_failed(in.transfers_failed);
+  out->set_engine_out_of_memory(in.engine_out_of_memory);
+  out->set_device_trouble(in.device_trouble);
   out->set_volumes_late(in.volumes_late);
   out->set_sweep_lock(ToWire(in.sweeps.state));
   out->set_sweep_period_ns(in.sweeps.period_ns);
@@ -105,6 +107,9 @@ void EncodeConnections(const ListenFigures& in, v1::ConnectionStats* out) {
   out->set_calls_revoked(in.calls_revoked);
   out->set_access_trouble(in.access_trouble);
   out->set_config_trouble(in.config_trouble);
+  out->set_tls_taken(in.tls_taken);
+  out->set_tls_refused(in.tls_refused);
+  out->set_accept_trouble(in.accept_trouble);
 }
 
 }  // namespace
@@ -127,6 +132,7 @@ void Encode(const Stats& in, v1::Stats* out) {
   out->set_outcomes_undelivered(in.outcomes_undelivered);
   out->set_client_drops(in.client_drops);
   out->set_streams_overrun(in.streams_overrun);
+  out->set_volume_watches_asleep(in.volume_watches_asleep);
   out->set_frames_dropped(in.frames_dropped);
   out->set_timed_pending(in.timed_pending);
   out->set_timed_dropped(in.timed_dropped);
@@ -159,6 +165,10 @@ void Encode(const Stats& in, v1::Stats* out) {
   process->set_reserve_bytes(in.process.reserve_bytes);
   process->set_reserve_held_bytes(in.process.reserve_held_bytes);
   process->set_trouble(in.process.trouble);
+  process->set_segments_refused(in.process.segments_refused);
+  process->set_pauses(in.process.pauses);
+  process->set_clock_steps(in.process.clock_steps);
+  process->set_time_trouble(in.process.time_trouble);
   for (const DisplayFigures& display : in.displays) EncodeFigures(display, out->add_displays());
 }
 

@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <system_error>
 
@@ -20,7 +21,10 @@ constexpr int kFutureWrite = F_SEAL_FUTURE_WRITE;
 constexpr int kFutureWrite = 0x0010;  // linux/fcntl.h
 #endif
 
+std::atomic<uint64_t> refused = 0;
+
 absl::Status Failed(const char* what, size_t size) {
+  ++refused;
   return absl::ResourceExhaustedError(absl::StrCat("shared memory of ", size, " bytes: ", what,
                                                    ": ", std::generic_category().message(errno)));
 }
@@ -36,6 +40,8 @@ int MakeMemory(size_t size) {
 }
 
 }  // namespace
+
+uint64_t Segment::Refused() { return refused; }
 
 absl::StatusOr<std::shared_ptr<Segment>> Segment::Map(int fd, size_t size, int protection) {
   const int flags = fd < 0 ? MAP_PRIVATE | MAP_ANONYMOUS : MAP_SHARED;

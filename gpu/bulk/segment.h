@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 
@@ -29,6 +30,9 @@ class Segment {
   ~Segment();
   Segment(const Segment&) = delete;
   Segment& operator=(const Segment&) = delete;
+
+  // Of this process: how often the system had no memory or descriptors for one.
+  static uint64_t Refused();
 
   std::span<std::byte> bytes() const { return {data_, size_}; }
   int fd() const { return fd_; }  // −1: none

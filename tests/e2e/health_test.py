@@ -93,7 +93,7 @@ class Health(unittest.TestCase):
                     controller = Controller(port)
                     self.until(asked, SERVING)
                     self.until(lambda: asked(b"voxeld.v1.SceneService"), SERVING)
-                    self.until(page, (200, []))
+                    self.until(page, (200, [("cube", "device")]))  # that it was lost is told for a minute
             finally:
                 daemon.terminate()
                 self.assertEqual(daemon.wait(LONG), 0)

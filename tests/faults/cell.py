@@ -2,6 +2,7 @@
 import contextlib
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -19,6 +20,7 @@ import numpy as np
 import voxeld as voxel
 
 from polling import LONG, until
+from programs import program
 
 DISPLAYS = 'driver = "simulated"\nsize = "16x16x12"\nrate = 60\n'
 HERE = Path(__file__).parent
@@ -33,7 +35,7 @@ def free_port() -> int:
 class Cell:
     """A daemon under a load."""
 
-    def __init__(self, test: unittest.TestCase, clients: int, hurt: str = "", engine: str = "", environment: Optional[dict[str, str]] = None, tls: bool = False) -> None:
+    def __init__(self, test: unittest.TestCase, clients: int, hurt: str = "", engine: str = 'kind = "cpu"\n', environment: Optional[dict[str, str]] = None, tls: bool = False) -> None:
         self.test = test
         self.folder = tempfile.mkdtemp(prefix="voxeld-faults-")
         self.server = f"unix:{self.folder}/s"
@@ -51,9 +53,11 @@ class Cell:
             grants.chmod(0o600)
         Path(self.folder, "voxeld.toml").write_text(
             f'[server]\nlisten = [{listen}]\nhttp = "127.0.0.1:{self.http}"\n[state]\ndir = "{self.folder}/state"\n{security}'
-            f'[engine]\nkind = "cpu"\n{engine}[[display]]\nname = "hurt"\n{DISPLAYS}{hurt}[[display]]\nname = "well"\n{DISPLAYS}', encoding="utf-8")
+            f'[engine]\n{engine}[[display]]\nname = "hurt"\n{DISPLAYS}{hurt}[[display]]\nname = "well"\n{DISPLAYS}', encoding="utf-8")
         self.environment = {**os.environ, **(environment or {})}
         self.told = ""  # by health, now and then
+        self.moved: set[str] = set()  # metrics that a fault has seen itself
+        self.goes_on: Optional["GoesOn"] = None
         self.start()
         test.addCleanup(self.close)
         self.via = self.server
@@ -62,7 +66,7 @@ class Cell:
 
     def start(self) -> None:
         self.log = open(f"{self.folder}/log", "a", encoding="utf-8")
-        self.daemon = subprocess.Popen([os.environ["VOXELD"], "--config", f"{self.folder}/voxeld.toml", "--log-level", "info"],
+        self.daemon = subprocess.Popen([program("VOXELD", "the daemon"), "--config", f"{self.folder}/voxeld.toml", "--log-level", "info"],
                                        stdin=subprocess.DEVNULL, stdout=self.log, stderr=subprocess.STDOUT, env=self.environment)
         until(self.reachable, f"a daemon: {self.said()[-2000:]}")
 
@@ -75,9 +79,10 @@ class Cell:
     def said(self) -> str:
         return Path(f"{self.folder}/log").read_text(encoding="utf-8", errors="replace")
 
-    def health(self) -> str:
+    def health(self, timeout: float = LONG) -> str:
+        """Its answer, 200 or 503."""
         try:
-            with urllib.request.urlopen(f"http://127.0.0.1:{self.http}/healthz", timeout=LONG) as answer:
+            with urllib.request.urlopen(f"http://127.0.0.1:{self.http}/healthz", timeout=timeout) as answer:
                 return str(answer.read().decode())
         except urllib.error.HTTPError as error:
             return str(error.read().decode())
@@ -88,13 +93,13 @@ class Cell:
             lines = answer.read().decode().splitlines()
         return {line.rpartition(" ")[0]: float(line.rpartition(" ")[2]) for line in lines if line and not line.startswith("#")}
 
-    def watch_health(self, seconds: float) -> None:
-        """What it says meanwhile is kept; a daemon that is stopped says nothing."""
+    def watch_health(self, seconds: float, says: str = "") -> None:
+        """What it says meanwhile is kept; a daemon that is stopped says nothing. `says`: and for longer, LONG at most, until it has said that."""
         end = time.monotonic() + seconds
-        while time.monotonic() < end:
+        last = end + LONG if says else end
+        while time.monotonic() < end or time.monotonic() < last and self.daemon.poll() is None and not re.search(says, self.told):
             with contextlib.suppress(OSError, urllib.error.URLError):
-                with urllib.request.urlopen(f"http://127.0.0.1:{self.http}/healthz", timeout=max(0.05, end - time.monotonic())) as answer:
-                    self.told += answer.read().decode() + "\n"
+                self.told += self.health(max(0.05, end - time.monotonic())) + "\n"
             time.sleep(0.05)  # the pace at which it is asked
 
     def certificate(self, name: str) -> None:
@@ -102,10 +107,10 @@ class Cell:
                         "-addext", "subjectAltName=DNS:display.example", "-keyout", f"{self.folder}/{name}.key", "-out", f"{self.folder}/{name}.pem"],
                        check=True, capture_output=True)
 
-    def install(self, name: str) -> None:
+    def install(self, name: str, key: str = "") -> None:
         for end in ("key", "pem"):
             path = Path(self.folder, f"server.{end}.new")
-            path.write_bytes(Path(self.folder, f"{name}.{end}").read_bytes())
+            path.write_bytes(Path(self.folder, f"{key or name if end == 'key' else name}.{end}").read_bytes())
             path.chmod(0o600)
             path.rename(Path(self.folder, f"server.{end}"))
 

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """So many clients at once, each with a layer of its own, which commit at a rate until a line comes in; then each waits for all that it is
 owed, and a line of JSON says what became of everything.
-usage: clients.py SERVER COUNT RATE [CERTIFICATE KEY NAME], the certificate being its own and its authority's in one."""
+For fault_matrix_test, and by hand: two lines on standard input end it. PYTHONPATH has the client."""
+import argparse
 import contextlib
 import json
 import sys
@@ -13,10 +14,22 @@ import numpy as np
 import voxeld as voxel
 
 LONG = 60.0
-server, count, rate = sys.argv[1], int(sys.argv[2]), float(sys.argv[3])
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+parser.add_argument("server", help="its address, as unix:/run/voxeld.sock")
+parser.add_argument("count", type=int, help="how many clients")
+parser.add_argument("rate", type=float, help="commits a second, of each")
+parser.add_argument("certificate", nargs="?", help="for TLS: a file that is theirs and their authority's in one")
+parser.add_argument("key", nargs="?", help="its key")
+parser.add_argument("name", nargs="?", help="by which the server goes in its certificate")
+options = parser.parse_args()
+server, count, rate = options.server, options.count, options.rate
+if count < 1 or rate <= 0:
+    parser.error(f"count is {count} and rate {rate:g}; there is at least one client, and it commits")
 who: Optional[voxel.Credentials] = None
-if len(sys.argv) > 4:
-    who = voxel.Credentials(ca=sys.argv[4], certificate=sys.argv[4], key=sys.argv[5], server_name=sys.argv[6])
+if options.certificate is not None:
+    if options.name is None:
+        parser.error("a certificate comes with its key and the server's name")
+    who = voxel.Credentials(ca=options.certificate, certificate=options.certificate, key=options.key, server_name=options.name)
 stop = threading.Event()
 ends = {"commits": 0, "presented": 0, "unchanged": 0, "superseded": 0, "lost": 0, "not_shown": 0, "refused": 0, "unknown": 0, "missing": 0}
 mutex = threading.Lock()

@@ -31,6 +31,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from life import PATIENCE, Ending, Life, again, end, judge
+from programs import program
 
 # Who may end the process where it asked for memory itself: by an abort, or since it does not look at what it got (fontconfig, OpenSSL).
 GIVES_UP = re.compile(r"^(libfontconfig|libcrypto|libssl|libgrpc|libgrpc\+\+|libgpr|libabsl_\w+|libprotobuf|libupb|libtbb|libstdc\+\+|ld-linux-x86-64)[^ ]*\.so")
@@ -165,14 +166,16 @@ def say(last: Result, at: int, of: int) -> None:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--way", choices=["reserve", "bare", "forever"], action="append")
+    parser.add_argument("--way", choices=["reserve", "bare", "forever"], action="append", help="how it fails, as above; may be given more than once (default: reserve)")
     parser.add_argument("--sites", help="only these, by comma")
     parser.add_argument("--sample", type=int, default=0, help="so many of each way, by chance")
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=1, help="of that chance (default: %(default)s)")
     parser.add_argument("--jobs", type=int, default=1, help="so many lives at a time")
     parser.add_argument("--list", action="store_true", help="say where memory is asked for, and end")
-    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--json", action="store_true", help="what came of each as JSON, on standard output")
     options = parser.parse_args()
+    program("VOXELD", "the daemon")
+    program("FAIL_MALLOC", "the library that makes allocations fail")
     found, most_descriptors = places()
     if options.list:
         for place in found:

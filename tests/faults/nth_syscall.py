@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from life import Life, again, end, judge
+from programs import program
 
 # What fails, and with what: errors that a system in want gives.
 ERRORS = {
@@ -111,13 +112,14 @@ def main() -> int:
     parser.add_argument("--calls", help="only these, by comma")
     parser.add_argument("--most", type=int, default=1 << 30, help="of each call the first so many")
     parser.add_argument("--sample", type=int, default=0, help="so many of all, by chance")
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=1, help="of that chance (default: %(default)s)")
     parser.add_argument("--list", action="store_true", help="say how many there are, and end")
-    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--json", action="store_true", help="what came of each as JSON, on standard output")
     options = parser.parse_args()
     unknown = set(options.calls.split(",")) - set(ERRORS) if options.calls else set()
     if unknown:
         parser.error(f"no such calls: {', '.join(sorted(unknown))}; there are {', '.join(sorted(ERRORS))}")
+    program("VOXELD", "the daemon")
     counted = count()
     wanted = options.calls.split(",") if options.calls else sorted(counted)
     cases = [(call, error, n) for call in wanted for error in ERRORS[call] for n in range(1, min(counted.get(call, 0), options.most) + 1)]

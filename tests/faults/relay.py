@@ -14,6 +14,7 @@ class Relay:
         self.going = threading.Event()
         self.going.set()
         self.half = False
+        self.held = self.halved = 0  # bytes that waited; pieces of which half passed
         self._mutex = threading.Lock()
         self._open: list[socket.socket] = []
         threading.Thread(target=self._accept, daemon=True).start()
@@ -25,12 +26,14 @@ class Relay:
         self.half = False
         self.going.set()
 
-    def cut(self) -> None:
+    def cut(self) -> int:
+        """How many there were."""
         with self._mutex:
             ended, self._open = self._open, []
         for each in ended:
             with contextlib.suppress(OSError):
                 each.shutdown(socket.SHUT_RDWR)
+        return len(ended) // 2
 
     def close(self) -> None:
         self.go_on()
@@ -56,8 +59,11 @@ class Relay:
     def _forward(self, one: socket.socket, other: socket.socket) -> None:
         with contextlib.suppress(OSError):
             while data := one.recv(65536):
+                if not self.going.is_set():
+                    self.held += len(data)
                 self.going.wait()
                 if self.half:
+                    self.halved += 1
                     other.sendall(data[:len(data) // 2])
                     break
                 other.sendall(data)

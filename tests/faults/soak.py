@@ -28,6 +28,7 @@ import numpy as np
 import voxeld as voxel
 
 from polling import until
+from programs import program
 
 EVERY = 2.0  # seconds from sample to sample
 LONG = 60.0
@@ -199,19 +200,20 @@ def draw(path: str, rows: list[dict[str, float]]) -> None:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--minutes", type=float, default=45)
+    parser.add_argument("--minutes", type=float, default=45, help="how long (default: %(default)s)")
     parser.add_argument("--roles", default=",".join(ROLES), help="which clients there are (default: %(default)s)")
-    parser.add_argument("--csv")
-    parser.add_argument("--svg")
-    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--csv", help="a file for each measurement, a line each")
+    parser.add_argument("--svg", help="a file for a picture of them")
+    parser.add_argument("--json", action="store_true", help="what came of it as JSON, on standard output")
     options = parser.parse_args()
+    voxeld = program("VOXELD", "the daemon")
     with tempfile.TemporaryDirectory(prefix="voxeld-soak-") as folder:
         server = f"unix:{folder}/s"
         log = open(f"{folder}/log", "w+", encoding="utf-8")
         # Full after a minute or two, so that what is kept stays as much, and making room goes on all the time.
         Path(f"{folder}/voxeld.toml").write_text("[limits]\nmax_assets = 64\n", encoding="utf-8")
         daemon = subprocess.Popen(
-            [os.environ["VOXELD"], "--config", f"{folder}/voxeld.toml", "--listen", server, "--http", "127.0.0.1:0", "--state-dir", f"{folder}/state", "--log-level", "info", "--engine", "cpu",
+            [voxeld, "--config", f"{folder}/voxeld.toml", "--listen", server, "--http", "127.0.0.1:0", "--state-dir", f"{folder}/state", "--log-level", "info", "--engine", "cpu",
              "--display", "stack=simulated,size=24x24x16,rate=60", "--display", "rotor=simulated,geometry=rotor,size=24x16,slices=60,rate=30",
              "--display", "lattice=simulated,profile=" + str(Path(__file__).parents[2] / "display/profiles/lattice-8.toml")],
             stdout=log, stderr=subprocess.STDOUT)

@@ -68,6 +68,7 @@ TEST_F(SecurityTest, WithoutFilesOfTlsThereIsNone) {
   const auto security = Open({});
   ASSERT_TRUE(security.ok()) << security.status();
   EXPECT_EQ((*security)->tls(), nullptr);
+  EXPECT_EQ((*security)->tls_counts().taken, 0u);
   EXPECT_EQ((*security)->trouble(), "");
   (*security)->Look();
   PutFile(options_.grants, "wrong");

@@ -149,6 +149,8 @@ TEST_F(TlsStoreTest, TheLastThatWasRightStays) {
   ASSERT_TRUE(store.ok()) << store.status();
   EXPECT_EQ((*store)->trouble(), "");
   const TlsStore::Current first = (*store)->current();
+  EXPECT_EQ((*store)->counts().taken, 1u);
+  EXPECT_EQ((*store)->counts().refused, 0u);
 
   // In the middle of an exchange: a certificate whose key has not come yet.
   const Issued next = authority_.Issue("display.example", -3600, 40 * 86400);
@@ -167,6 +169,8 @@ TEST_F(TlsStoreTest, TheLastThatWasRightStays) {
   std::filesystem::remove(files_.key);
   EXPECT_FALSE((*store)->Look().ok());
   EXPECT_EQ((*store)->current().material->certificate, next.certificate);
+  EXPECT_EQ((*store)->counts().taken, 2u);
+  EXPECT_EQ((*store)->counts().refused, 2u);
 }
 
 TEST_F(TlsStoreTest, TellsOfTheEndBeforeItComes) {

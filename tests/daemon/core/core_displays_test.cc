@@ -2,12 +2,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "daemon/pipeline/link_watch.h"
 #include "tests/daemon/fakes/simulation.h"
 
 namespace voxeld::daemon {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Pair;
 using testing::Put;
 using testing::Simulation;
 using Kind = CommitOutcome::Kind;
@@ -226,6 +229,30 @@ TEST(CoreDisplays, ACaptureEndsInTimeAndWithTheDisplay) {
   EXPECT_EQ(lost->result.status().code(), absl::StatusCode::kUnavailable);
   EXPECT_THAT(lost->result.status().message(), HasSubstr("cable pulled"));
   EXPECT_EQ(Capture(sim, sync::kSecond, 0)->result.status().code(), absl::StatusCode::kUnavailable);
+}
+
+TEST(CoreDisplays, WhatWentWrongWithADeviceIsToldAfterwardsToo) {
+  Simulation sim({}, 2);
+  sim.Start();
+  sim.core->Step();
+  EXPECT_EQ(sim.GetStats().displays[1].device_trouble, "");
+  sim.display(1).FailTransfers(3);
+  sim.core->Step();
+  sim.core->Step();  // what was posted
+  const std::string name = sim.GetStats().displays[1].name;
+  EXPECT_THAT(sim.transfers_failed, ElementsAre(Pair(name, ElementsAre(3u))));
+  EXPECT_THAT(sim.GetStats().displays[1].device_trouble, HasSubstr("transfers failed 0 s ago"));
+  EXPECT_EQ(sim.GetStats().displays[0].device_trouble, "");
+
+  sim.Advance(LinkWatch::kTold);
+  EXPECT_EQ(sim.GetStats().displays[1].device_trouble, "");
+  sim.display(1).Lose("cable pulled");
+  sim.core->Step();
+  EXPECT_EQ(sim.GetStats().displays[1].device_trouble, "") << "it is lost, and that is its state";
+  sim.display(1).Attach();
+  sim.core->Step();
+  EXPECT_THAT(sim.GetStats().displays[1].device_trouble,
+              HasSubstr("the device was lost (cable pulled) and came back 0 s ago"));
 }
 
 TEST(CoreDisplays, ACancelledCaptureHoldsNothingUp) {

@@ -254,6 +254,7 @@ TEST_F(CoreEngine, WithoutMemoryForTheSceneGivesWayToTheCpu) {
   EXPECT_EQ(Outcome(), Kind::kPresented);
   DisplayFigures figures = Figures();
   EXPECT_EQ(figures.engine, "cpu");
+  EXPECT_EQ(figures.engine_out_of_memory, 1u);
   EXPECT_EQ(figures.engine_faults, 0u);
   EXPECT_EQ(figures.commits_lost, 0u);
   EXPECT_THAT(figures.engine_degraded, HasSubstr("out of memory"));

@@ -74,6 +74,7 @@ TEST(VolumeFeed, WhoDoesNotTakeIsPassedOverThenSleepsAndBeginsAnew) {
   viewer.Show();
   EXPECT_TRUE(viewer.feed->asleep());
   sim.core->Step();
+  EXPECT_EQ(sim.GetStats().volume_watches_asleep, 1u);
   sim.Advance(FramePipeline::kWatchLinger);
   EXPECT_FALSE(sim.display().tapped()) << "nothing is decoded for a sleeper";
 

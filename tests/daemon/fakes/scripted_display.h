@@ -41,6 +41,7 @@ class ScriptedDisplay final : public display::Display {
 
   void Attach() { Attached(); }
   void Lose(const std::string& reason) { DeviceLost(reason); }
+  void FailTransfers(uint64_t count) { mutable_stats().transfers_failed += count; }
   // The volume in flight ends. False if none is.
   bool Show() {
     if (in_flight() == nullptr) return false;

@@ -2,6 +2,7 @@
 // with scripted displays and recording engines.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -70,6 +71,9 @@ class Simulation {
     options.version = "test";
     options.threads = false;
     options.engine_event = [this](const EngineEvent& event) { engine_events.push_back(event); };
+    options.transfers_event = [this](const std::string& display, uint64_t failed) {
+      transfers_failed[display].push_back(failed);
+    };
     options.make_engine =
         [this, make_engine](
             const gpu::EngineOptions& wanted) -> absl::StatusOr<std::unique_ptr<gpu::Engine>> {
@@ -161,6 +165,7 @@ class Simulation {
   sync::FakeClock clock;
   absl::Status make_engine_fails;
   std::vector<EngineEvent> engine_events;
+  std::map<std::string, std::vector<uint64_t>> transfers_failed;  // as it was told, by display
   std::optional<Core> core;
 
  private:

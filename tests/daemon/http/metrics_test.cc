@@ -34,13 +34,22 @@ TEST(Metrics, EveryFigureStandsThereOnce) {
                    .allocations_refused = 2,
                    .reserve_bytes = 4 << 20,
                    .reserve_held_bytes = 2 << 20,
-                   .trouble = ""};
+                   .segments_refused = 3,
+                   .trouble = "",
+                   .pauses = 5,
+                   .clock_steps = 6,
+                   .time_trouble = ""};
+  stats.volume_watches_asleep = 77;
   const std::string text = MetricsText(stats);
   EXPECT_THAT(text, HasSubstr("# TYPE voxeld_process_allocations_failed_total counter\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_process_allocations_failed_total 9\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_process_allocations_refused_total 2\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_process_reserve_bytes 4194304\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_process_reserve_held_bytes 2097152\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_process_segments_refused_total 3\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_process_pauses_total 5\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_process_clock_steps_total 6\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_volume_watches_asleep_total 77\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_memory_bytes{use=\"answers\"} 88\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_commit_applying_seconds{stat=\"p50\"} 0.001\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_assets 4\n"));
@@ -129,6 +138,26 @@ TEST(Health, IsWellUnlessADisplayIsLostOrAnEngineIsGone) {
             R"({"status":"degraded","reasons":[{"what":"memory","why":"there was none"}]})"
             "\n");
   stats.process.trouble = "";
+  stats.process.time_trouble = "it stepped";
+  EXPECT_EQ(HealthResponse(displays, stats, false).status, 200u);
+  EXPECT_EQ(HealthResponse(displays, stats, false).body,
+            R"({"status":"degraded","reasons":[{"what":"time","why":"it stepped"}]})"
+            "\n");
+  stats.process.time_trouble = "";
+  stats.connections.accept_trouble = "none could be";
+  EXPECT_EQ(HealthResponse(displays, stats, false).status, 200u);
+  EXPECT_THAT(HealthResponse(displays, stats, false).body,
+              HasSubstr(R"("reasons":[{"what":"connections","why":"none could be"}])"));
+  stats.connections.accept_trouble = "";
+  stats.displays[0].device_trouble = "it was lost";
+  EXPECT_EQ(HealthResponse(displays, stats, false).status, 200u);
+  EXPECT_THAT(HealthResponse(displays, stats, false).body,
+              HasSubstr(R"("what":"device","why":"it was lost"})"));
+  stats.displays[0].state = display::DisplayState::kLost;
+  EXPECT_THAT(HealthResponse(displays, stats, false).body, Not(HasSubstr("it was lost")))
+      << "it is still, and that is told";
+  stats.displays[0].state = display::DisplayState::kShowing;
+  stats.displays[0].device_trouble = "";
   stats.connections.unreachable = "127.0.0.1:1: no answer came in time";
   EXPECT_EQ(HealthResponse(displays, stats, false).status, 503u);
   EXPECT_EQ(HealthResponse(displays, stats, false).body,

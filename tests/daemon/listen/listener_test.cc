@@ -27,6 +27,7 @@ namespace voxeld::daemon::listen {
 namespace {
 
 using std::chrono::steady_clock;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
@@ -410,6 +411,10 @@ TEST_F(ListenerTest, AcceptsAgainWhenDescriptorsComeBack) {
       ASSERT_TRUE(Await([&] { return counters_.Read().accept_failures > failures; }));
       EXPECT_LT(served(), kClients);
     }
+    const sync::TimeNs now = clock_.Now();
+    EXPECT_THAT(counters_.Read(now).accept_trouble, HasSubstr("Too many open files"));
+    EXPECT_EQ(counters_.Read(now + Counters::kTold).accept_trouble, "");
+    EXPECT_EQ(counters_.Read().accept_trouble, "") << "without a time";
     const auto begin = steady_clock::now();
     EXPECT_TRUE(Await([&] { return served() == kClients; }))
         << served() << ": nobody is lost; in cycle " << cycle << ", accepted " << accepted()

@@ -62,6 +62,29 @@ TEST_F(ReserveWatchTest, TakesBackWhatWasGivenUpAndTellsOfIt) {
   EXPECT_EQ(watch.figures().allocations_failed, 1u);
 }
 
+TEST_F(ReserveWatchTest, TellsOfArraysThatThereWasNoMemoryFor) {
+  static uint64_t refused = 0;
+  refused = 5;  // before it was there: nobody's
+  ReserveWatch watch(0, clock_, log_, reserve_, [] { return refused; });
+  clock_.Advance(sync::kSecond);
+  watch.Look();
+  EXPECT_EQ(Logged(), "");
+  EXPECT_EQ(watch.figures().trouble, "");
+  refused = 8;
+  EXPECT_EQ(watch.figures().segments_refused, 8u);
+  watch.Look();
+  const std::string told = Logged();
+  EXPECT_THAT(told, HasSubstr("warning the system had no memory for arrays or engines"));
+  EXPECT_THAT(told, HasSubstr("times=3"));
+  watch.Look();
+  EXPECT_EQ(Logged(), "") << "twice";
+  clock_.Advance(2 * sync::kSecond);
+  EXPECT_EQ(watch.figures().trouble,
+            "the system had no memory for arrays or engines 2 s ago (8 times since the start)");
+  clock_.Advance(ReserveWatch::kTold);
+  EXPECT_EQ(watch.figures().trouble, "");
+}
+
 TEST_F(ReserveWatchTest, SaysHowManyWereRefused) {
   ReserveWatch watch(0, clock_, log_, reserve_);
   clock_.Advance(sync::kSecond);

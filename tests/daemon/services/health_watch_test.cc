@@ -2,8 +2,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <spdlog/sinks/ostream_sink.h>
 
+#include <memory>
 #include <optional>
+#include <sstream>
 
 namespace voxeld::daemon::services {
 namespace {
@@ -33,6 +36,18 @@ TEST_F(HealthWatchTest, IsOfEveryDisplay) {
   watch_.OnDisplay("b", DisplayState::kLost, "");
   watch_.OnDisplay("b", DisplayState::kBlanked, "");
   EXPECT_EQ(serving_, true);
+}
+
+TEST(HealthWatch, TransfersThatFailAreForTheLogAlone) {
+  std::ostringstream out;
+  Logger log(Logger::Level::kInfo, Logger::Format::kText,
+             std::make_shared<spdlog::sinks::ostream_sink_mt>(out, true));
+  HealthWatch watch(log);
+  bool serving = false;
+  watch.Tell([&serving](bool told) { serving = told; });
+  watch.OnTransfers("a", 3);
+  EXPECT_TRUE(serving);
+  EXPECT_THAT(out.str(), ::testing::HasSubstr("warning transfers failed display=a transfers=3"));
 }
 
 TEST_F(HealthWatchTest, IsOfWhatIsDrawnToo) {

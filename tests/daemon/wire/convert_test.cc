@@ -358,6 +358,10 @@ TEST(Encode, StatsHaveEveryFigure) {
   stats.must_show_timeouts = 104, stats.sessions_dormant = 105, stats.sessions_resumed = 106;
   stats.sending = {107, 108, 109, 110}, stats.decoding = {111, 112, 113, 114};
   stats.applying = {115, 116, 117, 118};
+  stats.volume_watches_asleep = 162, stats.connections.accept_trouble = "at";
+  stats.connections.tls_taken = 167, stats.connections.tls_refused = 168;
+  stats.process.segments_refused = 163, stats.process.pauses = 164;
+  stats.process.clock_steps = 165, stats.process.time_trouble = "tt";
   stats.memory = {121, 122, 123, 124, 125, 126, 127, 128, 129};
   DisplayFigures& d = stats.displays.emplace_back();
   d.name = "n", d.state = display::DisplayState::kShowing, d.state_reason = "s", d.engine = "e",
@@ -366,7 +370,7 @@ TEST(Encode, StatsHaveEveryFigure) {
   d.volumes_unchanged = 19, d.volumes_presented = 23;
   d.volumes_replaced = 24, d.volumes_lost = 25, d.volumes_per_second = 26, d.bytes_out = 27;
   d.slices_sent = 28, d.slices_resent = 29, d.underruns = 30, d.attaches = 31,
-  d.transfers_failed = 161;
+  d.transfers_failed = 161, d.device_trouble = "dt", d.engine_out_of_memory = 166;
   d.volumes_late = 131, d.sweeps = {sync::SweepLock::State::kLocked, 132, 133, 134, 135};
   d.genlock_volumes = 136, d.genlock_dropped = 137, d.genlock_postponed = 138;
   d.genlock_slips = 139, d.light = 140, d.power_w = 141, d.power_unlimited = true;
@@ -408,6 +412,16 @@ TEST(Encode, StatsHaveEveryFigure) {
   EXPECT_EQ(message.decoding().p50_ns(), 112);
   EXPECT_EQ(message.applying().max_ns(), 118);
   ExpectAllDifferent(message.memory());
+  EXPECT_EQ(message.displays(0).device_trouble(), "dt");
+  EXPECT_EQ(message.displays(0).engine_out_of_memory(), 166u);
+  EXPECT_EQ(message.volume_watches_asleep(), 162u);
+  EXPECT_EQ(message.connections().accept_trouble(), "at");
+  EXPECT_EQ(message.connections().tls_taken(), 167u);
+  EXPECT_EQ(message.connections().tls_refused(), 168u);
+  EXPECT_EQ(message.process().segments_refused(), 163u);
+  EXPECT_EQ(message.process().pauses(), 164u);
+  EXPECT_EQ(message.process().clock_steps(), 165u);
+  EXPECT_EQ(message.process().time_trouble(), "tt");
 }
 
 TEST(Encode, LimitsHaveEveryField) {

@@ -84,6 +84,9 @@ TEST(TopView, WhatTheServerSaysIsMadeFitForATerminal) {
   stats.mutable_displays(0)->set_state_reason("why\x1b");
   stats.mutable_connections()->set_access_trouble("grants\x1b");
   stats.mutable_process()->set_trouble("memory\x1b");
+  stats.mutable_process()->set_time_trouble("it did not run");
+  stats.mutable_connections()->set_accept_trouble("none could be accepted");
+  stats.mutable_displays(1)->set_device_trouble("cable\x1b");
   view.Take(stats, Owners(1), "");
   EXPECT_THAT(Text(view), Not(HasSubstr("\x1b")));
   for (const char* words : {"evil\\u{1b}[2J", "lost\\u{1b}", "why\\u{1b}", "grants\\u{1b}",
@@ -91,7 +94,9 @@ TEST(TopView, WhatTheServerSaysIsMadeFitForATerminal) {
     EXPECT_THAT(Text(view), HasSubstr(words));
   }
   EXPECT_THAT(TopText(stats, Owners(1)), Not(HasSubstr("\x1b")));
-  EXPECT_THAT(TopText(stats, Owners(1)), HasSubstr("grants\\u{1b}\nmemory\\u{1b}\n"));
+  EXPECT_THAT(TopText(stats, Owners(1)),
+              HasSubstr("none could be accepted\ngrants\\u{1b}\nmemory\\u{1b}\nit did not run\n"
+                        "display two: cable\\u{1b}\n"));
 }
 
 TEST(TopView, DisplaysAreChosenRoundAndRound) {

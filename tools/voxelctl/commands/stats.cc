@@ -99,6 +99,7 @@ std::string Full(const v1::Stats& stats) {
                                : std::string("-");
   });
   row("engine faults", [](const D& d) { return Grouped(d.engine_faults()); });
+  row("  out of memory", [](const D& d) { return Grouped(d.engine_out_of_memory()); });
   row("  returns", [](const D& d) { return Grouped(d.engine_returns()); });
   std::string text = Server(stats);
   for (const std::string& trouble : Troubles(stats)) absl::StrAppend(&text, trouble, "\n");

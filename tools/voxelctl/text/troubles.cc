@@ -1,5 +1,6 @@
 #include "tools/voxelctl/text/troubles.h"
 
+#include "absl/strings/str_cat.h"
 #include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
@@ -8,9 +9,15 @@ std::vector<std::string> Troubles(const v1::Stats& stats) {
   const v1::ConnectionStats& connections = stats.connections();
   std::vector<std::string> out;
   for (const std::string& trouble :
-       {connections.unreachable(), connections.access_trouble(), connections.config_trouble(),
-        stats.state().trouble(), stats.assets().trouble(), stats.process().trouble()}) {
+       {connections.unreachable(), connections.accept_trouble(), connections.access_trouble(),
+        connections.config_trouble(), stats.state().trouble(), stats.assets().trouble(),
+        stats.process().trouble(), stats.process().time_trouble()}) {
     if (!trouble.empty()) out.push_back(EscapeForTerminal(trouble));
+  }
+  for (const v1::DisplayStats& display : stats.displays()) {
+    if (display.device_trouble().empty()) continue;
+    out.push_back(EscapeForTerminal(
+        absl::StrCat("display ", display.name(), ": ", display.device_trouble())));
   }
   return out;
 }

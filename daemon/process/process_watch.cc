@@ -1,0 +1,22 @@
+#include "daemon/process/process_watch.h"
+
+#include "absl/strings/str_cat.h"
+#include "daemon/process/spare_threads.h"
+
+namespace voxeld::daemon {
+
+void ProcessWatch::Look() {
+  if (const uint64_t taken = SpareThreads::Refill(); taken > 0) {
+    log_.Warn("the system gave no thread: spare ones were taken",
+              {{"threads", absl::StrCat(taken)}});
+  }
+  reserve_.Look();
+}
+
+ProcessFigures ProcessWatch::figures() const {
+  ProcessFigures figures = reserve_.figures();
+  time_.AddTo(figures);
+  return figures;
+}
+
+}  // namespace voxeld::daemon

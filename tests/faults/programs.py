@@ -1,0 +1,21 @@
+"""The programs that these tests run, which whoever starts them names in the environment."""
+import os
+import sys
+from pathlib import Path
+
+
+def program(variable: str, what: str) -> str:
+    """The path in `variable`; without one that can be run (or loaded, a library) the process ends with 2 and a line that says so."""
+    path = os.environ.get(variable, "")
+    example = f"{variable}=build/quick/bin/{'tests/libvoxeld_fail_malloc.so' if variable == 'FAIL_MALLOC' else 'voxeld'}"
+    wrong = ""
+    if not path:
+        wrong = f"{variable} is not set; it is to name {what}"
+    elif not Path(path).is_file():
+        wrong = f"{variable}: there is no file {path}; it is to name {what}"
+    elif not path.endswith(".so") and not os.access(path, os.X_OK):
+        wrong = f"{variable}: {path} cannot be run; it is to name {what}"
+    if wrong:
+        print(f"{Path(sys.argv[0]).name}: {wrong}, as in {example}", file=sys.stderr)
+        sys.exit(2)
+    return path
