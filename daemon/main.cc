@@ -118,19 +118,19 @@ gpu::EngineOptions EngineOf(gpu::EngineOptions engine, const std::vector<int>& g
 
 absl::StatusOr<std::unique_ptr<http::Server>> StartHttp(
     const ServerConfig& config, Core& core, std::shared_ptr<const std::atomic<bool>> draining,
-    viewer::Viewer& viewer, Logger& log) {
-  std::unique_ptr<http::Server> none;
-  if (!config.http.has_value()) return none;
+    viewer::Viewer& viewer, std::function<void(const std::string&)> accept_failed, Logger& log) {
+  if (!config.http.has_value()) return nullptr;
   absl::StatusOr<std::unique_ptr<http::Server>> server =
       http::Server::Start({.listen = *config.http,
                            .max_connections = config.max_http_connections,
-                           .idle_limit_ns = config.http_idle_limit_ns},
+                           .idle_limit_ns = config.http_idle_limit_ns,
+                           .accept_failed = std::move(accept_failed)},
                           viewer.Handler(http::MonitorHandler(core, std::move(draining))),
                           viewer.Upgrade(), viewer.Receive());
   if (server.ok() || config.http_asked || !absl::IsAlreadyExists(server.status())) return server;
   log.Warn("no http port", {{"why", std::string(server.status().message())},
                             {"hint", "choose another with --http ADDR, or none with --http off"}});
-  return none;
+  return nullptr;
 }
 
 void LogDisplays(Core& core, Logger& log) {
@@ -312,7 +312,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
                 .max_bytes = config.server.http_max_upload_bytes}});
   if (!viewer.ok()) return Fail(1, viewer.status());
   absl::StatusOr<std::unique_ptr<http::Server>> http =
-      StartHttp(config.server, core, draining, **viewer, log);
+      StartHttp(config.server, core, draining, **viewer, counters->Noting(clock, log), log);
   if (!http.ok()) return Fail(1, http.status());
   const absl::StatusOr<std::optional<Address>> local_address = LocalSocketAddress(config.server);
   if (!local_address.ok()) return Fail(1, local_address.status());

@@ -28,7 +28,7 @@ struct DisplayFigures {
   double volumes_per_second = 0;
   uint64_t bytes_out = 0, slices_sent = 0, slices_resent = 0, underruns = 0, attaches = 0;
   uint64_t transfers_failed = 0;  // overcome, or the device was lost
-  std::string device_trouble;  // that it was lost or transfers failed just now; empty: all is well
+  std::string device_trouble;     // that it came back or transfers failed just now; empty: neither
   // Of the engine's part: drawing the volume; slicing it; copying pictures from the device. Where they
   // are packed as the volume is drawn there is no slicing.
   uint64_t volumes_late = 0;  // they missed the sweep before which their sending began

@@ -307,7 +307,8 @@ class Server::Impl {
     acceptor_.async_accept([this](error_code error, Stream::socket_type socket) {
       accepting_ = false;
       if (stopping_) return;
-      if (error) return AcceptLater();
+      if (error) return AcceptLater(error);
+      accept_failed_ = false;
       const auto connection =
           std::make_shared<Connection>(io_, std::move(socket), options_, served_,
                                        [this](Connection* closed) { OnClosed(closed); });
@@ -330,7 +331,10 @@ class Server::Impl {
   }
 
   // Out of descriptors, say: what is open may close.
-  void AcceptLater() {
+  void AcceptLater(const error_code& why) {
+    if (!std::exchange(accept_failed_, true) && options_.accept_failed) {
+      options_.accept_failed(why.message());
+    }
     retry_.expires_after(kAcceptRetry);
     retry_.async_wait([this](error_code error) {
       if (!error) Accept();
@@ -370,7 +374,7 @@ class Server::Impl {
   std::set<std::shared_ptr<Connection>> connections_;
   std::set<std::shared_ptr<WebSocketSession>> sockets_;
   std::set<std::shared_ptr<BodySession>> bodies_;
-  bool accepting_ = false, stopping_ = false;
+  bool accepting_ = false, accept_failed_ = false, stopping_ = false;
   std::thread thread_;
 };
 

@@ -78,6 +78,9 @@ struct ServerOptions {
   sync::TimeNs message_limit_ns = 30 * sync::kSecond;  // for a WebSocket's message to be read
   // Of a body that is taken something has to come within idle_limit_ns, and so much on the whole, counted from there.
   uint64_t body_bytes_per_s = 32 << 10;
+  // No connection can be accepted, out of descriptors say: it is tried again until one is, and told once until then. On the
+  // server's thread. May be empty.
+  std::function<void(const std::string& why)> accept_failed;
 };
 
 // Times are the system's: sockets know no other.

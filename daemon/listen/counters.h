@@ -3,11 +3,13 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "daemon/core/stats.h"
+#include "daemon/log/logger.h"
 #include "display/sync/clock.h"
 #include "display/sync/mutex.h"
 
@@ -41,6 +43,17 @@ class Counters {
     sync::MutexLock lock(mutex_);
     accept_failed_ns_ = now;
     accept_failed_why_ = std::move(why);
+  }
+
+  // To be called with the reason whenever no connection can be accepted by another than the listener; logs it. All outlive it.
+  std::function<void(const std::string&)> Noting(sync::Clock& clock, Logger& log) {
+    return [this, &clock, &log](const std::string& why) {
+      NoteAcceptFailure(clock.Now(), why);
+      log.Warn("no connection can be accepted",
+               {{"why", why},
+                {"of", "http"},
+                {"hint", "raise LimitNOFILE or lower max_http_connections"}});
+    };
   }
 
   // `now`: by which accept_trouble is told; 0: without it.

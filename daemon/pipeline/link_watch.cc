@@ -7,10 +7,11 @@
 namespace voxeld::daemon {
 
 uint64_t LinkWatch::Failed(uint64_t failed, sync::TimeNs now) {
-  if (failed == failed_) return 0;
-  failed_ = failed;
-  failed_at_ = now;
-  if (told_ > 0 && now - told_at_ < kQuiet) return 0;
+  if (failed != failed_) {
+    failed_ = failed;
+    failed_at_ = now;
+  }
+  if (failed_ == told_ || (told_ > 0 && now - told_at_ < kQuiet)) return 0;
   const uint64_t fresh = failed_ - told_;
   told_ = failed_;
   told_at_ = now;

@@ -17,7 +17,7 @@ class LinkWatch {
   static constexpr sync::TimeNs kQuiet = 10 * sync::kSecond;
 
   // `failed`: transfers since the display was made. How many the log is to be told of now; 0: none, since there are no
-  // new ones, or others were told within kQuiet. Those are in the next number.
+  // new ones, or others were told within kQuiet. Those are in the next number, kQuiet after the last.
   uint64_t Failed(uint64_t failed, sync::TimeNs now);
   // The device is lost, or still is, which is told elsewhere; is there, perhaps again.
   void Lost(const std::string& why);

@@ -58,7 +58,7 @@ void TimeWatch::Look() {
               {{"seconds", absl::StrFormat("%.1f", Seconds(pauses_.length))},
                {"hint",
                 "it was stopped, its machine was, or it had no time for it; devices with a "
-                "watchdog went dark"}});
+                "watchdog may have gone dark"}});
   }
   if (step >= kStep || step <= -kStep) {
     steps_ = {steps_.count + 1, now.running, step};

@@ -24,7 +24,7 @@ constexpr int kFutureWrite = 0x0010;  // linux/fcntl.h
 std::atomic<uint64_t> refused = 0;
 
 absl::Status Failed(const char* what, size_t size) {
-  ++refused;
+  if (errno == ENOMEM || errno == ENOSPC) ++refused;
   return absl::ResourceExhaustedError(absl::StrCat("shared memory of ", size, " bytes: ", what,
                                                    ": ", std::generic_category().message(errno)));
 }

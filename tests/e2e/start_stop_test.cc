@@ -141,7 +141,10 @@ TEST(Http, HealthAndMetricsOfTheRunningDaemon) {
     metrics = HttpGet(daemon.http(), "/metrics");
   } while (metrics.find(kShowing) == std::string::npos &&
            std::chrono::steady_clock::now() < deadline);
-  EXPECT_THAT(HttpGet(daemon.http(), "/healthz"), HasSubstr("{\"status\":\"ok\",\"reasons\":[]}"));
+  // On a machine that is busy the daemon may not have run for a second, of which it tells.
+  EXPECT_THAT(HttpGet(daemon.http(), "/healthz"),
+              AnyOf(HasSubstr("{\"status\":\"ok\",\"reasons\":[]}"),
+                    ContainsRegex("degraded.*\"reasons\":\\[\\{\"what\":\"time\",[^{]*\\]")));
   EXPECT_THAT(metrics, StartsWith("HTTP/1.1 200 "));
   EXPECT_THAT(metrics, HasSubstr(kShowing));
   EXPECT_THAT(HttpGet(daemon.http(), "/other"), StartsWith("HTTP/1.1 404 "));

@@ -57,6 +57,7 @@ def client(number: int) -> None:
     try:
         stream(number)
     except BaseException:
+        begun.release()
         over.release()
         raise
 
@@ -65,7 +66,9 @@ def stream(number: int) -> None:
     places = np.random.default_rng(number).uniform(-1, 1, (20, 3)).astype(np.float32)
     with voxel.connect(server, name=f"client {number}", timeout=LONG, credentials=who) as v:
         layer = v.layer(f"layer {number}")
-        frames: list[voxel.Frame] = []
+        layer.points("cloud", places)
+        frames: list[voxel.Frame] = [v.commit().wait(LONG)]
+        begun.release()
         turn = 0
         while not stop.is_set():
             turn += 1
@@ -88,11 +91,14 @@ def stream(number: int) -> None:
 
 
 ended: list[int] = []
+begun = threading.Semaphore(0)  # for each client of which a commit was accepted, or that failed
 over = threading.Semaphore(0)  # for each client that has all that it is owed, or that failed
 all_ended = threading.Event()
 threads = [threading.Thread(target=client, args=(n,)) for n in range(count)]
 for thread in threads:
     thread.start()
+for _ in range(count):
+    begun.acquire(timeout=2 * LONG)
 print("ready", flush=True)
 sys.stdin.readline()
 stop.set()

@@ -55,17 +55,28 @@ def hurt_display(name: str) -> str:
     return rf'voxeld_display_{name}_total\{{display="hurt"\}}'
 
 
+class TooEarly(Exception):
+    """The fault was there before its load."""
+
+
 class Usb(Fault):
-    """The display's own device, by its plan, from a transfer on. What is told says that it happened."""
+    """The display's own device, by its plan, from a transfer on: {out} of those to it, {into} of those from it, counted from its first. What is
+    told says that it happened."""
 
     def __init__(self, plan: str, why: str, *moved: str) -> None:
-        self.hurt = f'faults = "{plan}"\n'
+        self.plan = plan
         lost = why != "transfers failed"
         self.log = rf'lost display=hurt why="{why}' if lost else "transfers failed display=hurt"
         self.health = rf'"display":"hurt","what":"device","why":"[^"]*{why}'
         self.moved = tuple(hurt_display(name) for name in moved)
 
+    def begin_after(self, transfers: int) -> None:
+        self.hurt = f'faults = "{self.plan.format(out=transfers, into=transfers // 4)}"\n'
+
     def run(self, cell: Cell) -> None:
+        before = cell.metrics()
+        if before['voxeld_display_transfers_failed_total{display="hurt"}'] > 0 or before['voxeld_display_attaches_total{display="hurt"}'] > 1:
+            raise TooEarly
         cell.watch_health(5, says=self.health)
 
 
@@ -103,7 +114,9 @@ class EngineReports(Fault):
         self.moved = (rf"voxeld_display_engine_{what}_total\{{.*", r"voxeld_display_engine_returns_total\{.*")
 
     def environment(self, folder: str) -> dict[str, str]:
-        program = Path(os.environ.get("FAULTY_ENGINE", Path(os.environ["VOXELD"]).parent / "tests" / "faulty_engine"))
+        given = os.environ.get("FAULTY_ENGINE")
+        program = Path(given or Path(os.environ["VOXELD"]).parent / "tests" / "faulty_engine")
+        assert given is None or program.is_file(), f"FAULTY_ENGINE: there is no file {program}"
         if not program.is_file():
             raise unittest.SkipTest(f"the engine that fails as it is told is not built: {program} (FAULTY_ENGINE)")
         self.engine = f'kind = "cuda"\nworker = "{program.resolve()}"\nworker_deadline_ns = 1000000000\n'
@@ -188,14 +201,14 @@ class MemoryCgroup(Fault):
         first = Path("/sys/fs/cgroup/memory")  # version 1; of 2 there is one tree of all
         tree, limit = (first, "memory.limit_in_bytes") if first.is_dir() else (Path("/sys/fs/cgroup"), "memory.max")
         group = tree / f"voxeld-{cell.daemon.pid}"
+        size = int(re.search(r"RssAnon:\s+(\d+)", Path(f"/proc/{cell.daemon.pid}/status").read_text(encoding="ascii"))[1]) * 1024  # type: ignore[index]
         try:
             group.mkdir()
+            cell.test.addCleanup(group.rmdir)
+            (group / limit).write_text(str(size + (24 << 20)), encoding="ascii")
+            (group / "cgroup.procs").write_text(str(cell.daemon.pid), encoding="ascii")
         except OSError as error:
             raise unittest.SkipTest(f"no control group for memory can be made here: {error}") from None
-        cell.test.addCleanup(group.rmdir)
-        size = int(re.search(r"RssAnon:\s+(\d+)", Path(f"/proc/{cell.daemon.pid}/status").read_text(encoding="ascii"))[1]) * 1024  # type: ignore[index]
-        (group / "cgroup.procs").write_text(str(cell.daemon.pid), encoding="ascii")
-        (group / limit).write_text(str(size + (24 << 20)), encoding="ascii")
         brings = ("import sys, numpy as np, voxeld as voxel\n"
                   "v = voxel.connect(sys.argv[1], name='large', timeout=60)\n"
                   "v.points('large', np.zeros((4_000_000, 3), np.float32))\n"
@@ -273,7 +286,10 @@ class StopClient(Fault):
         begun = theirs()
         until(lambda: theirs() > begun + 3, "a client that streams")
         stopped.send_signal(signal.SIGSTOP)
-        cell.watch_health(0.5)  # what it had sent before is taken in
+        at = -1.0
+        while abs(theirs() - at) > 2:  # what it had sent before is taken in
+            at = theirs()
+            cell.watch_health(0.5)
         at, others = theirs(), goes_on.commits
         cell.watch_health(1.5)
         assert abs(theirs() - at) <= 3, f"{theirs() - at} commits of clients that are stopped"
@@ -334,6 +350,8 @@ class Network(Fault):
         relay = self.relay
         resumed = cell.metrics()["voxeld_sessions_resumed_total"]
         if self.how == "stalls":
+            # Of the last seconds: what a busy machine made late has to have gone.
+            until(lambda: cell.metrics()['voxeld_commit_sending_seconds{stat="max"}'] < 1, "commits that come in time")
             relay.stall()
         elif self.how == "halves":
             relay.half = True
@@ -391,13 +409,13 @@ class CertificateBroken(Fault):
 
 
 FAULTS: dict[str, Callable[[], Fault]] = {
-    "usb_stall": lambda: Usb("stall@t100", "transfers failed", "transfers_failed", "slices_resent"),
-    "usb_time_out": lambda: Usb("nak:2500@t100", "transfers failed", "transfers_failed", "slices_resent"),
-    "usb_babble": lambda: Usb("babble:2@t20/in", "transfers failed", "transfers_failed"),
-    "usb_protocol_error": lambda: Usb("error:8@t100", "transfers failed 6 times in a row", "transfers_failed", "volumes_lost", "attaches"),
-    "usb_short": lambda: Usb("partial:100@t100", "transfers failed", "transfers_failed", "slices_resent"),
-    "usb_unplug": lambda: Usb("unplug:600@t100", "the device was unplugged", "attaches"),
-    "usb_reset": lambda: Usb("unplug:30@t100", "the device was unplugged", "attaches"),
+    "usb_stall": lambda: Usb("stall@t{out}", "transfers failed", "transfers_failed", "slices_resent"),
+    "usb_time_out": lambda: Usb("nak:2500@t{out}", "transfers failed", "transfers_failed", "slices_resent"),
+    "usb_babble": lambda: Usb("babble:2@t{into}/in", "transfers failed", "transfers_failed"),
+    "usb_protocol_error": lambda: Usb("error:8@t{out}", "transfers failed 6 times in a row", "transfers_failed", "volumes_lost", "attaches"),
+    "usb_short": lambda: Usb("partial:100@t{out}", "transfers failed", "transfers_failed", "slices_resent"),
+    "usb_unplug": lambda: Usb("unplug:600@t{out}", "the device was unplugged", "attaches"),
+    "usb_reset": lambda: Usb("unplug:30@t{out}", "the device was unplugged", "attaches"),
     "engine_killed": lambda: WorkerLost(signal.SIGKILL), "engine_hangs": lambda: WorkerLost(signal.SIGSTOP),
     "engine_reports_an_error": lambda: EngineReports("dataloss"), "device_memory_full": lambda: EngineReports("exhausted"),
     "disk_full": lambda: Refused("pwrite64,ftruncate,fallocate", "ENOSPC", "full"),

@@ -113,7 +113,7 @@ def main() -> int:
     parser.add_argument("--most", type=int, default=1 << 30, help="of each call the first so many")
     parser.add_argument("--sample", type=int, default=0, help="so many of all, by chance")
     parser.add_argument("--seed", type=int, default=1, help="of that chance (default: %(default)s)")
-    parser.add_argument("--list", action="store_true", help="say how many there are, and end")
+    parser.add_argument("--list", action="store_true", help="say how often each is called, and how many cases that makes, and end")
     parser.add_argument("--json", action="store_true", help="what came of each as JSON, on standard output")
     options = parser.parse_args()
     unknown = set(options.calls.split(",")) - set(ERRORS) if options.calls else set()
@@ -124,7 +124,7 @@ def main() -> int:
     wanted = options.calls.split(",") if options.calls else sorted(counted)
     cases = [(call, error, n) for call in wanted for error in ERRORS[call] for n in range(1, min(counted.get(call, 0), options.most) + 1)]
     if options.list:
-        print("\n".join(f"{call} {times}" for call, times in sorted(counted.items())))
+        print("\n".join(f"{call} {counted.get(call, 0)}" for call in wanted))
         print(f"{len(cases)} cases")
         return 0
     if options.sample:

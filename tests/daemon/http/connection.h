@@ -18,25 +18,26 @@ namespace voxeld::daemon::http {
 // A blocking connection; every read has a deadline of its own.
 class Connection {
  public:
-  explicit Connection(const Address& address) {
-    const timeval limit = {30, 0};
+  explicit Connection(const Address& address) : fd_(Made(address.unix_socket)) { Connect(address); }
+  Connection() : fd_(Made(false)) {}  // not connected yet
+  ~Connection() { close(fd_); }
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+
+  void Connect(const Address& address) {
     if (address.unix_socket) {
-      fd_ = socket(AF_UNIX, SOCK_STREAM, 0);
       sockaddr_un name = {};
       name.sun_family = AF_UNIX;
       std::memcpy(name.sun_path, address.path.c_str(), address.path.size());
       EXPECT_EQ(connect(fd_, reinterpret_cast<sockaddr*>(&name), sizeof(name)), 0);
     } else {
-      fd_ = socket(AF_INET, SOCK_STREAM, 0);
       sockaddr_in name = {};
       name.sin_family = AF_INET;
       name.sin_port = htons(address.port);
       inet_pton(AF_INET, address.host.c_str(), &name.sin_addr);
       EXPECT_EQ(connect(fd_, reinterpret_cast<sockaddr*>(&name), sizeof(name)), 0);
     }
-    setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof(limit));
   }
-  ~Connection() { close(fd_); }
 
   void Send(const std::string& text) {
     EXPECT_EQ(send(fd_, text.data(), text.size(), MSG_NOSIGNAL), static_cast<ssize_t>(text.size()));
@@ -67,7 +68,14 @@ class Connection {
   }
 
  private:
-  int fd_ = -1;
+  static int Made(bool unix_socket) {
+    const int fd = socket(unix_socket ? AF_UNIX : AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    const timeval limit = {30, 0};
+    setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof(limit));
+    return fd;
+  }
+
+  const int fd_;
 };
 
 }  // namespace voxeld::daemon::http

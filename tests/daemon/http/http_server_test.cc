@@ -1,11 +1,14 @@
 // The server, spoken to in bytes.
 #include "daemon/http/http_server.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <thread>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "display/sync/mutex.h"
 #include "tests/daemon/http/connection.h"
@@ -96,6 +99,72 @@ TEST_F(HttpServer, RefusesWhatIsNoRequest) {
   body.Send("POST /hello HTTP/1.1\r\nHost: x\r\nContent-Length: 1000000\r\n\r\n");
   EXPECT_THAT(body.ReadTo("\r\n\r\n"), StartsWith("HTTP/1.1 413 "));
   EXPECT_THAT(Ask(Get("/hello")), StartsWith("HTTP/1.1 200 ")) << "the others are served";
+}
+
+// The process gets so many more descriptors, about, while this lives.
+class FewDescriptors {
+ public:
+  explicit FewDescriptors(rlim_t more) {
+    const int next = open("/dev/null", O_RDONLY | O_CLOEXEC);
+    EXPECT_GE(next, 0);
+    close(next);
+    EXPECT_EQ(getrlimit(RLIMIT_NOFILE, &before_), 0);
+    const rlimit few = {.rlim_cur = static_cast<rlim_t>(next) + more, .rlim_max = before_.rlim_max};
+    EXPECT_EQ(setrlimit(RLIMIT_NOFILE, &few), 0);
+  }
+  ~FewDescriptors() { EXPECT_EQ(setrlimit(RLIMIT_NOFILE, &before_), 0); }
+
+ private:
+  rlimit before_ = {};
+};
+
+TEST_F(HttpServer, WithoutDescriptorsItsStartIsAnError) {
+  const auto start = [] {
+    return Server::Start({.listen = *ParseAddress("127.0.0.1:0")},
+                         [](const Request&, const Done&) { return false; })
+        .status();
+  };
+  ASSERT_TRUE(start().ok()) << "and all that is made once is there";
+  bool waits = true, listens = true;  // that there was one for these in each try
+  absl::Status status;
+  for (rlim_t more = 0; more < 10; ++more) {
+    {
+      const FewDescriptors few(more);
+      status = start();
+    }
+    if (status.ok()) break;
+    EXPECT_THAT(std::string(status.message()), HasSubstr("Too many open files"));
+    if (absl::StrContains(status.message(), "no descriptor or thread for http")) waits = false;
+    if (absl::StrContains(status.message(), "127.0.0.1:0 cannot be listened on")) listens = false;
+  }
+  EXPECT_TRUE(status.ok()) << status;
+  EXPECT_FALSE(waits);
+  EXPECT_FALSE(listens);
+}
+
+TEST_F(HttpServer, WhoCannotBeAcceptedIsToldAndAcceptedLater) {
+  sync::Mutex mutex;
+  std::vector<std::string> told;
+  Start({.accept_failed = [&](const std::string& why) {
+    sync::MutexLock lock(mutex);
+    told.push_back(why);
+  }});
+  const auto times = [&] {
+    sync::MutexLock lock(mutex);
+    return told.size();
+  };
+  for (size_t i = 1; i <= 2; ++i) {
+    Connection connection;  // of which the socket is there before
+    {
+      const FewDescriptors none(0);
+      connection.Connect(server_->address());
+      while (times() < i) std::this_thread::yield();
+    }
+    connection.Send(Get("/hello"));
+    EXPECT_THAT(connection.ReadTo("\r\n\r\n"), StartsWith("HTTP/1.1 200 "));
+  }
+  sync::MutexLock lock(mutex);
+  EXPECT_EQ(told, std::vector<std::string>(2, "Too many open files")) << "each time once";
 }
 
 TEST_F(HttpServer, WhatEndsInItsMidstIsNotAnswered) {

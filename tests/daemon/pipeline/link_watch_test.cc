@@ -19,8 +19,10 @@ TEST(LinkWatch, FailuresAreToldAtOnceThenTogether) {
   EXPECT_EQ(watch.Failed(2, kStart), 0u) << "the same";
   EXPECT_EQ(watch.Failed(3, kStart + 1), 0u) << "too soon";
   EXPECT_EQ(watch.Failed(7, kStart + LinkWatch::kQuiet - 1), 0u);
-  EXPECT_EQ(watch.Failed(7, kStart + LinkWatch::kQuiet), 0u) << "no new one";
-  EXPECT_EQ(watch.Failed(8, kStart + LinkWatch::kQuiet + 1), 6u);
+  EXPECT_EQ(watch.Failed(7, kStart + LinkWatch::kQuiet), 5u) << "those that had to wait";
+  EXPECT_EQ(watch.Failed(7, kStart + LinkWatch::kQuiet + 1), 0u) << "told";
+  EXPECT_EQ(watch.Failed(8, kStart + LinkWatch::kQuiet + 1), 0u) << "too soon after the last";
+  EXPECT_EQ(watch.Failed(8, kStart + 2 * LinkWatch::kQuiet), 1u);
 }
 
 TEST(LinkWatch, FailuresAreTroubleForAWhile) {

@@ -263,7 +263,7 @@ void TopView::AddConnections(std::vector<TopLine>* out) const {
            ? TopStyle::kWarning
            : TopStyle::kPlain});
   for (std::string& trouble : Troubles(stats_)) {
-    out->push_back({std::move(trouble), TopStyle::kBad});
+    out->push_back({std::move(trouble), TopStyle::kWarning});
   }
 }
 
