@@ -315,20 +315,26 @@ class StopDaemon(Fault):
 
 
 class StopViewer(Fault):
-    """A page that asks, and does not read."""
+    """A page that watches both displays is stopped, and goes on."""
 
     moved = ("voxeld_volume_watches_asleep_total",)
     cannot_know = dict.fromkeys(TOLD - {"moved"}, "a reader that stops, a page in the background say, is no fault: it is sent nothing more, and costs nothing")
 
     def run(self, cell: Cell) -> None:
-        with socket.create_connection(("127.0.0.1", cell.http)) as page:
-            page.sendall(f"GET /volumes HTTP/1.1\r\nHost: 127.0.0.1:{cell.http}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-                         "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n".encode())
-            assert b" 101 " in page.recv(4096)
-            for text in (b'{"watch":"well","id":1}', b'{"watch":"hurt","id":2}', *[b'{"stats":true}'] * 50):
-                page.sendall(bytes([0x81, 0x80 | len(text), 0, 0, 0, 0]) + text)
-            cell.watch_health(2)
-            until(lambda: cell.metrics()["voxeld_volume_watches_asleep_total"] >= 2, "two watches that sleep")
+        page = subprocess.Popen([sys.executable, str(HERE / "viewer.py"), str(cell.http), "well", "hurt"], stdout=subprocess.PIPE, text=True)
+        try:
+            assert page.stdout is not None
+            assert page.stdout.readline() == "reads\n"
+            asleep = cell.metrics()["voxeld_volume_watches_asleep_total"]
+            page.send_signal(signal.SIGSTOP)
+            # What the two ends' buffers have room for comes first.
+            until(lambda: cell.metrics()["voxeld_volume_watches_asleep_total"] >= asleep + 2, "two watches that sleep")
+            cell.watch_health(1)
+            page.send_signal(signal.SIGCONT)
+            assert page.stdout.readline() == "reads again\n"
+        finally:
+            page.kill()
+            page.communicate()
 
 
 class Network(Fault):
