@@ -21,6 +21,8 @@ namespace {
 using daemon::services::Client;
 using daemon::services::SetDeadline;
 using daemon::services::SphereIn;
+using ::testing::AnyOf;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
