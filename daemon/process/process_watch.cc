@@ -11,6 +11,10 @@ void ProcessWatch::Look() {
               {{"threads", absl::StrCat(taken)}});
   }
   reserve_.Look();
+  if (clock_.Now() >= give_back_at_) {
+    give_back_();
+    give_back_at_ = clock_.Now() + kGiveBack;
+  }
 }
 
 ProcessFigures ProcessWatch::figures() const {

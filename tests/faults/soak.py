@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """A long day in short: the real voxeld with three displays, state and http, and clients of every kind that come, draw, err and go. Its
-resident memory, descriptors, threads and latencies are measured all the while, and lines are laid through them.
+resident memory, what of it is held, descriptors, threads and latencies are measured all the while, and lines are laid through them.
 
-usage: soak.py [--minutes M] [--roles NAME,…] [--csv FILE] [--svg FILE] [--json]      Paths are in VOXELD and PYTHONPATH
-(the client and tests/e2e).
+usage: soak.py [--minutes M] [--roles NAME,…] [--csv FILE] [--svg FILE] [--json]      Paths are in VOXELD, HEAP_HELD (the
+preloaded library that tells what is held) and PYTHONPATH (the client and tests/e2e).
 
 Ends with 1 if a commit has not had all that it is owed, or if something grows: the 95 % confidence interval of its slope (by medians of
 twelfths after the first, which is for warming up) lies above zero by more than GROWTH says an hour."""
@@ -35,7 +35,7 @@ LONG = 60.0
 PARTS = 12
 WARM = 20  # minutes; of a shorter run slopes are told, and receipts alone are judged
 # By what part of its level a quantity may grow in an hour; of whole numbers, by how many.
-GROWTH = {"resident_mb": 0.02, "anonymous_mb": 0.02, "descriptors": 0.5, "threads": 0.5, "p50_ms": 0.5, "p99_ms": 0.5}
+GROWTH = {"resident_mb": 0.02, "anonymous_mb": 0.02, "held_mb": 0.02, "descriptors": 0.5, "threads": 0.5, "p50_ms": 0.5, "p99_ms": 0.5}
 WHOLE = ("descriptors", "threads")
 DISPLAYS = 3
 
@@ -157,13 +157,15 @@ def role(name: str, server: str, stop: Stop, answer: Pipe) -> None:
     answer.send((tally.ends, why))
 
 
-def sample(pid: int, port: int) -> dict[str, float]:
+def sample(pid: int, port: int, heap: Path) -> dict[str, float]:
     status = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
     # Resident is what files hold too: programs' pages, which come as they are first used, and of which there are no more than files have.
     number = {key: int(value) for key, value in re.findall(r"^(VmRSS|RssAnon|Threads):\s+(\d+)", status, re.M)}
     with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=LONG) as answer:
         answer.read()
-    return {"resident_mb": number["VmRSS"] / 1024, "anonymous_mb": number["RssAnon"] / 1024, "descriptors": len(os.listdir(f"/proc/{pid}/fd")), "threads": number["Threads"]}
+    held = re.match(r" *(\d+) +\d+\n", heap.read_text(encoding="ascii"))  # of the allocator's, as tests/faults/heap_held.c tells
+    assert held is not None, "nothing tells what is held"
+    return {"resident_mb": number["VmRSS"] / 1024, "anonymous_mb": number["RssAnon"] / 1024, "held_mb": int(held[1]) / 2**20, "descriptors": len(os.listdir(f"/proc/{pid}/fd")), "threads": number["Threads"]}
 
 
 def line_through(times: np.ndarray[Any, Any], values: np.ndarray[Any, Any]) -> tuple[float, float]:
@@ -207,16 +209,19 @@ def main() -> int:
     parser.add_argument("--json", action="store_true", help="what came of it as JSON, on standard output")
     options = parser.parse_args()
     voxeld = program("VOXELD", "the daemon")
+    heap_held = program("HEAP_HELD", "the library that tells what is held")
     with tempfile.TemporaryDirectory(prefix="voxeld-soak-") as folder:
         server = f"unix:{folder}/s"
         log = open(f"{folder}/log", "w+", encoding="utf-8")
         # Full after a minute or two, so that what is kept stays as much, and making room goes on all the time.
         Path(f"{folder}/voxeld.toml").write_text("[limits]\nmax_assets = 64\n", encoding="utf-8")
+        heap = Path(f"{folder}/heap")
+        heap.touch()
         daemon = subprocess.Popen(
             [voxeld, "--config", f"{folder}/voxeld.toml", "--listen", server, "--http", "127.0.0.1:0", "--state-dir", f"{folder}/state", "--log-level", "info", "--engine", "cpu",
              "--display", "stack=simulated,size=24x24x16,rate=60", "--display", "rotor=simulated,geometry=rotor,size=24x16,slices=60,rate=30",
              "--display", "lattice=simulated,profile=" + str(Path(__file__).parents[2] / "display/profiles/lattice-8.toml")],
-            stdout=log, stderr=subprocess.STDOUT)
+            stdout=log, stderr=subprocess.STDOUT, env={**os.environ, "LD_PRELOAD": heap_held, "HEAP_HELD_FILE": str(heap)})
 
         def listens() -> int:
             said = Path(f"{folder}/log").read_text(encoding="utf-8")
@@ -225,6 +230,7 @@ def main() -> int:
             return int(match[1]) if match else 0
 
         port = until(listens, "voxeld's page")
+        until(lambda: heap.stat().st_size > 0, "what is held")
         stop = mp.Event()
         clients = []
         for name in options.roles.split(","):
@@ -239,7 +245,7 @@ def main() -> int:
             while (now := time.monotonic()) - began < options.minutes * 60 and daemon.poll() is None and all(p.is_alive() for _, p, _ in clients):
                 stats = v.stats(timeout=LONG)
                 shown = stats.displays[0].commit_to_presented
-                rows.append({"minutes": (now - began) / 60, **sample(daemon.pid, port), "p50_ms": shown.p50_ns / 1e6, "p99_ms": shown.p99_ns / 1e6})
+                rows.append({"minutes": (now - began) / 60, **sample(daemon.pid, port, heap), "p50_ms": shown.p50_ns / 1e6, "p99_ms": shown.p99_ns / 1e6})
                 if now - told > 60 and not options.json:
                     told = now
                     print(" ".join(f"{key} {value:.1f}" for key, value in rows[-1].items()), file=sys.stderr, flush=True)

@@ -1,7 +1,14 @@
 #include "daemon/process/process_watch.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <cstring>
+#include <fstream>
+#include <memory>
+#include <vector>
+
+#include "daemon/process/process.h"
 #include "display/sync/fake_clock.h"
 #include "gpu/bulk/segment.h"
 
@@ -23,6 +30,42 @@ TEST(ProcessWatch, HasTheFiguresOfAll) {
   EXPECT_EQ(watch.figures().pauses, 0u);
   EXPECT_EQ(watch.figures().clock_steps, 0u);
 }
+
+int given_back = 0;
+
+TEST(ProcessWatch, GivesBackFreeMemoryEachMinute) {
+  sync::FakeClock clock;
+  Logger log(Logger::Level::kOff, Logger::Format::kText);
+  ProcessWatch watch(0, clock, log, [] { ++given_back; });
+  for (int second = 1; second <= 150; ++second) {
+    clock.Advance(sync::kSecond);
+    watch.Look();
+    EXPECT_EQ(given_back, second / 60) << second;
+  }
+}
+
+#if defined(__GLIBC__) && !defined(VOXELD_SANITIZED)
+TEST(Process, WhatIsFreeBetweenWhatIsHeldIsGivenBack) {
+  // Every other of many places of four pages is let go.
+  constexpr size_t kPlace = 16 << 10, kPlaces = 4096;
+  std::vector<std::unique_ptr<char[]>> places(kPlaces);
+  for (std::unique_ptr<char[]>& place : places) {
+    place = std::make_unique<char[]>(kPlace);
+    std::memset(place.get(), 1, kPlace);
+  }
+  for (size_t i = 0; i < kPlaces; i += 2) places[i].reset();
+  const auto resident = [] {
+    std::ifstream file("/proc/self/statm");
+    size_t pages = 0, in_memory = 0;
+    file >> pages >> in_memory;
+    return in_memory * static_cast<size_t>(sysconf(_SC_PAGESIZE));
+  };
+  const size_t before = resident();
+  GiveBackFreeMemory();
+  // Of each the pages that are its own alone.
+  EXPECT_LT(resident(), before - kPlaces / 2 * kPlace / 2);
+}
+#endif
 
 }  // namespace
 }  // namespace voxeld::daemon
