@@ -235,8 +235,53 @@ class Host {
     return TRUE;
   }
 
+  // What a request points to, read from the client's memory; that waits for the client, which may be stopped: without the lock, so that
+  // whoever asks about the device is answered. Owned by nobody, or by what is in flight.
+  struct Memory {
+    UMockdevIoctlData* first = nullptr;
+    UMockdevIoctlData* second = nullptr;
+  };
+  static Memory Read(UMockdevIoctlClient* client) {
+    UMockdevIoctlData* const argument = umockdev_ioctl_client_get_arg(client);
+    const auto read = [](UMockdevIoctlData* from, size_t offset, size_t size) {
+      return umockdev_ioctl_data_resolve(from, offset, size, nullptr);
+    };
+    Memory memory;
+    switch (umockdev_ioctl_client_get_request(client)) {
+      case USBDEVFS_GET_CAPABILITIES:
+      case USBDEVFS_CLEAR_HALT:
+        memory.first = read(argument, 0, sizeof(uint32_t));
+        break;
+      case USBDEVFS_CONNECTINFO:
+        memory.first = read(argument, 0, sizeof(usbdevfs_connectinfo));
+        break;
+      case USBDEVFS_CONTROL: {
+        memory.first = read(argument, 0, sizeof(usbdevfs_ctrltransfer));
+        const auto& asked = *reinterpret_cast<usbdevfs_ctrltransfer*>(memory.first->data);
+        if (asked.wLength > 0) {
+          memory.second =
+              read(memory.first, G_STRUCT_OFFSET(usbdevfs_ctrltransfer, data), asked.wLength);
+        }
+        break;
+      }
+      case USBDEVFS_SUBMITURB: {
+        memory.first = read(argument, 0, sizeof(usbdevfs_urb));
+        const auto length = reinterpret_cast<usbdevfs_urb*>(memory.first->data)->buffer_length;
+        if (length > 0 && static_cast<size_t>(length) <= kMostInFlight) {
+          memory.second = read(memory.first, G_STRUCT_OFFSET(usbdevfs_urb, buffer),
+                               static_cast<size_t>(length));
+        }
+        break;
+      }
+      default:
+        break;
+    }
+    return memory;
+  }
+
   gboolean OnIoctl(UMockdevIoctlClient* client) {
-    const std::lock_guard lock(mutex_);
+    const Memory memory = Read(client);
+    std::unique_lock lock(mutex_);
     device_.model->Tick();
     UMockdevIoctlData* const argument = umockdev_ioctl_client_get_arg(client);
     const bool stale = Stale(client);
@@ -245,15 +290,15 @@ class Host {
         uint32_t capabilities = USBDEVFS_CAP_BULK_SCATTER_GATHER | USBDEVFS_CAP_BULK_CONTINUATION |
                                 USBDEVFS_CAP_NO_PACKET_SIZE_LIM |
                                 USBDEVFS_CAP_REAP_AFTER_DISCONNECT | USBDEVFS_CAP_ZERO_PACKET;
-        return Give(client, argument, capabilities);
+        return Give(client, memory.first, capabilities);
       }
       case USBDEVFS_CONNECTINFO: {
         usbdevfs_connectinfo info{};
         info.devnum = static_cast<unsigned>(number_);
-        return Give(client, argument, info);
+        return Give(client, memory.first, info);
       }
       case USBDEVFS_CONTROL:
-        return stale ? Answer(client, ENODEV) : SynchronousControl(client, argument);
+        return stale ? Answer(client, ENODEV) : SynchronousControl(client, memory);
       case USBDEVFS_CLAIMINTERFACE:
       case USBDEVFS_RELEASEINTERFACE:
       case USBDEVFS_SETINTERFACE:
@@ -264,9 +309,8 @@ class Host {
         return Answer(client, stale ? ENODEV : 0);
       case USBDEVFS_CLEAR_HALT: {
         if (stale) return Answer(client, ENODEV);
-        g_autoptr(UMockdevIoctlData) data = umockdev_ioctl_data_resolve(argument, 0, 4, nullptr);
         uint32_t endpoint = 0;
-        std::memcpy(&endpoint, data->data, sizeof(endpoint));
+        std::memcpy(&endpoint, memory.first->data, sizeof(endpoint));
         display::Urb urb;
         urb.id = next_++;
         urb.setup = {.request_type = 2, .request = 1, .index = static_cast<uint16_t>(endpoint)};
@@ -274,7 +318,7 @@ class Host {
         return Answer(client, 0);
       }
       case USBDEVFS_SUBMITURB:
-        return stale ? Answer(client, ENODEV) : SubmitUrb(client, argument);
+        return stale ? Answer(client, ENODEV) : SubmitUrb(client, memory);
       case USBDEVFS_REAPURB:
       case USBDEVFS_REAPURBNDELAY: {
         std::deque<UMockdevIoctlData*>& done = DoneOf(client);
@@ -284,10 +328,12 @@ class Host {
           parked_.push_back({client, clock_.Now() + kPark});
           return TRUE;
         }
+        UMockdevIoctlData* const urb = done.front();
+        done.pop_front();
+        lock.unlock();
         g_autoptr(UMockdevIoctlData) data =
             umockdev_ioctl_data_resolve(argument, 0, sizeof(void*), nullptr);
-        umockdev_ioctl_data_set_ptr(data, 0, done.front());
-        done.pop_front();
+        umockdev_ioctl_data_set_ptr(data, 0, urb);
         return Answer(client, 0);
       }
       case USBDEVFS_DISCARDURB: {
@@ -310,45 +356,33 @@ class Host {
   }
 
   template <typename T>
-  gboolean Give(UMockdevIoctlClient* client, UMockdevIoctlData* argument, T value) {
-    g_autoptr(UMockdevIoctlData) data =
-        umockdev_ioctl_data_resolve(argument, 0, sizeof(value), nullptr);
+  gboolean Give(UMockdevIoctlClient* client, UMockdevIoctlData* data, T value) {
     umockdev_ioctl_data_update(data, 0, reinterpret_cast<guint8*>(&value), sizeof(value));
     return Answer(client, 0);
   }
 
-  gboolean SynchronousControl(UMockdevIoctlClient* client, UMockdevIoctlData* argument) {
-    UMockdevIoctlData* const data =
-        umockdev_ioctl_data_resolve(argument, 0, sizeof(usbdevfs_ctrltransfer), nullptr);
+  gboolean SynchronousControl(UMockdevIoctlClient* client, const Memory& memory) {
     usbdevfs_ctrltransfer control;
-    std::memcpy(&control, data->data, sizeof(control));
+    std::memcpy(&control, memory.first->data, sizeof(control));
     // The only one that libusb sends in this way: GET_CONFIGURATION.
     if (control.bRequestType != 0x80 || control.bRequest != 8 || control.wLength < 1) {
       return Answer(client, EPIPE);
     }
-    UMockdevIoctlData* const bytes = umockdev_ioctl_data_resolve(
-        data, G_STRUCT_OFFSET(usbdevfs_ctrltransfer, data), control.wLength, nullptr);
     guint8 configuration = 1;
-    umockdev_ioctl_data_update(bytes, 0, &configuration, 1);
+    umockdev_ioctl_data_update(memory.second, 0, &configuration, 1);
     umockdev_ioctl_client_complete(client, 1, 0);
     return TRUE;
   }
 
-  gboolean SubmitUrb(UMockdevIoctlClient* client, UMockdevIoctlData* argument) {
-    UMockdevIoctlData* const data =
-        umockdev_ioctl_data_resolve(argument, 0, sizeof(usbdevfs_urb), nullptr);
-    const auto& asked = *reinterpret_cast<usbdevfs_urb*>(data->data);
+  gboolean SubmitUrb(UMockdevIoctlClient* client, const Memory& memory) {
+    const auto& asked = *reinterpret_cast<usbdevfs_urb*>(memory.first->data);
     const auto length = static_cast<size_t>(asked.buffer_length);
     if (length > kMostInFlight - bytes_in_flight_) return Answer(client, ENOMEM);
     InFlight urb{.node = umockdev_ioctl_client_get_devnode(client),
-                 .urb = data,
-                 .buffer = nullptr,
+                 .urb = memory.first,
+                 .buffer = memory.second,
                  .bytes = length,
                  .out = {}};
-    if (length > 0) {
-      urb.buffer =
-          umockdev_ioctl_data_resolve(data, G_STRUCT_OFFSET(usbdevfs_urb, buffer), length, nullptr);
-    }
     display::Urb out;
     out.id = next_++;
     const auto* bytes =
