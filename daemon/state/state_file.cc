@@ -170,10 +170,10 @@ absl::Status StateFile::Prepare() {
   return absl::IsDataLoss(status) ? Check() : status;
 }
 
-// Every page is looked at, before anybody relies on it.
+// Every page is looked at, and whether rows are in the order by which they are found, before anybody relies on it.
 absl::Status StateFile::Check() {
   sqlite3_stmt* check = nullptr;
-  int code = sqlite3_prepare_v2(database_, "PRAGMA quick_check(1)", -1, &check, nullptr);
+  int code = sqlite3_prepare_v2(database_, "PRAGMA integrity_check(1)", -1, &check, nullptr);
   if (code == SQLITE_OK) code = sqlite3_step(check);
   std::string found;
   if (code == SQLITE_ROW) {

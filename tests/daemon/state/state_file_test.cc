@@ -10,6 +10,7 @@
 #include <fstream>
 #include <map>
 #include <random>
+#include <sstream>
 
 #include "absl/strings/str_cat.h"
 #include "tests/daemon/state/crash_vfs.h"
@@ -133,6 +134,27 @@ TEST_F(StateFileTest, TriggersAndTablesOfOthersHaveNoSay) {
     ASSERT_TRUE(Put(**file, {PutOf(kEntity, "x")}).ok()) << sql;
     EXPECT_EQ(AllRows(**file).size(), 1u) << sql;
   }
+}
+
+TEST_F(StateFileTest, RowsOutOfOrderArePutAside) {
+  // Rows are found by their order: one that stands elsewhere can be read, and not removed.
+  {
+    auto file = Open();
+    ASSERT_TRUE(file.ok());
+    for (const char* id : {"aaaaaaaa", "bbbbbbbb", "cccccccc"}) {
+      ASSERT_TRUE(Put(**file, {PutOf({RowKind::kEntity, 7, "layer", id}, "x")}).ok());
+    }
+  }
+  std::stringstream read;
+  read << std::ifstream(path_, std::ios::binary).rdbuf();
+  std::string bytes = read.str();
+  const size_t at = bytes.find("bbbbbbbb");
+  ASSERT_NE(at, std::string::npos);
+  bytes.replace(at, 8, "zzzzzzzz");
+  std::ofstream(path_, std::ios::binary) << bytes;
+  const auto file = Open();
+  ASSERT_TRUE(file.ok()) << file.status();
+  EXPECT_THAT((*file)->quarantined(), HasSubstr("order"));
 }
 
 TEST_F(StateFileTest, WhatSomebodyElseOrALaterVersionMadeIsLeftAlone) {

@@ -96,6 +96,12 @@ TEST(PlyPoints, SeventyThousandPoints) {
   EXPECT_EQ(part.colors[0x1234], (Rgb{0x34, 0x12, 'z'}));
 }
 
+std::string Lines(int count, const std::string& line) {
+  std::string lines;
+  for (int i = 0; i < count; ++i) absl::StrAppend(&lines, line, "\n");
+  return lines;
+}
+
 struct BadFile {
   const char* name;
   std::string bytes;
@@ -134,6 +140,12 @@ INSTANTIATE_TEST_SUITE_P(
                 Header("ascii", "1", "property float x\nproperty float y\n") + "0 0\n",
                 {"no z"}},
         BadFile{"no_vertices", Header("ascii", "0", kXyz), {"no vertices"}},
+        BadFile{
+            "no_vertices_copied_as_text",
+            Header("binary_little_endian", "0",
+                   absl::StrCat(kXyz, "property float nx\nproperty float ny\nproperty float nz\n",
+                                Lines(100, "comment"))),
+            {"no vertices"}},
         BadFile{"negative_count", Header("ascii", "-5", kXyz), {"element vertex -5", "COUNT"}},
         BadFile{"absurd_count",
                 Header("binary_little_endian", "4000000000", kXyz) + LittleXyz(0, 0, 0),

@@ -111,7 +111,7 @@ uint64_t LeastBytes(const PlyHeader& header, const PlyElement& element) {
   return bytes;
 }
 
-absl::Status CheckCounts(const SourceFile& file, const PlyHeader& header) {
+absl::Status CheckVertices(const SourceFile& file, const PlyHeader& header) {
   const PlyElement* vertex = header.Find("vertex");
   if (vertex == nullptr)
     return FileError(file, "has no vertices", "\"element vertex COUNT\" is expected");
@@ -126,6 +126,10 @@ absl::Status CheckCounts(const SourceFile& file, const PlyHeader& header) {
     return FileError(file, absl::StrCat("announces ", vertex->count, " vertices"),
                      absl::StrCat("at most ", kMaxModelVertices, " are read"));
   }
+  return absl::OkStatus();
+}
+
+absl::Status CheckCounts(const SourceFile& file, const PlyHeader& header) {
   // The last line of an ASCII file need not end.
   const uint64_t have = file.bytes.size() - header.body + 1;
   uint64_t need = 0;
@@ -219,10 +223,9 @@ absl::StatusOr<PlyHeader> ParsePlyHeader(const SourceFile& file, PlyCounts count
   if (!formatted)
     return FileError(file, "its header has no format", "\"format ascii 1.0\" is expected");
   header.body = at;
-  if (counts == PlyCounts::kChecked) {
-    const absl::Status status = CheckCounts(file, header);
-    if (!status.ok()) return status;
-  }
+  absl::Status status = CheckVertices(file, header);
+  if (status.ok() && counts == PlyCounts::kChecked) status = CheckCounts(file, header);
+  if (!status.ok()) return status;
   return header;
 }
 
