@@ -104,6 +104,7 @@ class Reader {
   // Layers are blended in the order in which they were made.
   void PutLayers() {
     std::vector<std::pair<OwnedName, wire::KeptLayerRow*>> order;
+    order.reserve(layers_.size());
     for (auto& [key, row] : layers_) order.emplace_back(key, &row);
     std::sort(order.begin(), order.end(),
               [](const auto& a, const auto& b) { return a.second->number < b.second->number; });
@@ -117,7 +118,9 @@ class Reader {
 
   // Those that others refer to come first.
   void PutObjects() {
-    for (auto& [owner, objects] : objects_) {
+    for (auto& of_owner : objects_) {
+      const uint64_t owner = of_owner.first;
+      auto& objects = of_owner.second;
       std::set<std::string> begun;
       std::vector<Operation> operations;
       // From each to what it refers to, however many there are one behind the other; and how many of those are done.
