@@ -12,8 +12,8 @@ namespace voxeld::daemon {
 void TuneProcess();
 
 // Gives the system what the allocator keeps and nobody holds, from between what is held too. A moment's peaks would stay
-// for ever else, each arena's, and higher ones come the longer the daemon runs. Takes a millisecond for each ten thousand
-// free places or so, for which others who want memory of that arena wait; what is wanted again is faulted in again.
+// for ever else, each arena's, and higher ones come the longer the daemon runs. Takes longer the more
+// places are free, and others who want memory of that arena wait for it; what is wanted again is faulted in again.
 void GiveBackFreeMemory();
 
 // As many descriptors as the process may have: every client holds two, what serves it and what guards it.

@@ -31,7 +31,7 @@ class Segment {
   Segment(const Segment&) = delete;
   Segment& operator=(const Segment&) = delete;
 
-  // Of this process: how often the system had no memory or descriptors for one.
+  // Of this process: how often the system had no memory for one. Any thread.
   static uint64_t Refused();
 
   std::span<std::byte> bytes() const { return {data_, size_}; }
