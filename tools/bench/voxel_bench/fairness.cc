@@ -1,5 +1,7 @@
 // Many clients at once, each as fast as its credit lets it: who gets how much.
 #include <algorithm>
+#include <cstdint>
+#include <limits>
 #include <memory>
 #include <utility>
 
@@ -102,13 +104,19 @@ absl::StatusOr<nlohmann::json> RunFairness(const FairnessOptions& options,
     const double seconds = static_cast<double>(Now() - begin) / sync::kSecond;
     if (absl::Status failed = first_failure(); !failed.ok()) return failed;
     std::vector<double> rates;
+    uint64_t least = std::numeric_limits<uint64_t>::max(), together = 0;
     for (size_t i = 0; i < clients.size(); ++i) {
       const uint64_t accepted = clients[i]->session.tally().accepted - before[i];
+      least = std::min(least, accepted);
+      together += accepted;
       rates.push_back(static_cast<double>(accepted) / seconds);
     }
     const double mean = MeanOf(rates);
     const Spread spread = SpreadOf(rates);
-    slowest.push_back(mean == 0 ? 0 : spread.least / mean);
+    // Of whole numbers: a mean of rates may round to less than each of them.
+    const uint64_t least_of_each = least * clients.size();
+    slowest.push_back(
+        together == 0 ? 0 : static_cast<double>(least_of_each) / static_cast<double>(together));
     jain.push_back(JainIndexOf(rates));
     all.push_back(mean * static_cast<double>(clients.size()));
     report["clients_commits_per_s"].push_back(rates);
