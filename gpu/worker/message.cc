@@ -15,8 +15,8 @@ constexpr size_t kMostBody = 4096;
 
 struct Header {
   MessageType type;
-  uint32_t reserved = 0;
-  uint64_t call = 0;
+  uint32_t reserved;
+  uint64_t call;
 };
 
 }  // namespace
@@ -53,12 +53,8 @@ absl::Status SendMessage(int socket, const Message& message) {
     rights->cmsg_len = CMSG_LEN(sizeof(int));
     std::memcpy(CMSG_DATA(rights), &message.fd, sizeof(int));
   }
-  ssize_t sent = 0;
-  do {
-    sent = sendmsg(socket, &out, MSG_NOSIGNAL);
-  } while (sent < 0 && errno == EINTR);
-  if (sent >= 0) return absl::OkStatus();
-  if (errno == EAGAIN || errno == EWOULDBLOCK) {
+  if (TEMP_FAILURE_RETRY(sendmsg(socket, &out, MSG_NOSIGNAL)) >= 0) return absl::OkStatus();
+  if (errno == EAGAIN) {
     return absl::ResourceExhaustedError("the other process does not read");
   }
   return absl::UnavailableError(
@@ -76,10 +72,7 @@ absl::StatusOr<Message> ReceiveMessage(int socket) {
   alignas(cmsghdr) char control[CMSG_SPACE(sizeof(int))] = {};
   in.msg_control = control;
   in.msg_controllen = CMSG_LEN(sizeof(int));  // with its padding there would be room for a second
-  ssize_t got = 0;
-  do {
-    got = recvmsg(socket, &in, MSG_CMSG_CLOEXEC);
-  } while (got < 0 && errno == EINTR);
+  const ssize_t got = TEMP_FAILURE_RETRY(recvmsg(socket, &in, MSG_CMSG_CLOEXEC));
   for (cmsghdr* c = got < 0 ? nullptr : CMSG_FIRSTHDR(&in); c != nullptr; c = CMSG_NXTHDR(&in, c)) {
     if (c->cmsg_level == SOL_SOCKET && c->cmsg_type == SCM_RIGHTS) {
       std::memcpy(&message.fd, CMSG_DATA(c), sizeof(int));

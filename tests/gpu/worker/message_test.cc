@@ -3,14 +3,21 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <pthread.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
+#include <atomic>
+#include <csignal>
 #include <cstring>
+#include <fstream>
+#include <functional>
 #include <set>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
 namespace voxeld::gpu {
@@ -90,6 +97,35 @@ TEST_F(MessageTest, ComesAsItWasSent) {
   EXPECT_EQ(Open(), before);
 }
 
+TEST_F(MessageTest, BytesAreHeaderThenBody) {
+  const Message sent = MakeMessage(MessageType::kApply, 0x0102030405060708, BulkMessage{6, 7, 8});
+  ASSERT_TRUE(SendMessage(ends_[0], sent).ok());
+  std::string bytes(100, '\0');
+  const ssize_t got = recv(ends_[1], bytes.data(), bytes.size(), 0);
+  ASSERT_EQ(got, static_cast<ssize_t>(kHeaderBytes + sizeof(BulkMessage)));
+  EXPECT_EQ(bytes.substr(0, kHeaderBytes), Header(MessageType::kApply, 0x0102030405060708));
+  EXPECT_EQ(std::memcmp(bytes.data() + kHeaderBytes, sent.body.data(), sizeof(BulkMessage)), 0);
+}
+
+TEST_F(MessageTest, ADescriptorMayHaveAnyNumber) {
+  const int standard_input = fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3);
+  ASSERT_GE(standard_input, 0);
+  close(STDIN_FILENO);  // the next to be given is 0
+  SendBytes(Header(MessageType::kSegment, 1), {ends_[0]});
+  const absl::StatusOr<Message> got = ReceiveMessage(ends_[1]);
+  EXPECT_TRUE(got.ok() && got->fd == STDIN_FILENO);
+  EXPECT_TRUE(got.ok() && SendMessage(ends_[0], *got).ok());
+  const absl::StatusOr<Message> again = ReceiveMessage(ends_[1]);
+  EXPECT_TRUE(again.ok() && again->fd >= 0) << "0 is a descriptor too";
+  if (again.ok() && again->fd >= 0) close(again->fd);
+  close(STDIN_FILENO);
+  SendBytes("no message", {ends_[0]});
+  EXPECT_FALSE(ReceiveMessage(ends_[1]).ok());
+  EXPECT_EQ(fcntl(STDIN_FILENO, F_GETFD), -1) << "closed, as it came with what is no message";
+  ASSERT_EQ(dup2(standard_input, STDIN_FILENO), STDIN_FILENO);
+  close(standard_input);
+}
+
 TEST_F(MessageTest, OfOneDescriptorMoreNoneStaysOpen) {
   for (const size_t count : {2u, 3u, 20u}) {
     const std::set<int> before = Open();
@@ -147,6 +183,80 @@ TEST_F(MessageTest, TheEndIsToldAtBothEnds) {
   EXPECT_TRUE(absl::IsUnavailable(sent)) << sent;
   EXPECT_EQ(sent.message().substr(0, 27), "the other process is gone: ");
   EXPECT_TRUE(absl::IsUnavailable(ReceiveMessage(ends_[0]).status()));
+}
+
+// Sleeps in a system call until a signal comes, whose handler has run then, and sleeps again: twice.
+class Interrupted {
+ public:
+  explicit Interrupted(std::function<void()> calls) {
+    struct sigaction action = {};
+    action.sa_handler = [](int) { handled.fetch_add(1); };  // without SA_RESTART
+    sigaction(SIGUSR1, &action, &before_);
+    handled = 0;
+    thread_ = std::thread([this, calls = std::move(calls)] {
+      id_ = gettid();
+      calls();
+    });
+    for (int signals = 1; signals <= 2; ++signals) {
+      AwaitSleep();
+      pthread_kill(thread_.native_handle(), SIGUSR1);
+      while (handled < signals) std::this_thread::yield();
+    }
+    AwaitSleep();
+  }
+  ~Interrupted() {
+    thread_.join();
+    sigaction(SIGUSR1, &before_, nullptr);
+  }
+  Interrupted(const Interrupted&) = delete;
+  Interrupted& operator=(const Interrupted&) = delete;
+
+ private:
+  // Until the thread sleeps in a call, or has ended, which it should not have done yet.
+  void AwaitSleep() {
+    while (id_ == 0) std::this_thread::yield();
+    for (char state = 'R'; state == 'R';) {
+      std::this_thread::yield();
+      std::ifstream stat("/proc/self/task/" + std::to_string(id_) + "/stat");
+      std::string line;
+      if (!std::getline(stat, line)) return;
+      state = line[line.rfind(')') + 2];
+    }
+  }
+
+  static std::atomic<int> handled;
+  std::atomic<pid_t> id_ = 0;
+  struct sigaction before_ = {};
+  std::thread thread_;
+};
+std::atomic<int> Interrupted::handled = 0;
+
+TEST_F(MessageTest, ASignalIsNoEnd) {
+  for (const int end : ends_) ASSERT_EQ(fcntl(end, F_SETFL, 0), 0);
+  absl::StatusOr<Message> got;
+  {
+    const Interrupted receiving([&] { got = ReceiveMessage(ends_[1]); });
+    ASSERT_TRUE(SendMessage(ends_[0], MakeDone(5, absl::OkStatus())).ok());
+  }
+  ASSERT_TRUE(got.ok()) << got.status();
+  EXPECT_EQ(got->call, 5u);
+
+  ASSERT_EQ(fcntl(ends_[0], F_SETFL, O_NONBLOCK), 0);
+  uint64_t sent = 0;
+  while (SendMessage(ends_[0], MakeDone(sent, absl::OkStatus())).ok()) ++sent;
+  ASSERT_EQ(fcntl(ends_[0], F_SETFL, 0), 0);
+  absl::Status last = absl::UnknownError("not sent");
+  {
+    const Interrupted sending(
+        [&] { last = SendMessage(ends_[0], MakeDone(sent, absl::OkStatus())); });
+    for (uint64_t call = 0; call < sent; ++call) {
+      got = ReceiveMessage(ends_[1]);
+      EXPECT_TRUE(got.ok() && got->call == call);
+    }
+  }
+  ASSERT_TRUE(last.ok()) << last;
+  got = ReceiveMessage(ends_[1]);
+  EXPECT_TRUE(got.ok() && got->call == sent);
 }
 
 TEST(DoneMessage, BringsAStatusThrough) {
