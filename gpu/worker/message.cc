@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <iterator>
 #include <system_error>
 
 #include "absl/strings/str_cat.h"
@@ -38,11 +39,11 @@ absl::Status StatusOf(const Message& done) {
 
 absl::Status SendMessage(int socket, const Message& message) {
   const Header header{message.type, 0, message.call};
-  iovec parts[2] = {{const_cast<Header*>(&header), sizeof(header)},
-                    {const_cast<std::byte*>(message.body.data()), message.body.size()}};
+  iovec parts[] = {{const_cast<Header*>(&header), sizeof(header)},
+                   {const_cast<std::byte*>(message.body.data()), message.body.size()}};
   msghdr out = {};
   out.msg_iov = parts;
-  out.msg_iovlen = 2;
+  out.msg_iovlen = std::size(parts);
   alignas(cmsghdr) char control[CMSG_SPACE(sizeof(int))] = {};
   if (message.fd >= 0) {
     out.msg_control = control;
@@ -65,10 +66,10 @@ absl::StatusOr<Message> ReceiveMessage(int socket) {
   Header header;
   Message message;
   message.body.resize(kMostBody);
-  iovec parts[2] = {{&header, sizeof(header)}, {message.body.data(), message.body.size()}};
+  iovec parts[] = {{&header, sizeof(header)}, {message.body.data(), message.body.size()}};
   msghdr in = {};
   in.msg_iov = parts;
-  in.msg_iovlen = 2;
+  in.msg_iovlen = std::size(parts);
   alignas(cmsghdr) char control[CMSG_SPACE(sizeof(int))] = {};
   in.msg_control = control;
   in.msg_controllen = CMSG_LEN(sizeof(int));  // with its padding there would be room for a second
