@@ -32,6 +32,33 @@ inline std::string PngOf(uint32_t width, uint32_t height, const std::vector<uint
   return file;
 }
 
+// Grey, 16 bits a pixel, of a file that does not say what its values mean.
+inline std::string WideGreyPngOf(uint32_t width, uint32_t height,
+                                 const std::vector<uint16_t>& grey) {
+  png_image image = {};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = width;
+  image.height = height;
+  image.format = PNG_FORMAT_LINEAR_Y;
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
+  std::string told(size, '\0');
+  if (png_image_write_to_memory(&image, told.data(), &size, 0, grey.data(), 0, nullptr) == 0) {
+    return "";
+  }
+  told.resize(size);
+  constexpr size_t kSignature = 8, kBesideData = 12;  // a chunk: length, name, data, CRC-32
+  std::string file = told.substr(0, kSignature);
+  for (size_t at = kSignature; at < told.size();) {
+    size_t chunk = kBesideData;
+    for (size_t i = 0; i < 4; ++i)
+      chunk += size_t{static_cast<uint8_t>(told[at + i])} << (24 - 8 * i);
+    const std::string name = told.substr(at + 4, 4);
+    if (name == "IHDR" || name == "IDAT" || name == "IEND") file += told.substr(at, chunk);
+    at += chunk;
+  }
+  return file;
+}
+
 inline std::string JpegOf(int width, int height, const std::vector<uint32_t>& pixels) {
   const tjhandle writer = tjInitCompress();
   unsigned char* bytes = nullptr;

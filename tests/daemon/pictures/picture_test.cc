@@ -2,11 +2,13 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <cmath>
 #include <string>
 #include <vector>
 
+#include "absl/strings/match.h"
 #include "tests/daemon/pictures/files.h"
 
 namespace voxeld::pictures {
@@ -68,16 +70,56 @@ TEST(Picture, AJpegIsReadNearly) {
   }
 }
 
+TEST(Picture, SixteenBitsAreOfSrgbToo) {
+  const std::string bytes = WideGreyPngOf(3, 1, {0, 0x8080, 0xFFFF});
+  EXPECT_FALSE(absl::StrContains(bytes, "gAMA"));
+  EXPECT_THAT(*Read(bytes), ElementsAre(0, 0x808080, 0xFFFFFF));
+}
+
+TEST(Picture, OneRowOrColumnIsAPicture) {
+  for (const int height : {1, 5}) {
+    const int width = height == 1 ? 5 : 1;
+    const std::string bytes = JpegOf(width, height, std::vector<uint32_t>(5, 0x808080));
+    EXPECT_THAT(*Read(bytes), ElementsAreArray(std::vector<uint32_t>(5, 0x808080)));
+  }
+}
+
+// Of what a file's head alone needed, and of what all of it did, well or not.
+TEST(Picture, NothingOfALibraryIsLeft) {
+  const std::vector<uint32_t> pixels(64 * 64, 0x80FF20);
+  const std::string png = PngOf(64, 64, pixels), jpeg = JpegOf(64, 64, pixels);
+  const auto held = [] {
+    const struct mallinfo2 info = mallinfo2();
+    return info.uordblks + info.hblkhd;
+  };
+  const auto read_all = [&] {
+    for (const std::string& whole : {png, jpeg}) {
+      for (const size_t size : {whole.size(), whole.size() - 20, size_t{9}}) {
+        (void)Read(whole.substr(0, size)).ok();
+        (void)PictureFile::Open(whole.substr(0, size)).ok();
+      }
+    }
+  };
+  for (int i = 0; i < 3; ++i) read_all();
+  const size_t before = held();
+  for (int i = 0; i < 10; ++i) read_all();
+  EXPECT_EQ(held(), before);
+}
+
 TEST(Picture, WhatIsNoneIsRefused) {
   EXPECT_THAT(MessageOf(""), HasSubstr("is neither a PNG nor a JPEG file"));
   EXPECT_THAT(MessageOf("GIF89a"), HasSubstr("is neither"));
   EXPECT_THAT(MessageOf("\x89PNG\r\n\x1a\n"), HasSubstr("begins as a PNG file does"));
   EXPECT_THAT(MessageOf("\xFF\xD8\xFF"), HasSubstr("begins as a JPEG file does"));
+  EXPECT_FALSE(PictureFile::Open("\x89PNG\r\n\x1a\n").ok());
+  EXPECT_FALSE(PictureFile::Open("\xFF\xD8\xFF").ok());
 }
 
 // Wherever it ends, and whichever byte is another: an error or a picture of that size, and no more.
 TEST(Picture, BrokenFilesAreRefused) {
-  const std::vector<uint32_t> pixels(64, 0x80FF20);
+  std::vector<uint32_t> pixels(64);
+  for (size_t i = 0; i < pixels.size(); ++i)
+    pixels[i] = static_cast<uint32_t>(i * i * 0x9E37) & 0xFFFFFF;
   for (const std::string& whole : {PngOf(8, 8, pixels), JpegOf(8, 8, pixels)}) {
     ASSERT_TRUE(Read(whole).ok());
     for (size_t size = 0; size + 16 < whole.size(); ++size) {
