@@ -12,6 +12,7 @@
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
+#include <cerrno>
 #include <chrono>
 #include <cstring>
 #include <exception>
@@ -285,7 +286,10 @@ class Server::Impl {
           error.value(), absl::StrCat(options_.listen.ToString(), " cannot be listened on"));
     }
     if (options_.listen.unix_socket) {
-      chmod(options_.listen.path.c_str(), kSocketMode);
+      if (chmod(options_.listen.path.c_str(), kSocketMode) != 0) {
+        return absl::ErrnoToStatus(
+            errno, absl::StrCat(options_.listen.ToString(), " cannot be made its group's"));
+      }
     } else {
       const Protocol::endpoint local = acceptor_.local_endpoint(error);
       asio::ip::tcp::endpoint tcp;

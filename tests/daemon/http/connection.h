@@ -4,6 +4,7 @@
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -50,6 +51,11 @@ class Connection {
     char c = 0;
     while (!text.ends_with(end) && recv(fd_, &c, 1, 0) == 1) text += c;
     return text;
+  }
+  // Whether something has come, or the end, that is not read yet.
+  bool Readable() const {
+    pollfd socket = {.fd = fd_, .events = POLLIN, .revents = 0};
+    return poll(&socket, 1, 0) != 0;
   }
   // As much as is taken before the other end closes.
   size_t SendUntilClosed(const std::string& text) {

@@ -121,6 +121,15 @@ TEST_F(HttpBody, IsTakenWholeAndAnswered) {
   EXPECT_LE(taken_.longest, 64u << 10);
 }
 
+TEST_F(HttpBody, ItsConnectionMakesRoomForTheNext) {
+  Start({.max_connections = 1});
+  for (int i = 0; i < 3; ++i) {
+    Connection connection(server_->address());
+    connection.Send(Head("/take", 2) + "ab");
+    EXPECT_THAT(connection.ReadAll(), StartsWith("HTTP/1.1 202 ")) << i;
+  }
+}
+
 TEST_F(HttpBody, ComesInChunksToo) {
   Start();
   Connection connection(server_->address());

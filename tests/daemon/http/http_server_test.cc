@@ -4,9 +4,11 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <thread>
+#include <tuple>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
@@ -91,14 +93,60 @@ TEST_F(HttpServer, RefusesWhatIsNoRequest) {
   Start();
   Connection garbage(server_->address());
   garbage.Send("\x16\x03\x01 this is not HTTP\r\n\r\n");
-  EXPECT_THAT(garbage.ReadAll(), StartsWith("HTTP/1.1 400 "));
+  const std::string answer = garbage.ReadAll();
+  EXPECT_THAT(answer, StartsWith("HTTP/1.1 400 "));
+  EXPECT_THAT(answer, HasSubstr("\r\n\r\nbad request: "));
   Connection large(server_->address());
   large.Send(absl::StrCat("GET /hello HTTP/1.1\r\nX: ", std::string(20'000, 'x'), "\r\n\r\n"));
   EXPECT_THAT(large.ReadTo("\r\n\r\n"), StartsWith("HTTP/1.1 431 "));
   Connection body(server_->address());
   body.Send("POST /hello HTTP/1.1\r\nHost: x\r\nContent-Length: 1000000\r\n\r\n");
-  EXPECT_THAT(body.ReadTo("\r\n\r\n"), StartsWith("HTTP/1.1 413 "));
+  EXPECT_THAT(body.ReadAll(), StartsWith("HTTP/1.1 413 ")) << "and the connection ends";
   EXPECT_THAT(Ask(Get("/hello")), StartsWith("HTTP/1.1 200 ")) << "the others are served";
+}
+
+TEST_F(HttpServer, HowMuchOfAHeaderIsReadIsAnOption) {
+  Start({.max_header_bytes = 300});
+  const auto ask = [&](size_t padding) {
+    Connection connection(server_->address());
+    connection.Send(absl::StrCat("GET /hello HTTP/1.1\r\nHost: x\r\nConnection: close\r\nX: ",
+                                 std::string(padding, 'x'), "\r\n\r\n"));
+    return connection.ReadAll();
+  };
+  EXPECT_THAT(ask(200), StartsWith("HTTP/1.1 200 "));
+  EXPECT_THAT(ask(300), StartsWith("HTTP/1.1 431 ")) << "and the connection ends";
+}
+
+std::string AskForAWebSocket(const std::string& path) {
+  return absl::StrCat(
+      "GET ", path,
+      " HTTP/1.1\r\nHost: x\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+      "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dm94ZWxzIGFyZSBsaXQhIQ==\r\n\r\n");
+}
+
+TEST_F(HttpServer, AWebSocketThatIsRefusedIsToldWhy) {
+  const auto server = Server::Start(
+      {.listen = *ParseAddress("127.0.0.1:0")}, [](const Request&, const Done&) { return false; },
+      [](const Request& request) -> absl::StatusOr<ServeWebSocket> {
+        if (request.path == "/none") return absl::NotFoundError("there is none");
+        if (request.path == "/full") return absl::ResourceExhaustedError("all are taken");
+        return absl::PermissionDeniedError("not you");
+      });
+  ASSERT_TRUE(server.ok()) << server.status();
+  for (const auto& [path, code, why] : {std::tuple{"/none", "404", "there is none"},
+                                        {"/full", "503", "all are taken"},
+                                        {"/secret", "403", "not you"}}) {
+    Connection connection((*server)->address());
+    connection.Send(AskForAWebSocket(path));
+    const std::string answer = connection.ReadAll();
+    EXPECT_THAT(answer, StartsWith(absl::StrCat("HTTP/1.1 ", code, " ")));
+    EXPECT_THAT(answer, HasSubstr(why));
+  }
+}
+
+TEST_F(HttpServer, WhereThereAreNoWebSocketsThatIsARequestLikeOthers) {
+  Start();
+  EXPECT_THAT(Ask(AskForAWebSocket("/hello")), EndsWith("hello\n"));
 }
 
 // The process gets so many more descriptors, about, while this lives.
@@ -251,6 +299,30 @@ TEST_F(HttpServer, DoesNotWaitForAnAnswerForEver) {
   EXPECT_THAT(connection.ReadTo("hello\n"), StartsWith("HTTP/1.1 200 "));
 }
 
+TEST_F(HttpServer, WhoWaitsForAnAnswerIsNotIdle) {
+  Start({.idle_limit_ns = 20 * sync::kMillisecond, .answer_limit_ns = 80 * sync::kMillisecond});
+  Connection connection(server_->address());
+  connection.Send(Get("/later"));
+  EXPECT_THAT(connection.ReadTo("in time\n"), StartsWith("HTTP/1.1 503 "));
+}
+
+TEST_F(HttpServer, WhoDoesNotReadAnAnswerMakesRoomForOthers) {
+  const std::string body(64 << 20, 'b');  // more than lies in sockets' buffers
+  const auto server = Server::Start({.listen = *ParseAddress("127.0.0.1:0"),
+                                     .max_connections = 1,
+                                     .idle_limit_ns = 20 * sync::kMillisecond},
+                                    [&](const Request& request, const Done& done) {
+                                      done({.body = request.path == "/long" ? body : "short\n"});
+                                      return true;
+                                    });
+  ASSERT_TRUE(server.ok()) << server.status();
+  Connection reads_nothing((*server)->address());
+  reads_nothing.Send(Get("/long"));
+  Connection next((*server)->address());
+  next.Send(Get("/short"));
+  EXPECT_THAT(next.ReadTo("short\n"), StartsWith("HTTP/1.1 200 "));
+}
+
 TEST_F(HttpServer, ClosesIdleConnections) {
   Start({.idle_limit_ns = 20 * sync::kMillisecond});
   Connection connection(server_->address());
@@ -266,8 +338,32 @@ TEST_F(HttpServer, FurtherConnectionsWaitForTheirTurn) {
   EXPECT_THAT(second.ReadTo("hello\n"), StartsWith("HTTP/1.1 200 "));
   Connection third(server_->address());
   third.Send(Get("/hello"));
+  const auto not_yet = [&](const Connection& waits) {
+    for (int i = 0; i < 20; ++i) {  // the server's thread has looked at whatever had come before
+      second.Send(Get("/hello"));
+      EXPECT_THAT(second.ReadTo("hello\n"), StartsWith("HTTP/1.1 200 "));
+    }
+    return !waits.Readable();
+  };
+  EXPECT_TRUE(not_yet(third));
   first.reset();
   EXPECT_THAT(third.ReadTo("hello\n"), StartsWith("HTTP/1.1 200 "));
+  Connection fourth(server_->address());
+  fourth.Send(Get("/hello"));
+  EXPECT_TRUE(not_yet(fourth));
+}
+
+TEST_F(HttpServer, ThePortIsThereForTheNextAtOnce) {
+  Start();
+  Connection open(
+      server_->address());  // which the server ends, and its system remembers for a minute
+  open.Send(Get("/hello"));
+  EXPECT_THAT(open.ReadTo("hello\n"), StartsWith("HTTP/1.1 200 "));
+  const Address address = server_->address();
+  server_.reset();
+  const auto next =
+      Server::Start({.listen = address}, [](const Request&, const Done&) { return false; });
+  EXPECT_TRUE(next.ok()) << next.status();
 }
 
 TEST_F(HttpServer, MayGoBeforeItsAnswers) {
@@ -284,6 +380,9 @@ TEST_F(HttpServer, ServesAUnixSocketAndRemovesIt) {
   const std::string path = absl::StrCat(::testing::TempDir(), "/voxeld-http-", getpid(), ".sock");
   Start({.listen = *ParseAddress(absl::StrCat("unix:", path))});
   EXPECT_THAT(Ask(Get("/hello")), StartsWith("HTTP/1.1 200 "));
+  struct stat file;
+  ASSERT_EQ(stat(path.c_str(), &file), 0);
+  EXPECT_EQ(file.st_mode & 07777, mode_t{0660});
   server_.reset();
   EXPECT_NE(access(path.c_str(), F_OK), 0);
 }
