@@ -183,7 +183,9 @@ class Memory(Fault):
         if cell.daemon.poll() is None:
             subprocess.run(["prlimit", "--pid", str(cell.daemon.pid), "--as=unlimited"], check=True)
             assert self.refused, "it had no memory for it, and nobody was told"
+            self.clients_are_cut = False
         else:
+            assert cell.daemon.returncode == 1, f"ended with {cell.daemon.returncode}: {cell.said()[-2000:]}"
             self.log, self.health, self.moved = "cannot go on|bad_alloc|out of memory", "", ()
             self.cannot_know = {"health": "it has ended", "moved": "it has ended"}
 
@@ -346,6 +348,7 @@ class Network(Fault):
     def __init__(self, how: str) -> None:
         self.how = how
         if how == "stalls":
+            self.clients_are_cut = False
             self.moved = (r'voxeld_commit_sending_seconds\{stat="max"\}',)
             self.cannot_know = dict.fromkeys(TOLD - {"moved"}, "a client of which nothing comes may have nothing to say; that commits came late is known once they come")
         else:

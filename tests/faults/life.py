@@ -153,6 +153,33 @@ class Life:
             self.told.shown = bool(red.any())
 
 
+def refuses(life: Life) -> str:
+    """What it says to one more client that draws as the first did, three times; nothing: it serves, as it should whatever failed once."""
+    told, life.told = life.told, Told()
+    try:
+        for _ in range(3):  # each new thread may meet a failure of its own
+            life.told.failed.clear()
+            life.step("draw afterwards", life.draw)
+            if not life.told.failed:
+                return ""
+        return f"it serves nobody afterwards: {life.told.failed}"
+    finally:
+        life.told = told
+
+
+def descriptors(pid: int, most: int) -> int:
+    """How many a process has, once there are no more than `most`, or after a while."""
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        try:
+            have = len(os.listdir(f"/proc/{pid}/fd"))
+        except OSError:
+            return 0
+        if have <= most or time.monotonic() > deadline:
+            return have
+        time.sleep(0.02)  # connections close by themselves, and nothing tells when
+
+
 def end(process: "subprocess.Popen[str]", pid: int) -> Optional[int]:
     """Its exit status when it was asked to end; None: it had to be killed."""
     if pid:

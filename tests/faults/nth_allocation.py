@@ -25,12 +25,11 @@ import re
 import subprocess
 import sys
 import tempfile
-import time
 import urllib.request
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from life import PATIENCE, Ending, Life, again, end, judge
+from life import PATIENCE, Ending, Life, again, descriptors, end, judge
 from programs import program
 
 # Who may end the process where it asked for memory itself: by an abort, or since it does not look at what it got (fontconfig, OpenSSL).
@@ -61,19 +60,6 @@ def place_of(line: str) -> Place:
     return Place(site, int(count), stack)
 
 
-def descriptors(process: "subprocess.Popen[str]", most: int) -> int:
-    """How many it has, once there are no more than `most`, or after a while."""
-    deadline = time.monotonic() + PATIENCE
-    while True:
-        try:
-            have = len(os.listdir(f"/proc/{process.pid}/fd"))
-        except OSError:
-            return 0
-        if have <= most or time.monotonic() > deadline:
-            return have
-        time.sleep(0.02)  # connections close by themselves, and nothing tells when
-
-
 def failures(life: Life) -> int:
     """That the daemon counts itself; -1: it does not tell."""
     try:
@@ -93,7 +79,7 @@ def run(way: str, place: Place, most_descriptors: int) -> Result:
             "FAIL_MALLOC_TIMES": {"reserve": "1", "bare": "2", "forever": "0"}[way]})
         is_ready, wrong = life.lived(process, lambda: process.pid)
         alive = process.poll() is None
-        left = descriptors(process, most_descriptors)
+        left = descriptors(process.pid, most_descriptors)
         counted = failures(life) if alive and told.exists() else -1  # it may come with the end
         status = end(process, process.pid)
         said = life.said()
@@ -149,7 +135,7 @@ def places() -> tuple[list[Place], int]:
         if not life.ready(process):
             sys.exit(f"voxeld does not start: {life.said()}")
         life.live()
-        rest = descriptors(process, 0)  # what it comes down to
+        rest = descriptors(process.pid, 0)  # what it comes down to
         status = end(process, process.pid)
         if life.told.failed or not life.told.shown or not life.told.durable:
             sys.exit(f"unharmed it failed: {life.told}")

@@ -2,6 +2,7 @@
 """Plants each of the defects of tests/simulation/mutants in a copy of the tree, one at a time, and has the simulation look for it.
 
     tests/simulation/mutants.py [--scratch DIR] [--seeds N] [--jobs N] [--json FILE] [NAME …]
+    tests/simulation/mutants.py --check     only whether each still fits the tree, and builds nothing
 
 NAME: those whose file names hold it; none: all. A copy of the tree is built in DIR (build/mutants), by the
 preset "host" without CUDA. Prints a table: the defect, the first seed that finds it, what was found wrong. Ends with 0 if all were
@@ -76,6 +77,7 @@ def main():
     parser.add_argument("--seeds", type=int, default=20000)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--json", type=pathlib.Path)
+    parser.add_argument("--check", action="store_true")
     parser.add_argument("names", nargs="*")
     options = parser.parse_args()
     source, build = options.scratch.resolve(), options.scratch.resolve() / "build" / "host"
@@ -83,6 +85,11 @@ def main():
                if not options.names or any(name in patch.stem for name in options.names)]
     if not patches:
         sys.exit(f"no defect in {HERE / 'mutants'} is called {' or '.join(options.names)}")
+    if options.check:
+        unfit = [patch.stem for patch in patches
+                 if subprocess.run(["git", "apply", "--check", patch], cwd=ROOT, check=False).returncode != 0]
+        print(f"{len(patches) - len(unfit)} of {len(patches)} fit{': not ' if unfit else ''}{', '.join(unfit)}")
+        return 1 if unfit or len(patches) < 20 and not options.names else 0
     copy_tree(source)
     configure(source, build)
     build_simulation(source, build, options.jobs)
