@@ -1,4 +1,4 @@
-// What a faulty worker is told (faults.h), for as long as this lives.
+// What a faulty worker is told (faults.h, liar.h), for as long as this lives.
 #pragma once
 
 #include <cstdlib>
@@ -9,15 +9,17 @@ namespace voxeld::gpu {
 class FaultEnvironment {
  public:
   struct Fault {
-    std::string frame, color, kind;  // empty: not set
+    std::string frame, color, kind, lie;  // empty: not set
   };
   explicit FaultEnvironment(const Fault& fault) {
     setenv("VOXELD_FAULT_FRAME", fault.frame.c_str(), 1);
     setenv("VOXELD_FAULT_COLOR", fault.color.c_str(), 1);
     setenv("VOXELD_FAULT_KIND", fault.kind.c_str(), 1);
+    setenv("VOXELD_FAULT_LIE", fault.lie.c_str(), 1);
   }
   ~FaultEnvironment() {
-    for (const char* name : {"VOXELD_FAULT_FRAME", "VOXELD_FAULT_COLOR", "VOXELD_FAULT_KIND"}) {
+    for (const char* name :
+         {"VOXELD_FAULT_FRAME", "VOXELD_FAULT_COLOR", "VOXELD_FAULT_KIND", "VOXELD_FAULT_LIE"}) {
       unsetenv(name);
     }
   }

@@ -1,5 +1,7 @@
 // A stand-in for voxeld-engine that fails when faults.h says so, without a GPU: asked for CUDA, it
-// is the CPU engine by another name. VOXELD_FAULT_KIND: crash (the default), exit, hang, dataloss, exhausted.
+// is the CPU engine by another name. VOXELD_FAULT_KIND: crash (the default), exit, hang, dataloss, exhausted. And one that lies when
+// liar.h says so.
+#include <cstdlib>
 #include <string>
 #include <utility>
 
@@ -7,6 +9,7 @@
 #include "gpu/worker/process.h"
 #include "gpu/worker/worker_server.h"
 #include "tests/gpu/worker/faults.h"
+#include "tests/gpu/worker/liar.h"
 
 namespace voxeld::gpu {
 namespace {
@@ -23,7 +26,9 @@ int Main() {
   BecomeWorker();
   WorkerHooks hooks;
   hooks.make_engine = MakeEngine;
-  ServeEngines(kWorkerSocket, hooks);
+  const char* const lie = std::getenv("VOXELD_FAULT_LIE");
+  ServeEngines(lie != nullptr && *lie != 0 ? ServeThroughALiar(kWorkerSocket, lie) : kWorkerSocket,
+               hooks);
 }
 
 }  // namespace

@@ -29,8 +29,12 @@ class FaultyWorker : public ::testing::Test {
   // `fault`: its kind and, behind a colon, its frame.
   conformance::EngineDriver Make(const std::string& fault, int64_t deadline_ns = 20'000'000'000) {
     const size_t colon = fault.find(':');
-    const FaultEnvironment environment(
-        {.frame = fault.substr(colon + 1), .kind = fault.substr(0, colon)});
+    return MakeWith({.frame = fault.substr(colon + 1), .kind = fault.substr(0, colon)},
+                    deadline_ns);
+  }
+  static conformance::EngineDriver MakeWith(const FaultEnvironment::Fault& fault,
+                                            int64_t deadline_ns = 20'000'000'000) {
+    const FaultEnvironment environment(fault);
     EngineOptions options;
     options.kind = EngineKind::kCpu;
     options.threads = 1;
@@ -59,6 +63,27 @@ TEST_F(FaultyWorker, ThatCrashesEndsThisCallAndEveryLaterOneInDataLoss) {
     delta.Reset();
     EXPECT_EQ(engine.Apply(delta).code(), absl::StatusCode::kDataLoss);
   }
+}
+
+TEST_F(FaultyWorker, ThatLiesIsNotBelieved) {
+  const std::vector<std::pair<const char*, const char*>> lies = {
+      {"call", ", of which no answer is owed"},
+      {"type", "the worker's answer to a frame is none"},
+      {"short", "the worker's answer to a frame is none"},
+      {"frame", "the worker answered with another frame"},
+      {"sum", "a frame was damaged on its way from the worker"},
+      {"done", "a frame without a result"}};
+  for (const auto& [lie, what] : lies) {
+    SCOPED_TRACE(lie);
+    conformance::EngineDriver engine = MakeWith({.lie = lie});
+    ASSERT_TRUE(engine.SetTarget(target_).ok());
+    const absl::Status refused = engine.Frame().status();
+    EXPECT_EQ(refused.code(), absl::StatusCode::kDataLoss) << refused;
+    EXPECT_THAT(refused.message(), HasSubstr(what));
+  }
+  conformance::EngineDriver honest = MakeWith({.lie = "not at all"});
+  ASSERT_TRUE(honest.SetTarget(target_).ok());
+  EXPECT_TRUE(honest.Frame().ok()) << "whoever stands between passes on what is true";
 }
 
 TEST_F(FaultyWorker, ThatHangsIsGivenUp) {
