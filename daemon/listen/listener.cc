@@ -80,10 +80,11 @@ class Listener::Impl {
     Reserve();
     epoll_.Reset(epoll_create1(EPOLL_CLOEXEC));
     wake_.Reset(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
-    if (!epoll_.ok() || !wake_.ok() || !reserve_.ok())
-      return absl::ErrnoToStatus(errno, "the listener");
-    Watch(wake_.get(), EPOLLIN, kWake);
-    for (size_t i = 0; i < sockets_.size(); ++i) Watch(sockets_[i].descriptor(), EPOLLIN, 1 + i);
+    bool ready = epoll_.ok() && wake_.ok() && reserve_.ok() && Watch(wake_.get(), EPOLLIN, kWake);
+    for (size_t i = 0; ready && i < sockets_.size(); ++i) {
+      ready = Watch(sockets_[i].descriptor(), EPOLLIN, 1 + i);
+    }
+    if (!ready) return absl::ErrnoToStatus(errno, "the listener");
     thread_ = std::thread([this] { Run(); });
     return absl::OkStatus();
   }

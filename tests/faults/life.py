@@ -167,9 +167,9 @@ def refuses(life: Life) -> str:
         life.told = told
 
 
-def descriptors(pid: int, most: int) -> int:
+def descriptors(pid: int, most: int, patience: float = PATIENCE) -> int:
     """How many a process has, once there are no more than `most`, or after a while."""
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + patience
     while True:
         try:
             have = len(os.listdir(f"/proc/{pid}/fd"))

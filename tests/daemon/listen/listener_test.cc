@@ -154,6 +154,17 @@ class ListenerTest : public ::testing::Test {
   std::unique_ptr<Listener> listener_;
 };
 
+TEST_F(ListenerTest, ASocketThatCannotBeWatchedIsAnErrorAtTheStart) {
+  std::vector<ListeningSocket> sockets = *ListeningSocket::Listen(*ParseAddress("127.0.0.1:0"));
+  const ListeningSocket elsewhere(
+      std::move(sockets.front()));  // the one that stays has no descriptor
+  guard_ = std::make_unique<Guard>(ConnectionLimits(), clock_, counters_, nullptr);
+  const auto serve = [](const Accepted&, const Descriptor&) { return true; };
+  const absl::Status refused =
+      Listener::Start(std::move(sockets), *guard_, counters_, own_, clock_, serve, {}).status();
+  EXPECT_EQ(refused.message(), "the listener: Bad file descriptor");
+}
+
 TEST_F(ListenerTest, AHostWithSeveralNumbersHasOnePort) {
   const std::vector<SocketName> names = Start("localhost:0");
   ASSERT_FALSE(names.empty());
