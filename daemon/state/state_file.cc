@@ -63,7 +63,7 @@ absl::Status StateFile::Fault(int code, const char* what) const {
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
       return absl::AlreadyExistsError(
-          absl::StrCat(text, "; another daemon has it: give each its own state_dir"));
+          absl::StrCat(text, "; another daemon has it: give each its own folder, [state] dir"));
     case SQLITE_FULL:
       return absl::ResourceExhaustedError(absl::StrCat(text, "; make room on its disk"));
     default:
@@ -128,7 +128,7 @@ absl::Status StateFile::Prepare() {
   if (application != kApplicationId && (application != 0 || tables != 0)) {
     return absl::FailedPreconditionError(
         absl::StrCat(options_.path,
-                     " is a database of something else; move it away, or give another state_dir"));
+                     " is a database of something else; move it away, or give another folder, [state] dir"));
   }
   if (version > kVersion) {
     return absl::FailedPreconditionError(

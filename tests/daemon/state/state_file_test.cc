@@ -120,6 +120,7 @@ TEST_F(StateFileTest, WhatIsNoDatabaseIsPutAside) {
 TEST_F(StateFileTest, TriggersAndTablesOfOthersHaveNoSay) {
   for (const char* sql :
        {"CREATE TRIGGER t AFTER INSERT ON rows BEGIN DELETE FROM rows; END", "CREATE TABLE more(a)",
+        "CREATE VIEW seen AS SELECT 1",
         "DROP TABLE rows; CREATE TABLE rows(kind, owner, name, id, bytes CHECK(bytes = 'a'))"}) {
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directory(folder_);

@@ -140,5 +140,23 @@ TEST(Kept, AnEntityLivesAsLongAsItHasLeft) {
   EXPECT_THAT(std::string(wrong.message()), HasSubstr("upsert.entity.primitive.sphere.radius: "));
 }
 
+TEST(Kept, ALifetimeOfCenturiesIsNotOverAfterwards) {
+  v1::KeptEntity row;
+  row.mutable_entity()->mutable_primitive()->mutable_sphere()->set_radius(1);
+  const TwoClocks now{.monotonic_ns = 5, .unix_ns = 1'700'000'000'000'000'000};
+  const auto decoded = [&](const std::string& bytes) {
+    auto entity = DecodeKeptEntity("l", "e", bytes, now, {}, nullptr, nullptr);
+    EXPECT_TRUE(entity.ok() && entity->has_value()) << entity.status();
+    return std::get<Upsert>((**entity).op).entity;
+  };
+  Entity entity;
+  entity.data = decoded(row.SerializeAsString());
+  constexpr int64_t kLast = std::numeric_limits<int64_t>::max();
+  entity.expires_ns = kLast - 1;
+  const absl::StatusOr<std::string> kept = EncodeKept(entity, now);
+  ASSERT_TRUE(kept.ok()) << kept.status();
+  EXPECT_EQ(decoded(*kept).lifetime_ns, kLast - now.unix_ns) << "until the last time that there is";
+}
+
 }  // namespace
 }  // namespace voxeld::daemon::wire

@@ -48,7 +48,8 @@ std::string WhyUnreachable(absl::string_view grpc_says, const std::string& addre
   }
   return credentials.certificate.empty()
              ? "it ended the connection: it asks for a certificate, and none is given; "
-               "VOXELD_TLS_CERT and VOXELD_TLS_KEY name one's files"
+               "VOXELD_TLS_CERT and VOXELD_TLS_KEY name one's files; or what listens there is no "
+               "voxeld with TLS"
              : absl::StrCat("it ended the connection: the certificate in ",
                             EscapeForTerminal(credentials.certificate),
                             " is not taken, or what listens there is no voxeld with TLS");
