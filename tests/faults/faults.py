@@ -418,11 +418,11 @@ class CertificateBroken(Fault):
 
 
 FAULTS: dict[str, Callable[[], Fault]] = {
-    "usb_stall": lambda: Usb("stall@t{out}", "transfers failed", "transfers_failed", "slices_resent"),
-    "usb_time_out": lambda: Usb("nak:2500@t{out}", "transfers failed", "transfers_failed", "slices_resent"),
+    "usb_stall": lambda: Usb("stall@t{out}", "transfers failed", "transfers_failed"),
+    "usb_time_out": lambda: Usb("nak:2500@t{out}", "transfers failed", "transfers_failed"),
     "usb_babble": lambda: Usb("babble:2@t{into}/in", "transfers failed", "transfers_failed"),
     "usb_protocol_error": lambda: Usb("error:8@t{out}", "transfers failed 6 times in a row", "transfers_failed", "volumes_lost", "attaches"),
-    "usb_short": lambda: Usb("partial:100@t{out}", "transfers failed", "transfers_failed", "slices_resent"),
+    "usb_short": lambda: Usb("partial:100@t{out}", "transfers failed", "transfers_failed"),
     "usb_unplug": lambda: Usb("unplug:600@t{out}", "the device was unplugged", "attaches"),
     "usb_reset": lambda: Usb("unplug:30@t{out}", "the device was unplugged", "attaches"),
     "engine_killed": lambda: WorkerLost(signal.SIGKILL), "engine_hangs": lambda: WorkerLost(signal.SIGSTOP),
