@@ -28,8 +28,6 @@ namespace {
 
 using std::chrono::steady_clock;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::SizeIs;
 
 // Until it holds; false after a generous time.
 bool Await(const std::function<bool()>& holds) {
@@ -416,7 +414,7 @@ TEST_F(ListenerTest, AcceptsAgainWhenDescriptorsComeBack) {
       const FewDescriptors few(cycle % 2 == 0 ? 5 : 4);  // two connections; and an odd descriptor
       const uint64_t failures = counters_.Read().accept_failures;
       for (Descriptor& client : clients) {
-        connect(client.get(), names[0].get(), names[0].length);
+        (void)connect(client.get(), names[0].get(), names[0].length);
         Speak(client.get());  // in the system's queue it has been connected with
       }
       ASSERT_TRUE(Await([&] { return counters_.Read().accept_failures > failures; }));
