@@ -126,9 +126,9 @@ absl::Status StateFile::Prepare() {
   if (status.ok()) status = number("SELECT count(*) FROM sqlite_schema", &tables);
   if (!status.ok()) return status;
   if (application != kApplicationId && (application != 0 || tables != 0)) {
-    return absl::FailedPreconditionError(
-        absl::StrCat(options_.path,
-                     " is a database of something else; move it away, or give another folder, [state] dir"));
+    return absl::FailedPreconditionError(absl::StrCat(
+        options_.path,
+        " is a database of something else; move it away, or give another folder, [state] dir"));
   }
   if (version > kVersion) {
     return absl::FailedPreconditionError(
