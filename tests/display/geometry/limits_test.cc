@@ -33,6 +33,17 @@ PlanarStack OnePixelStack(std::vector<double> positions, int strokes = 1) {
   return stack;
 }
 
+// As wide and high in pixels, as high as it is far from its axis.
+Helix HelixOf(int slices, int pixels, int blades, double span_turns, double mm) {
+  Helix helix;
+  helix.slices_per_turn = slices;
+  helix.width_px = helix.height_px = pixels;
+  helix.blades = blades;
+  helix.span_turns = span_turns;
+  helix.height_mm = helix.radius_mm = mm;
+  return helix;
+}
+
 TEST(Limits, PicturesTogether) {
   PlanarStack stack = OnePixelStack(EvenPositions(64, 1, 0));
   stack.width_px = stack.height_px = 16384;  // 2^34 pixels
@@ -40,12 +51,7 @@ TEST(Limits, PicturesTogether) {
   stack.positions_mm = EvenPositions(65, 1, 0);
   EXPECT_THAT(ShapeRefusal({stack, {}}),
               HasSubstr("is 17448304640: it must be at most 17179869184"));
-  Helix helix;
-  helix.slices_per_turn = 65;
-  helix.width_px = helix.height_px = 16384;
-  helix.blades = 1;
-  helix.span_turns = 0.1;
-  helix.height_mm = helix.radius_mm = 1;
+  Helix helix = HelixOf(65, 16384, 1, 0.1, 1);
   EXPECT_THAT(ShapeRefusal({helix, {}}), HasSubstr("(65·16384·16384) is 17448304640"));
   helix.slices_per_turn = 64;
   EXPECT_TRUE(ValidateShape({helix, {}}).ok());
@@ -170,12 +176,7 @@ TEST(Limits, TableWhereFootprintsAreKeptPixelByPixel) {
   stack.strokes = 2;
   EXPECT_THAT(GridRefusal({stack, CentredGrid(1024, 1024, 64, {1, 1, 1}), Correction{}}),
               HasSubstr("table is 268436160:"));  // 4 passes: 2^28 + 192 + 512
-  Helix helix;
-  helix.slices_per_turn = 20;
-  helix.width_px = helix.height_px = 16;
-  helix.blades = 3;
-  helix.span_turns = 0.25;
-  helix.height_mm = helix.radius_mm = 8;
+  const Helix helix = HelixOf(20, 16, 3, 0.25, 8);
   EXPECT_THAT(GridRefusal({helix, CentredGrid(1024, 1024, 64, {1, 1, 1})}),
               HasSubstr("table is 402660864:"));  // 6 passes: 6 · 2^26 + 5120 + 2560
   Rotor rotor;
@@ -200,11 +201,7 @@ TEST(Limits, RowsInWholeBytesPixelByPixel) {
 }
 
 TEST(Limits, WhatAHelixSpans) {
-  Helix helix;
-  helix.slices_per_turn = helix.width_px = helix.height_px = 4;
-  helix.height_mm = helix.radius_mm = 1;
-  helix.blades = 2;
-  helix.span_turns = 0.1;
+  Helix helix = HelixOf(4, 4, 2, 0.1, 1);
   EXPECT_EQ(ShapeRefusal({helix, {}}), "");
   helix.span_turns = 0.5;
   EXPECT_EQ(ShapeRefusal({helix, {}}), "");
