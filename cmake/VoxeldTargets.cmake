@@ -63,7 +63,8 @@ if(VOXELD_SANITIZE MATCHES "address" AND CMAKE_CXX_COMPILER_ID MATCHES "Clang" A
   target_compile_options(voxeld_options INTERFACE -fsanitize-coverage=inline-8bit-counters,pc-table)
 endif()
 if(VOXELD_COVERAGE)
-  target_compile_options(voxeld_options INTERFACE -fprofile-instr-generate -fcoverage-mapping)
+  # Atomic, since threads that count at once would otherwise lose counts.
+  target_compile_options(voxeld_options INTERFACE -fprofile-instr-generate -fcoverage-mapping -fprofile-update=atomic)
   target_link_options(voxeld_options INTERFACE -fprofile-instr-generate)
 endif()
 include(VoxeldHardening)

@@ -117,7 +117,7 @@ gpu::EngineOptions EngineOf(gpu::EngineOptions engine, const std::vector<int>& g
 }
 
 absl::StatusOr<std::unique_ptr<http::Server>> StartHttp(
-    const ServerConfig& config, Core& core, std::shared_ptr<const std::atomic<bool>> draining,
+    const ServerConfig& config, Core& core, std::shared_ptr<const std::atomic<http::Phase>> phase,
     viewer::Viewer& viewer, std::function<void(const std::string&)> accept_failed, Logger& log) {
   if (!config.http.has_value()) return nullptr;
   absl::StatusOr<std::unique_ptr<http::Server>> server =
@@ -125,7 +125,7 @@ absl::StatusOr<std::unique_ptr<http::Server>> StartHttp(
                            .max_connections = config.max_http_connections,
                            .idle_limit_ns = config.http_idle_limit_ns,
                            .accept_failed = std::move(accept_failed)},
-                          viewer.Handler(http::MonitorHandler(core, std::move(draining))),
+                          viewer.Handler(http::MonitorHandler(core, std::move(phase))),
                           viewer.Upgrade(), viewer.Receive());
   if (server.ok() || config.http_asked || !absl::IsAlreadyExists(server.status())) return server;
   log.Warn("no http port", {{"why", std::string(server.status().message())},
@@ -300,7 +300,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   } else if (config.server.http.has_value() && config.server.http_control && TellsControl(config)) {
     play = play::SetUpPlaying(config.server.listen);
   }
-  const auto draining = std::make_shared<std::atomic<bool>>(false);
+  const auto phase = std::make_shared<std::atomic<http::Phase>>(http::Phase::kStarting);
   absl::StatusOr<std::unique_ptr<viewer::Viewer>> viewer = viewer::Viewer::Make(
       core, clock,
       {.version = Version(),
@@ -312,7 +312,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
                 .max_bytes = config.server.http_max_upload_bytes}});
   if (!viewer.ok()) return Fail(1, viewer.status());
   absl::StatusOr<std::unique_ptr<http::Server>> http =
-      StartHttp(config.server, core, draining, **viewer, counters->Noting(clock, log), log);
+      StartHttp(config.server, core, phase, **viewer, counters->Noting(clock, log), log);
   if (!http.ok()) return Fail(1, http.status());
   const absl::StatusOr<std::optional<Address>> local_address = LocalSocketAddress(config.server);
   if (!local_address.ok()) return Fail(1, local_address.status());
@@ -373,6 +373,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   });
 
   watch.Tell([server = server->get()](bool serving) { server->SetServing(serving); });
+  *phase = http::Phase::kServing;
 
   log.Info("voxeld",
            {{"version", Version()}, {"config", config.file.empty() ? "defaults" : config.file}});
@@ -418,7 +419,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   ticker.reset();
   security->access().SetOnChange(nullptr);
   log.Info("shutting down", {{"signal", signal == SIGTERM ? "SIGTERM" : "SIGINT"}});
-  *draining = true;
+  *phase = http::Phase::kEnding;
   watch.Tell(nullptr);
   if (play.player != nullptr) play.player->End();
   (*server)->Shutdown(kServerLimit);

@@ -221,7 +221,7 @@ absl::Status CheckReach(const Address& address, const SecurityConfig& security) 
   }
   return absl::InvalidArgumentError(absl::StrCat(
       address.ToString(),
-      " can be reached from other machines, and all that goes over it could be read and changed; "
+      " may be reached from other machines, and all that goes over it could be read and changed; "
       "give tls:",
       address.ToString(),
       " with tls_certificate, tls_key and tls_client_ca, an "

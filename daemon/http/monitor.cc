@@ -18,10 +18,11 @@ Response Unavailable(const absl::Status& status) {
 }  // namespace
 
 Response HealthResponse(const std::vector<DisplayDescription>& displays, const Stats& stats,
-                        bool draining) {
+                        Phase phase) {
   Json reasons = Json::array();
   bool held = false;
-  if (draining) reasons.push_back({{"what", "shutting down"}});
+  if (phase == Phase::kStarting) reasons.push_back({{"what", "starting"}});
+  if (phase == Phase::kEnding) reasons.push_back({{"what", "shutting down"}});
   for (const DisplayDescription& display : displays) {
     if (display.state != display::DisplayState::kLost &&
         display.state != display::DisplayState::kStopped) {
@@ -82,8 +83,8 @@ Response HealthResponse(const std::vector<DisplayDescription>& displays, const S
           answer.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n"};
 }
 
-Handler MonitorHandler(Core& core, std::shared_ptr<const std::atomic<bool>> draining) {
-  return [&core, draining](const Request& request, Done done) {
+Handler MonitorHandler(Core& core, std::shared_ptr<const std::atomic<Phase>> phase) {
+  return [&core, phase](const Request& request, Done done) {
     const std::string_view path = request.path;
     if (path == "/metrics") {
       core.GetStats([done](absl::StatusOr<Stats> stats) {
@@ -93,15 +94,14 @@ Handler MonitorHandler(Core& core, std::shared_ptr<const std::atomic<bool>> drai
       return true;
     }
     if (path == "/healthz") {
-      core.ListDisplays(
-          [&core, draining, done](absl::StatusOr<std::vector<DisplayDescription>> displays) {
-            if (!displays.ok()) return done(Unavailable(displays.status()));
-            core.GetStats(
-                [draining, done, displays = *std::move(displays)](absl::StatusOr<Stats> stats) {
-                  if (!stats.ok()) return done(Unavailable(stats.status()));
-                  done(HealthResponse(displays, *stats, *draining));
-                });
-          });
+      core.ListDisplays([&core, phase,
+                         done](absl::StatusOr<std::vector<DisplayDescription>> displays) {
+        if (!displays.ok()) return done(Unavailable(displays.status()));
+        core.GetStats([phase, done, displays = *std::move(displays)](absl::StatusOr<Stats> stats) {
+          if (!stats.ok()) return done(Unavailable(stats.status()));
+          done(HealthResponse(displays, *stats, *phase));
+        });
+      });
       return true;
     }
     return false;

@@ -14,6 +14,7 @@
 #include "absl/strings/str_split.h"
 #include "daemon/core/token.h"
 #include "daemon/viewer/page_files.h"
+#include "daemon/viewer/page_message.h"
 #include "daemon/viewer/viewer_socket.h"
 
 namespace voxeld::daemon::viewer {
@@ -154,7 +155,7 @@ class Viewer::Impl {
     } else if (request.origin.empty()) {
       refused.refusal = Plain(403, "files are taken from pages, which say where they are from");
     } else if (!HasControl(request)) {
-      refused.refusal = Plain(403, kOnlyLook);
+      refused.refusal = Plain(403, page::kOnlyLook);
     } else {
       return play_->Receive(request.query);
     }

@@ -7,11 +7,10 @@
 #include <optional>
 #include <utility>
 
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "daemon/core/volume_feed.h"
+#include "daemon/viewer/page_message.h"
 #include "daemon/viewer/volume_message.h"
-#include "daemon/wire/convert.h"
 #include "daemon/wire/encode.h"
 #include "voxeld/v1/display.pb.h"
 #include "voxeld/v1/scene.pb.h"
@@ -23,7 +22,6 @@ using Json = nlohmann::json;
 
 constexpr size_t kMostWatches = 16;
 constexpr size_t kMostWatchesInAll = 64;
-constexpr size_t kMostHidden = 256;  // layers
 
 std::string ToJson(const google::protobuf::Message& message) {
   google::protobuf::util::JsonPrintOptions options;
@@ -78,20 +76,9 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
   ~ViewerSocket() { shared_->watches -= watches_.size(); }
 
   void OnText(const std::string& text) {
-    const Json message = Json::parse(text, nullptr, false);
-    if (!message.is_object()) return Complain("a message is a JSON object");
-    if (message.contains("hello")) return Hello();
-    if (message.contains("watch")) return Watch(message);
-    if (message.contains("shown")) return Shown(message["shown"]);
-    if (message.contains("unwatch")) return Unwatch(message["unwatch"]);
-    if (message.contains("dark")) return Dark(message["dark"]);
-    if (message.contains("compare")) return Compare(message);
-    if (message.contains("stats")) return Stats();
-    if (message.contains("layers")) return Layers();
-    if (message.contains("update")) return Update(message["update"]);
-    if (message.contains("clear")) return Clear(message["clear"]);
-    if (message.contains("stop")) return control_ ? shared_->play->Stop() : Complain(kOnlyLook);
-    Complain("there is no such message; see docs/protocols/viewer.md");
+    absl::StatusOr<page::Message> message = page::Read(text, control_);
+    if (!message.ok()) return Complain(std::string(message.status().message()));
+    std::visit([this](const auto& what) { On(what); }, *message);
   }
 
  private:
@@ -121,7 +108,7 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
         };
   }
 
-  void Hello() {
+  void On(const page::Hello&) {
     if (!Begin(Asked::kHello)) return;
     using Displays = std::vector<DisplayDescription>;
     shared_->core.ListDisplays(
@@ -139,17 +126,8 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
         }));
   }
 
-  static std::optional<uint16_t> Number(const Json& json) {
-    if (!json.is_number_unsigned() || json.get<uint64_t>() > UINT16_MAX) return std::nullopt;
-    return json.get<uint16_t>();
-  }
-
-  void Watch(const Json& message) {
-    const std::optional<uint16_t> id = Number(message.value("id", Json()));
-    if (!id.has_value() || !message["watch"].is_string()) {
-      return Complain("watch names a display, and id is a number from 0 to 65535");
-    }
-    if (watches_.contains(*id) || watches_.size() >= kMostWatches) {
+  void On(const page::Watch& watch) {
+    if (watches_.contains(watch.id) || watches_.size() >= kMostWatches) {
       return Complain(absl::StrCat("a page has ", kMostWatches, " watches with different ids"));
     }
     if (shared_->watches >= kMostWatchesInAll) {
@@ -157,10 +135,10 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     }
     ++shared_->watches;
     const uint64_t serial = ++last_serial_;
-    watches_[*id].serial = serial;
+    watches_[watch.id].serial = serial;
     shared_->core.GetDisplay(
-        message["watch"].get<std::string>(),
-        Then<DisplayDescription>([id = *id, serial](ViewerSocket& self, auto display) {
+        watch.display,
+        Then<DisplayDescription>([id = watch.id, serial](ViewerSocket& self, auto display) {
           self.Start(id, serial, std::move(display));
         }));
   }
@@ -210,20 +188,14 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     peer_->Send(VolumeMessage(id, **change, *watch.places), true);
   }
 
-  void Shown(const Json& which) {
-    const std::optional<uint16_t> id = Number(which);
-    if (!id.has_value()) return Complain("shown is the id of a watch, 0 to 65535");
-    const auto found = id.has_value() ? watches_.find(*id) : watches_.end();
+  void On(const page::Shown& shown) {
+    const auto found = watches_.find(shown.id);
     if (found == watches_.end()) return;  // it may have ended meanwhile
     found->second.credit = true;
-    Pump(*id);
+    Pump(shown.id);
   }
 
-  void Unwatch(const Json& which) {
-    const std::optional<uint16_t> id = Number(which);
-    if (!id.has_value()) return Complain("unwatch is the id of a watch, 0 to 65535");
-    Drop(*id);
-  }
+  void On(const page::Unwatch& unwatch) { Drop(unwatch.id); }
 
   void Drop(uint16_t id) { shared_->watches -= watches_.erase(id); }
 
@@ -232,51 +204,27 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     peer_->Send(Text({{"ended", {{"id", id}, {"why", std::string(why.message())}}}}), false);
   }
 
-  void Dark(const Json& which) {
-    const std::optional<uint16_t> id = Number(which);
-    if (!id.has_value()) return Complain("dark is the id of a watch, 0 to 65535");
-    const auto found = id.has_value() ? watches_.find(*id) : watches_.end();
+  void On(const page::Dark& dark) {
+    const auto found = watches_.find(dark.id);
     if (found == watches_.end() || found->second.places == nullptr) return;
-    peer_->Send(DarkMessage(*id, *found->second.places), true);
+    peer_->Send(DarkMessage(dark.id, *found->second.places), true);
   }
 
-  void Compare(const Json& message) {
-    const std::optional<uint16_t> id = Number(message["compare"]);
-    if (!id.has_value()) return Complain("compare is the id of a watch, 0 to 65535");
-    const std::optional<std::vector<OwnedName>> hidden =
-        ReadLayers(message.value("without", Json::array()));
-    if (!hidden.has_value()) {
-      return Complain("without is a list of layers: {\"owner\": \"1\", \"layer\": \"name\"}");
-    }
-    const auto found = watches_.find(*id);
+  void On(const page::Compare& compare) {
+    const auto found = watches_.find(compare.id);
     if (found == watches_.end() || found->second.feed == nullptr) {
-      return Compared(*id, 0, absl::NotFoundError("there is no such watch"));
+      return Compared(compare.id, 0, absl::NotFoundError("there is no such watch"));
     }
     if (!Begin(Asked::kCompare)) {
-      return Compared(*id, 0, absl::FailedPreconditionError("another is compared for this page"));
+      return Compared(compare.id, 0,
+                      absl::FailedPreconditionError("another is compared for this page"));
     }
     shared_->core.GetShownScene(
         found->second.info->name,
-        Then<ShownScene>([id = *id, serial = found->second.serial, hidden = *hidden](
+        Then<ShownScene>([id = compare.id, serial = found->second.serial, hidden = compare.without](
                              ViewerSocket& self, absl::StatusOr<ShownScene> shown) {
           self.HoldAgainst(id, serial, hidden, std::move(shown));
         }));
-  }
-
-  // At most kMostHidden; nothing if it is no such list.
-  static std::optional<std::vector<OwnedName>> ReadLayers(const Json& json) {
-    std::vector<OwnedName> layers;
-    if (!json.is_array() || json.size() > kMostHidden) return std::nullopt;
-    for (const Json& each : json) {
-      uint64_t owner = 0;
-      if (!each.is_object() || !each.value("owner", Json()).is_string() ||
-          !each.value("layer", Json()).is_string() ||
-          !absl::SimpleAtoi(each["owner"].get<std::string>(), &owner)) {
-        return std::nullopt;
-      }
-      layers.push_back({owner, each["layer"].get<std::string>()});
-    }
-    return layers;
   }
 
   void HoldAgainst(uint16_t id, uint64_t serial, const std::vector<OwnedName>& hidden,
@@ -307,7 +255,7 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     peer_->Send(PointsMessage(MessageKind::kDifference, id, volume, comparison->difference), true);
   }
 
-  void Stats() {
+  void On(const page::Stats&) {
     if (!Begin(Asked::kStats)) return;
     shared_->core.GetStats(
         Then<daemon::Stats>([](ViewerSocket& self, absl::StatusOr<daemon::Stats> stats) {
@@ -319,7 +267,7 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
         }));
   }
 
-  void Layers() {
+  void On(const page::Layers&) {
     if (!Begin(Asked::kLayers)) return;
     EntityQuery query;
     query.page_size = 1;
@@ -334,17 +282,6 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
         }));
   }
 
-  // Whether what is asked is a control's to ask, and reads as the message that it has to be.
-  bool ReadControl(const Json& json, google::protobuf::Message* message) {
-    if (!control_) {
-      Complain(kOnlyLook);
-      return false;
-    }
-    const auto status = google::protobuf::util::JsonStringToMessage(Text(json), message);
-    if (!status.ok()) Complain(std::string(status.message()));
-    return status.ok();
-  }
-
   // `reply`, with the audit log's line written first, whether or not the socket is still there.
   template <typename Request, typename T>
   Core::Reply<T> Audited(const char* method, const Request& request, Core::Reply<T> reply) {
@@ -357,13 +294,10 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     };
   }
 
-  void Update(const Json& json) {
-    v1::UpdateDisplayRequest request;
-    if (!ReadControl(json, &request)) return;
-    absl::StatusOr<DisplayUpdate> update = wire::FromWire(request);
-    if (!update.ok()) return Complain(std::string(update.status().message()));
+  void On(const page::Update& update) {
+    const v1::UpdateDisplayRequest& request = update.request;
     shared_->core.UpdateDisplay(
-        request.name(), *std::move(update),
+        request.name(), update.update,
         Audited("UpdateDisplay", request,
                 Then<DisplayDescription>([](ViewerSocket& self, auto display) {
                   if (!display.ok()) return self.Complain(std::string(display.status().message()));
@@ -372,16 +306,17 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
                 })));
   }
 
-  void Clear(const Json& json) {
-    v1::ClearLayerRequest request;
-    if (!ReadControl(json, &request)) return;
+  void On(const page::Clear& clear) {
+    const v1::ClearLayerRequest& request = clear.request;
     shared_->core.ClearLayer(
         request.owner(), request.layer(), false, std::nullopt,
         Audited("ClearLayer", request, Then<Cleared>([](ViewerSocket& self, auto cleared) {
                   if (!cleared.ok()) return self.Complain(std::string(cleared.status().message()));
-                  self.Layers();
+                  self.On(page::Layers{});
                 })));
   }
+
+  void On(const page::Stop&) { shared_->play->Stop(); }
 
   const std::shared_ptr<ViewerShared> shared_;
   const std::shared_ptr<http::WebSocketPeer> peer_;

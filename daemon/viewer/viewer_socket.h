@@ -15,9 +15,6 @@
 
 namespace voxeld::daemon::viewer {
 
-inline constexpr char kOnlyLook[] =
-    "this page may only look: control is for the address that voxeld printed at its start";
-
 // What the sockets of one viewer share; on the http server's thread.
 struct ViewerShared {
   Core& core;

@@ -3,11 +3,13 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <variant>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "absl/strings/string_view.h"
 #include "display/geometry/cells.h"
 #include "display/geometry/corrector.h"
@@ -21,6 +23,13 @@
 namespace voxeld::display {
 namespace {
 
+// As many as tell it from its neighbours in a configuration: a value just beyond a limit does not look like the limit.
+template <typename Value>
+std::string Digits(Value value) {
+  if constexpr (std::is_floating_point_v<Value>) return absl::StrFormat("%.10g", value);
+  return absl::StrCat(value);
+}
+
 // Keeps the first thing that is wrong.
 class Checker {
  public:
@@ -30,8 +39,8 @@ class Checker {
   template <typename Value>
   void Require(bool holds, absl::string_view field, Value value, absl::string_view rule) {
     if (ok() && !holds) {
-      status_ =
-          absl::InvalidArgumentError(absl::StrCat(field, " is ", value, ": it must be ", rule));
+      status_ = absl::InvalidArgumentError(
+          absl::StrCat(field, " is ", Digits(value), ": it must be ", rule));
     }
   }
   void Count(absl::string_view field, int64_t value, int64_t most) {
@@ -40,7 +49,8 @@ class Checker {
   // NaN is in no range.
   void Number(absl::string_view field, double value, double least, double most) {
     if (!(value >= least && value <= most)) {
-      Require(false, field, value, absl::StrCat("from ", least, " to ", most, " mm"));
+      Require(false, field, value,
+              absl::StrCat("from ", Digits(least), " to ", Digits(most), " mm"));
     }
   }
   void Pitch(absl::string_view field, double mm) { Number(field, mm, kMinPitchMm, kMaxPitchMm); }

@@ -60,6 +60,26 @@ class Health(unittest.TestCase):
             time.sleep(0.02)
         self.assertEqual(got, want)
 
+    def test_it_is_well_once_clients_can_connect(self) -> None:
+        for _ in range(5):
+            http = free_port()
+            with tempfile.TemporaryDirectory() as folder:
+                daemon = subprocess.Popen([os.environ["VOXELD"], "--listen", f"unix:{folder}/s", "--http", f"127.0.0.1:{http}", "--log-level", "error",
+                                           "--engine", "cpu", "--display", "sim=simulated,size=8x8x8,rate=60"])
+                try:
+                    status = 0
+                    deadline = time.monotonic() + LONG
+                    while status != 200:
+                        self.assertLess(time.monotonic(), deadline)
+                        with contextlib.suppress(OSError):  # what is no 200 is one too
+                            with urllib.request.urlopen(f"http://127.0.0.1:{http}/healthz", timeout=LONG) as answer:
+                                status = answer.status
+                    with socket.socket(socket.AF_UNIX) as client:
+                        client.connect(f"{folder}/s")
+                finally:
+                    daemon.terminate()
+                    self.assertEqual(daemon.wait(LONG), 0)
+
     def test_a_display_that_is_lost_and_comes_back(self) -> None:
         http, port = free_port(), free_port()
         controller = Controller(port)

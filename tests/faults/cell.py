@@ -4,7 +4,6 @@ import json
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -19,17 +18,12 @@ from typing import Optional
 import numpy as np
 import voxeld as voxel
 
+from life import free_port
 from polling import LONG, until
 from programs import program
 
 DISPLAYS = 'driver = "simulated"\nsize = "16x16x12"\nrate = 60\n'
 HERE = Path(__file__).parent
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 class Cell:
@@ -73,7 +67,7 @@ class Cell:
     def reachable(self) -> bool:
         assert self.daemon.poll() is None, self.said()[-2000:]
         with contextlib.suppress(OSError, urllib.error.URLError):
-            return "status" in self.health()
+            return "status" in (health := self.health()) and '"starting"' not in health
         return False
 
     def said(self) -> str:

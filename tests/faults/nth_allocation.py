@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Every allocation of the daemon failed once: from each place that asks for memory, in the process and in the libraries of others, one allocation fails
-in an otherwise ordinary life of the real voxeld (life.py), and then it is started again on the same state, unharmed. A place is the four calls that
-led to it; what there is comes from a life in which nothing fails.
+in one of ten scenarios (scenarios.py) of the real voxeld, and then it is started again on the same state, unharmed. A place is the four calls that
+led to it; what there is comes from lives in which nothing fails, and each place fails in the first scenario that comes by it.
 
-usage: nth_allocation.py [--way reserve|bare|forever] [--sample N] [--seed N] [--sites HEX,…] [--jobs N] [--list] [--json]
+usage: nth_allocation.py [--scenarios NAME,…] [--way reserve|bare|forever] [--sample N] [--seed N] [--part K/N] [--within S] [--sites HEX,…] [--jobs N] [--list] [--json]
 
 The way that it fails:
   reserve   once: the daemon has its reserve, and nobody is to notice (the default)
@@ -16,11 +16,8 @@ was told to be durable is there after the next start, and in the end it has no m
 preloaded library) and PYTHONPATH; ends with 1 if one did not."""
 import argparse
 import collections
-import concurrent.futures
 import json
-import multiprocessing
 import os
-import random
 import re
 import subprocess
 import sys
@@ -29,11 +26,15 @@ import urllib.request
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from apart import add_options, chosen, each
 from life import PATIENCE, Ending, Life, again, descriptors, end, judge
 from programs import program
+from scenarios import SCENARIOS
 
 # Who may end the process where it asked for memory itself: by an abort, or since it does not look at what it got (fontconfig, OpenSSL).
 GIVES_UP = re.compile(r"^(libfontconfig|libcrypto|libssl|libgrpc|libgrpc\+\+|libgpr|libabsl_\w+|libprotobuf|libupb|libtbb|libstdc\+\+|ld-linux-x86-64)[^ ]*\.so")
+# Seconds in which connections that have ended are closed.
+SETTLES = 3.0
 ENDED = "voxeld: out of memory: there are no"
 
 
@@ -46,6 +47,7 @@ class Place:
 
 @dataclass
 class Result:
+    scenario: str
     way: str
     site: str
     how: str  # lived, refused, ended, late, hung, crashed, missed, known: …
@@ -70,9 +72,10 @@ def failures(life: Life) -> int:
         return -1
 
 
-def run(way: str, place: Place, most_descriptors: int) -> Result:
+def run(scenario: str, way: str, place: Place, most_descriptors: int) -> Result:
     with tempfile.TemporaryDirectory(prefix="voxeld-nth-") as name:
-        life = Life(Path(name), "" if way == "reserve" else "memory_reserve_bytes = 0" if way == "bare" else "")
+        life = SCENARIOS[scenario](Path(name), "memory_reserve_bytes = 0" if way == "bare" else "")
+        life.prepare()
         told = Path(name, "told")
         process = life.start(environment={
             "LD_PRELOAD": os.environ["FAIL_MALLOC"], "FAIL_MALLOC_SITE": place.site, "FAIL_MALLOC_TOLD": str(told),
@@ -93,10 +96,10 @@ def run(way: str, place: Place, most_descriptors: int) -> Result:
         ending = judge(life, status, is_ready, alive, f"{gives_up[1]} asked, and gives up" if gives_up else "")
         if way != "reserve" and is_ready and status == 1 and ENDED in said:
             ending = Ending("ended")  # be it on its way to the end
-        after = again(Path(name), life.told)
+        after = again(life)
         wrong = wrong or ending.wrong or after
         if not met:
-            return Result(way, place.site, "missed", stack, wrong, failed=life.told.failed)
+            return Result(scenario, way, place.site, "missed", stack, wrong, failed=life.told.failed)
         if way == "reserve":
             if ending.how != "lived":
                 wrong = wrong or f"{ending.how}: {said.strip().splitlines()[-1:]}"
@@ -110,15 +113,15 @@ def run(way: str, place: Place, most_descriptors: int) -> Result:
             wrong = wrong or "it ended, and did not say that there was no memory"
         if ending.how == "lived" and left > most_descriptors:
             wrong = wrong or f"{left} descriptors are left, of {most_descriptors}"
-        return Result(way, place.site, ending.how, stack, wrong, failed=life.told.failed)
+        return Result(scenario, way, place.site, ending.how, stack, wrong, failed=life.told.failed)
 
 
-def run_twice(way: str, place: Place, most_descriptors: int) -> Result:
+def run_twice(scenario: str, way: str, place: Place, most_descriptors: int) -> Result:
     """What is wrong must be so again: a machine that is busy with other things leaves clients waiting, too."""
-    first = run(way, place, most_descriptors)
+    first = run(scenario, way, place, most_descriptors)
     if not first.wrong:
         return first
-    second = run(way, place, most_descriptors)
+    second = run(scenario, way, place, most_descriptors)
     if second.wrong:
         second.wrong = f"{first.wrong}; and again: {second.wrong}"
     else:
@@ -126,61 +129,64 @@ def run_twice(way: str, place: Place, most_descriptors: int) -> Result:
     return second
 
 
-def places() -> tuple[list[Place], int]:
+def places(scenario: str) -> tuple[str, list[Place], int]:
     """Where memory is asked for in a life without failures, and how many descriptors there are before its end."""
     with tempfile.TemporaryDirectory(prefix="voxeld-nth-") as name:
-        life = Life(Path(name))
+        life = SCENARIOS[scenario](Path(name))
+        life.prepare()
         process = life.start(environment={"LD_PRELOAD": os.environ["FAIL_MALLOC"], "FAIL_MALLOC_LIST": f"{name}/list"})
-        life.pid = process.pid
-        if not life.ready(process):
-            sys.exit(f"voxeld does not start: {life.said()}")
-        life.live()
-        rest = descriptors(process.pid, 0)  # what it comes down to
+        is_ready, wrong = life.lived(process, lambda: process.pid)
+        rest = descriptors(process.pid, 0, SETTLES)  # what it comes down to
         status = end(process, process.pid)
-        if life.told.failed or not life.told.shown or not life.told.durable:
-            sys.exit(f"unharmed it failed: {life.told}")
-        if status != 0:
-            sys.exit(f"unharmed it ended with {status}: {life.said()}")
+        if not is_ready or wrong or not life.went_well() or status != 0:
+            sys.exit(f"{scenario}: unharmed it failed: {wrong}{life.told}; it ended with {status}: {life.said()[-2000:]}")
         found = [place_of(line) for line in Path(name, "list").read_text(encoding="ascii").splitlines()]
-        return sorted(found, key=lambda place: place.site), rest
+        return scenario, sorted(found, key=lambda place: place.site), rest
 
 
 def say(last: Result, at: int, of: int) -> None:
     wrong = f"; WRONG: {last.wrong}" if last.wrong else f"; once: {last.once}" if last.once else ""
-    print(f"{at}/{of} {last.way} {last.site} {' '.join(last.stack[:2])}: {last.how}{wrong}", file=sys.stderr, flush=True)
+    print(f"{at}/{of} {last.scenario} {last.way} {last.site} {' '.join(last.stack[:2])}: {last.how}{wrong}", file=sys.stderr, flush=True)
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenarios", default=",".join(SCENARIOS), help="only these, by comma (default: all ten: %(default)s)")
     parser.add_argument("--way", choices=["reserve", "bare", "forever"], action="append", help="how it fails, as above; may be given more than once (default: reserve)")
     parser.add_argument("--sites", help="only these, by comma")
-    parser.add_argument("--sample", type=int, default=0, help="so many of each way, by chance")
-    parser.add_argument("--seed", type=int, default=1, help="of that chance (default: %(default)s)")
-    parser.add_argument("--jobs", type=int, default=1, help="so many lives at a time")
+    add_options(parser)
     parser.add_argument("--list", action="store_true", help="say where memory is asked for, and end")
-    parser.add_argument("--json", action="store_true", help="what came of each as JSON, on standard output")
     options = parser.parse_args()
+    scenarios = options.scenarios.split(",")
+    if unknown := set(scenarios) - set(SCENARIOS):
+        parser.error(f"no such scenarios: {', '.join(sorted(unknown))}; there are {', '.join(SCENARIOS)}")
     program("VOXELD", "the daemon")
     program("FAIL_MALLOC", "the library that makes allocations fail")
-    found, most_descriptors = places()
+    found: dict[str, tuple[str, Place, int]] = {}
+    counted = {scenario: (here, rest) for scenario, here, rest in each(places, [(scenario,) for scenario in scenarios], options.jobs)}
+    for scenario in scenarios:
+        here, rest = counted[scenario]
+        new = [place for place in here if place.site not in found]
+        found.update({place.site: (scenario, place, rest) for place in new})
+        if options.list:
+            for place in new:
+                print(scenario, place.site, place.count, *place.stack)
+            print(f"{scenario}: {len(here)} places, {len(new)} new, {sum(place.count for place in here)} allocations, {rest} descriptors")
     if options.list:
-        for place in found:
-            print(place.site, place.count, *place.stack)
-        print(f"{len(found)} places, {sum(place.count for place in found)} allocations, {most_descriptors} descriptors")
         return 0
-    if options.sites:
-        found = [place for place in found if place.site in options.sites.split(",")]
+    wanted = [found[site] for site in sorted(found) if not options.sites or site in options.sites.split(",")]
     cases = []
     for way in options.way or ["reserve"]:
-        chosen = random.Random(options.seed).sample(found, min(options.sample or len(found), len(found)))
-        cases += [(way, place) for place in chosen]
-    results = []
-    # Each life has a client's process of its own: what gRPC keeps of one server would be in the next one's way.
-    with concurrent.futures.ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn"), max_tasks_per_child=1) as jobs:
-        for last in jobs.map(run_twice, *zip(*cases), [most_descriptors] * len(cases)):
-            results.append(last)
-            if last.wrong or last.once or not options.json and (sys.stderr.isatty() or len(results) % 50 == 0):
-                say(last, len(results), len(cases))
+        cases += [(scenario, way, place, rest) for scenario, place, rest in chosen(wanted, options)]
+    done = 0
+
+    def tell(last: Result) -> None:
+        nonlocal done
+        done += 1
+        if last.wrong or last.once or not options.json and (sys.stderr.isatty() or done % 50 == 0):
+            say(last, done, len(cases))
+
+    results = each(run_twice, cases, options.jobs, options.within, tell)
     if options.json:
         print(json.dumps([vars(result) for result in results]))
     else:
@@ -192,7 +198,7 @@ def main() -> int:
         print(f"{'way':<10}" + "".join(f"{kind:>9}" for kind in kinds))
         for way, counts in sorted(table.items()):
             print(f"{way:<10}" + "".join(f"{counts[kind]:>9}" for kind in kinds))
-        print(f"{len(results)} cases of {len(found)} places, {sum(1 for result in results if result.wrong)} wrong")
+        print(f"{len(results)} cases of {len(found)} places, {len(cases) - len(results)} left, {sum(1 for result in results if result.wrong)} wrong")
     return 1 if any(result.wrong for result in results) else 0
 
 

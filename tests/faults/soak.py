@@ -2,11 +2,11 @@
 """A long day in short: the real voxeld with three displays, state and http, and clients of every kind that come, draw, err and go. Its
 resident memory, what of it is held, descriptors, threads and latencies are measured all the while, and lines are laid through them.
 
-usage: soak.py [--minutes M] [--roles NAME,…] [--csv FILE] [--svg FILE] [--json]      Paths are in VOXELD, HEAP_HELD (the
+usage: soak.py [--minutes M] [--warm-up M] [--roles NAME,…] [--csv FILE] [--svg FILE] [--json]      Paths are in VOXELD, HEAP_HELD (the
 preloaded library that tells what is held) and PYTHONPATH (the client and tests/e2e).
 
 Ends with 1 if a commit has not had all that it is owed, or if something grows: the 95 % confidence interval of its slope (by medians of
-twelfths after the first, which is for warming up) lies above zero by more than GROWTH says an hour."""
+elevenths of what comes after warming up) lies above zero by more than GROWTH says an hour."""
 import argparse
 import contextlib
 import csv
@@ -32,8 +32,8 @@ from programs import program
 
 EVERY = 2.0  # seconds from sample to sample
 LONG = 60.0
-PARTS = 12
-WARM = 20  # minutes; of a shorter run slopes are told, and receipts alone are judged
+PARTS = 11
+LEAST = 10  # minutes beyond warming up; of a shorter run slopes are told, and receipts alone are judged
 # By what part of its level a quantity may grow in an hour; of whole numbers, by how many.
 GROWTH = {"resident_mb": 0.02, "anonymous_mb": 0.02, "held_mb": 0.02, "descriptors": 0.5, "threads": 0.5, "p50_ms": 0.5, "p99_ms": 0.5}
 WHOLE = ("descriptors", "threads")
@@ -169,8 +169,8 @@ def sample(pid: int, port: int, heap: Path) -> dict[str, float]:
 
 
 def line_through(times: np.ndarray[Any, Any], values: np.ndarray[Any, Any]) -> tuple[float, float]:
-    """Slope an hour and half of its 95 % interval, of the medians of the parts after the first."""
-    parts = [part for part in np.array_split(np.arange(len(times)), PARTS)[1:] if len(part)]
+    """Slope an hour and half of its 95 % interval, of the medians of the parts."""
+    parts = [part for part in np.array_split(np.arange(len(times)), PARTS) if len(part)]
     x = np.array([np.median(times[part]) for part in parts]) / 3600
     y = np.array([np.median(values[part]) for part in parts])
     n = len(x)
@@ -203,11 +203,14 @@ def draw(path: str, rows: list[dict[str, float]]) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=45, help="how long (default: %(default)s)")
+    parser.add_argument("--warm-up", type=float, default=10, help="minutes from its start of which slopes know nothing (default: %(default)s, a fifth at the most)")
     parser.add_argument("--roles", default=",".join(ROLES), help="which clients there are (default: %(default)s)")
     parser.add_argument("--csv", help="a file for each measurement, a line each")
     parser.add_argument("--svg", help="a file for a picture of them")
     parser.add_argument("--json", action="store_true", help="what came of it as JSON, on standard output")
     options = parser.parse_args()
+    warm_up = min(options.warm_up, options.minutes / 5)
+    judged = options.minutes - warm_up >= LEAST
     voxeld = program("VOXELD", "the daemon")
     heap_held = program("HEAP_HELD", "the library that tells what is held")
     with tempfile.TemporaryDirectory(prefix="voxeld-soak-") as folder:
@@ -269,13 +272,14 @@ def main() -> int:
         if any(display.commits_pending for display in last.displays):
             wrong.append("commits are pending still")
         slopes = {}
-        times = np.array([row["minutes"] * 60 for row in rows])
+        warm = [row for row in rows if row["minutes"] >= warm_up]
+        times = np.array([row["minutes"] * 60 for row in warm])
         for key, part in GROWTH.items():
-            values = np.array([row[key] for row in rows])
+            values = np.array([row[key] for row in warm])
             slope, half = line_through(times, values)
             level = float(np.median(values))
             slopes[key] = {"median": level, "least": float(values.min()), "most": float(values.max()), "an_hour": slope, "half_interval": half}
-            if options.minutes < WARM:
+            if not judged:
                 continue
             if slope - half > (part if key in WHOLE else part * level):
                 wrong.append(f"{key} grows by {slope:.3f} an hour (± {half:.3f}) from {level:.1f}")
@@ -287,11 +291,10 @@ def main() -> int:
     if options.json:
         print(json.dumps({"minutes": rows[-1]["minutes"], "receipts": sums, "slopes": slopes, "wrong": wrong}))
     else:
-        judged = "nothing grows, nothing is owed" if options.minutes >= WARM else "nothing is owed"
         print(f"{rows[-1]['minutes']:.1f} minutes, {len(rows)} samples; " + ", ".join(f"{count} {key}" for key, count in sums.items()))
         for key, each in slopes.items():
             print(f"{key}: median {each['median']:.2f} ({each['least']:.2f} to {each['most']:.2f}), {each['an_hour']:+.3f} an hour (± {each['half_interval']:.3f})")
-        print("\n".join(f"WRONG: {each}" for each in wrong) or judged)
+        print("\n".join(f"WRONG: {each}" for each in wrong) or ("nothing grows, nothing is owed" if judged else "nothing is owed"))
     if options.svg:
         draw(options.svg, rows)
     return 1 if wrong else 0

@@ -2,13 +2,13 @@
 from __future__ import annotations
 
 from types import TracebackType
-from typing import Callable, Iterator, Optional, Type, Union
+from typing import Callable, Optional, Type, Union
 
 from .assets import Asset, Content
 from .base import BaseConnection, settings
 from .credentials import Credentials
 from .errors import ConnectionLost
-from .queries import ChangeSet
+from .queries import Watch
 from .receipts import Issue
 from .v1 import display_pb2, scene_pb2
 from .volumes import Volume
@@ -65,8 +65,8 @@ class Connection(BaseConnection):
         return self._queries.upload(content, progress, patience)
 
     def watch_scene(self, layer: str = "", owner: int = 0, *, contents: bool = False,
-                    timeout: Optional[float] = None) -> Iterator[ChangeSet]:
-        """The scene's changes as they come; the first has all there is."""
+                    timeout: Optional[float] = None) -> Watch:
+        """The scene's changes as they come; the first has all there is. Its close() ends it."""
         return self._queries.watch(layer, owner, contents, timeout)
 
 

@@ -1,11 +1,12 @@
 """Lines that bend, surfaces of Bézier patches, arrows, text, and what lies on grids."""
 from __future__ import annotations
 
-from typing import Any, Optional, Sequence
+from typing import Any, Optional, Sequence, Union
 
 import numpy.typing as npt
 
 from . import curves, grids
+from .assets import Asset
 from .colors import Colors
 from .draw_measured import Drawn, DrawMeasured
 from .look import Look
@@ -79,7 +80,7 @@ class DrawCurves(DrawMeasured[Drawn]):
             facing=facing, up=up, style=style, align=align, line_spacing=line_spacing, wrap=wrap, font=font, depth=depth,
             color=color, rule=rule, width=width, unit=unit), Look.of(**look))
 
-    def grid(self, name: str, array: npt.ArrayLike, *, values: Optional[Sequence[float]] = None,
+    def grid(self, name: str, array: Union[npt.ArrayLike, Asset], *, values: Optional[Sequence[float]] = None,
              colors: Optional[Sequence[Any]] = None, cmap: Optional[str] = None, opacities: Optional[Sequence[float]] = None,
              extent: grids.Extent = None, filter: str = "linear", color: Optional[Colors] = None, **look: Any) -> Drawn:
         """A volume, without gaps: (nx, ny, nz) numbers, uint8, uint16 or float32, or (nx, ny, nz, 4) uint8 colours, whose
@@ -89,7 +90,7 @@ class DrawCurves(DrawMeasured[Drawn]):
         return self._draw(name, grids.grid, (array,), dict(values=values, colors=colors, cmap=cmap, opacities=opacities,
                                                            extent=extent, filter=filter, color=color), Look.of(**look))
 
-    def isosurface(self, name: str, array: npt.ArrayLike, level: float, *, extent: grids.Extent = None, filter: str = "linear",
+    def isosurface(self, name: str, array: Union[npt.ArrayLike, Asset], level: float, *, extent: grids.Extent = None, filter: str = "linear",
                    color: Optional[Colors] = None, fill: str = "surface", rule: str = "thin", shell: Optional[float] = None,
                    unit: str = "voxels", **look: Any) -> Drawn:
         """Where (nx, ny, nz) numbers are at a level, or, solid, no less than it."""

@@ -103,13 +103,13 @@ TEST(Health, IsWellUnlessADisplayIsLostOrAnEngineIsGone) {
   for (const auto state : {display::DisplayState::kAttaching, display::DisplayState::kShowing,
                            display::DisplayState::kBlanked}) {
     displays[0].state = state;
-    const Response well = HealthResponse(displays, stats, false);
+    const Response well = HealthResponse(displays, stats, Phase::kServing);
     EXPECT_EQ(well.status, 200u);
     EXPECT_EQ(well.body, "{\"status\":\"ok\",\"reasons\":[]}\n");
   }
   displays[0].state = display::DisplayState::kLost;
   displays[0].state_reason = "it said \"no\"\xFF";
-  const Response lost = HealthResponse(displays, stats, false);
+  const Response lost = HealthResponse(displays, stats, Phase::kServing);
   EXPECT_EQ(lost.status, 503u);
   EXPECT_EQ(lost.content_type, "application/json");
   EXPECT_THAT(lost.body, HasSubstr(R"({"display":"sim","what":"lost","why":"it said \"no\")"));
@@ -117,56 +117,59 @@ TEST(Health, IsWellUnlessADisplayIsLostOrAnEngineIsGone) {
   displays[0].state = display::DisplayState::kShowing;
   stats.displays[0].engine = "";
   stats.displays[0].engine_reason = "gone";
-  EXPECT_THAT(HealthResponse(displays, stats, false).body, HasSubstr("\"no engine\""));
+  EXPECT_THAT(HealthResponse(displays, stats, Phase::kServing).body, HasSubstr("\"no engine\""));
   stats.displays[0].engine = "cpu";
   stats.displays[0].engine_degraded = "a fault";
   stats.displays[0].pinned_entities = {"x"};
-  const Response degraded = HealthResponse(displays, stats, false);
+  const Response degraded = HealthResponse(displays, stats, Phase::kServing);
   EXPECT_EQ(degraded.status, 200u);
   EXPECT_EQ(degraded.body,
             R"({"status":"degraded","reasons":[{"display":"sim","what":"the engine is degraded",)"
             R"("why":"a fault","pinned":["x"]}]})"
             "\n");
   stats.displays[0].volume_held = true;
-  EXPECT_EQ(HealthResponse(displays, stats, false).status, 503u);
-  EXPECT_THAT(HealthResponse(displays, stats, false).body, HasSubstr("the last volume is held"));
+  EXPECT_EQ(HealthResponse(displays, stats, Phase::kServing).status, 503u);
+  EXPECT_THAT(HealthResponse(displays, stats, Phase::kServing).body,
+              HasSubstr("the last volume is held"));
   stats.displays[0].volume_held = false;
   stats.displays[0].engine_degraded = "";
   stats.process.trouble = "there was none";
-  EXPECT_EQ(HealthResponse(displays, stats, false).status, 200u);
-  EXPECT_EQ(HealthResponse(displays, stats, false).body,
+  EXPECT_EQ(HealthResponse(displays, stats, Phase::kServing).status, 200u);
+  EXPECT_EQ(HealthResponse(displays, stats, Phase::kServing).body,
             R"({"status":"degraded","reasons":[{"what":"memory","why":"there was none"}]})"
             "\n");
   stats.process.trouble = "";
   stats.process.time_trouble = "it stepped";
-  EXPECT_EQ(HealthResponse(displays, stats, false).status, 200u);
-  EXPECT_EQ(HealthResponse(displays, stats, false).body,
+  EXPECT_EQ(HealthResponse(displays, stats, Phase::kServing).status, 200u);
+  EXPECT_EQ(HealthResponse(displays, stats, Phase::kServing).body,
             R"({"status":"degraded","reasons":[{"what":"time","why":"it stepped"}]})"
             "\n");
   stats.process.time_trouble = "";
   stats.connections.accept_trouble = "none could be";
-  EXPECT_EQ(HealthResponse(displays, stats, false).status, 200u);
-  EXPECT_THAT(HealthResponse(displays, stats, false).body,
+  EXPECT_EQ(HealthResponse(displays, stats, Phase::kServing).status, 200u);
+  EXPECT_THAT(HealthResponse(displays, stats, Phase::kServing).body,
               HasSubstr(R"("reasons":[{"what":"connections","why":"none could be"}])"));
   stats.connections.accept_trouble = "";
   stats.displays[0].device_trouble = "it was lost";
-  EXPECT_EQ(HealthResponse(displays, stats, false).status, 200u);
-  EXPECT_THAT(HealthResponse(displays, stats, false).body,
+  EXPECT_EQ(HealthResponse(displays, stats, Phase::kServing).status, 200u);
+  EXPECT_THAT(HealthResponse(displays, stats, Phase::kServing).body,
               HasSubstr(R"("what":"device","why":"it was lost"})"));
   stats.displays[0].state = display::DisplayState::kLost;
-  EXPECT_THAT(HealthResponse(displays, stats, false).body, Not(HasSubstr("it was lost")))
+  EXPECT_THAT(HealthResponse(displays, stats, Phase::kServing).body, Not(HasSubstr("it was lost")))
       << "it is still, and that is told";
   stats.displays[0].state = display::DisplayState::kShowing;
   stats.displays[0].device_trouble = "";
   stats.connections.unreachable = "127.0.0.1:1: no answer came in time";
-  EXPECT_EQ(HealthResponse(displays, stats, false).status, 503u);
-  EXPECT_EQ(HealthResponse(displays, stats, false).body,
+  EXPECT_EQ(HealthResponse(displays, stats, Phase::kServing).status, 503u);
+  EXPECT_EQ(HealthResponse(displays, stats, Phase::kServing).body,
             R"({"status":"failing","reasons":[{"what":"not reachable",)"
             R"("why":"127.0.0.1:1: no answer came in time"}]})"
             "\n");
   stats.connections.unreachable = "";
-  EXPECT_EQ(HealthResponse(displays, stats, true).status, 503u);
-  EXPECT_THAT(HealthResponse(displays, stats, true).body, HasSubstr("shutting down"));
+  EXPECT_EQ(HealthResponse(displays, stats, Phase::kStarting).status, 503u);
+  EXPECT_THAT(HealthResponse(displays, stats, Phase::kStarting).body, HasSubstr("\"starting\""));
+  EXPECT_EQ(HealthResponse(displays, stats, Phase::kEnding).status, 503u);
+  EXPECT_THAT(HealthResponse(displays, stats, Phase::kEnding).body, HasSubstr("shutting down"));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The state file where one thing fails once, each in its turn: what SQLite asks of the disk, and of memory.
+// The state file where one thing fails once, each in its turn, in ten lives of it: what SQLite asks of the disk, and of memory.
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
@@ -31,21 +31,73 @@ absl::Status RowsOf(StateFile& file, Rows* rows) {
       [&](const RowKey& key, std::string_view bytes) { rows->emplace(key, std::string(bytes)); });
 }
 
+// What a transaction leaves.
+void Carry(const std::vector<Change>& changes, Rows* model) {
+  for (const Change& change : changes) {
+    switch (change.what) {
+      case Change::What::kPut:
+        (*model)[change.key] = change.bytes;
+        break;
+      case Change::What::kRemove:
+        model->erase(change.key);
+        break;
+      case Change::What::kRemoveLayer:
+        std::erase_if(*model, [&](const auto& row) {
+          return row.first.owner == change.key.owner && row.first.name == change.key.name &&
+                 (row.first.kind == RowKind::kLayer || row.first.kind == RowKind::kEntity);
+        });
+        break;
+      case Change::What::kRemoveAll:
+        model->clear();
+        break;
+    }
+  }
+}
+
+RowKey Entity(int layer, int number) {
+  return {RowKind::kEntity, 1, absl::StrCat("l", layer), absl::StrCat("e", number)};
+}
+Change Put(const RowKey& key, size_t size, int turn) {
+  return {Change::What::kPut, key, std::string(size, static_cast<char>('a' + turn % 26))};
+}
+
 // The turn-th transaction; some rows do not fit into a page.
-std::vector<Change> Changes(int turn, Rows* model) {
+std::vector<Change> Mixed(int turn) {
   std::vector<Change> changes;
   for (int i = 0; i < 8; ++i) {
-    const RowKey key{RowKind::kEntity, 1, absl::StrCat("l", i % 2),
-                     absl::StrCat("e", (turn * 5 + i) % 17)};
+    const RowKey key = Entity(i % 2, (turn * 5 + i) % 17);
     if ((turn + i) % 5 == 0) {
       changes.push_back({Change::What::kRemove, key, {}});
-      model->erase(key);
-      continue;
+    } else {
+      changes.push_back(Put(key, i == 3 ? 9000 : 40 + static_cast<size_t>(turn), turn + i));
     }
-    std::string bytes(i == 3 ? 9000 : 40 + static_cast<size_t>(turn), static_cast<char>('a' + i));
-    changes.push_back({Change::What::kPut, key, bytes});
-    (*model)[key] = std::move(bytes);
   }
+  return changes;
+}
+
+std::vector<Change> Many(int turn) {
+  std::vector<Change> changes;
+  for (int i = 0; i < 60; ++i) {
+    const RowKey key = Entity(turn / 2, i);
+    changes.push_back(turn % 2 == 0 ? Put(key, 30, turn) : Change{Change::What::kRemove, key, {}});
+  }
+  return changes;
+}
+
+std::vector<Change> Large(int turn) { return {Put(Entity(0, turn % 2), 100'000, turn)}; }
+
+std::vector<Change> OneRow(int turn) { return {Put(Entity(0, 0), 50, turn)}; }
+
+std::vector<Change> AllGone(int turn) {
+  std::vector<Change> changes = Mixed(turn);
+  changes.insert(changes.begin() + 4, {Change::What::kRemoveAll, {}, {}});
+  return changes;
+}
+
+std::vector<Change> LayerGone(int turn) {
+  std::vector<Change> changes = Mixed(turn);
+  changes.push_back(Put({RowKind::kLayer, 1, "l0", ""}, 20, turn));
+  changes.push_back({Change::What::kRemoveLayer, {RowKind::kLayer, 1, "l1", ""}, {}});
   return changes;
 }
 
@@ -53,17 +105,44 @@ absl::Status Apply(StateFile& file, std::vector<Change> changes) {
   return file.Apply([&] { return std::exchange(changes, {}); });
 }
 
-constexpr int kBefore = 4, kTurns = 8;
+// A life of a file: what there is before, and what is done with it.
+struct Life {
+  const char* name;
+  int before;  // transactions that made the file; 0: there is none
+  int turns;   // transactions
+  std::vector<Change> (*changes)(int turn);
+  bool reopens = false;    // before each turn
+  bool power_off = false;  // it was, while a transaction was written
+  uint64_t least_calls = 50;
+};
+void PrintTo(const Life& life, std::ostream* out) { *out << life.name; }
 
-// A life of a file that is there: opened, read, written to. Whatever fails is tried again, which has to work, as nothing fails
-// twice; it must have changed nothing. `failed`: how often something did.
-void Live(CrashDisk& disk, int* failed, Rows* model) {
+const Life kLives[] = {
+    {"ordinary", 4, 8, &Mixed},
+    {"the_first", 0, 4, &Mixed},
+    {"many_rows", 2, 4, &Many},
+    {"large_rows", 2, 5, &Large},
+    {"one_row", 1, 10, &OneRow},
+    {"all_is_removed", 3, 5, &AllGone},
+    {"a_layer_is_removed", 3, 5, &LayerGone},
+    {"only_read", 6, 0, &Mixed, false, false, 20},
+    {"opened_for_each", 2, 3, &Mixed, true},
+    {"after_the_power_was_off", 4, 4, &Mixed, false, true},
+};
+
+class OneFailure : public ::testing::TestWithParam<Life> {
+ protected:
+  // Opened, read, written to. Whatever fails is tried again, which has to work, as nothing fails
+  // twice; it must have changed nothing. `failed`: how often something did.
+  void Live(CrashDisk& disk, int* failed, Rows* model) const;
+  void MakeFile(CrashDisk& disk, Rows* model) const;
+  static void ExpectKept(CrashDisk& disk, const Rows& model);
+  void ExpectTold(uint64_t asked, int failed) const;
+};
+
+void OneFailure::Live(CrashDisk& disk, int* failed, Rows* model) const {
+  const Life& life = GetParam();
   std::unique_ptr<StateFile> file;
-  const auto open = [&] {
-    absl::StatusOr<std::unique_ptr<StateFile>> opened = OpenDisk(disk);
-    if (opened.ok()) file = *std::move(opened);
-    return opened.status();
-  };
   const auto twice = [&](const char* what, const std::function<absl::Status()>& attempt) {
     absl::Status status = attempt();
     if (status.ok()) return;
@@ -74,37 +153,60 @@ void Live(CrashDisk& disk, int* failed, Rows* model) {
     status = attempt();
     ASSERT_TRUE(status.ok()) << what << ": " << status;
   };
-  ASSERT_NO_FATAL_FAILURE(twice("open", open));
-  EXPECT_EQ(file->quarantined(), "") << "a good file was put aside";
+  const auto open = [&] {
+    file.reset();
+    ASSERT_NO_FATAL_FAILURE(twice("open", [&] {
+      absl::StatusOr<std::unique_ptr<StateFile>> opened = OpenDisk(disk);
+      if (opened.ok()) file = *std::move(opened);
+      return opened.status();
+    }));
+    EXPECT_EQ(file->quarantined(), "") << "a good file was put aside";
+  };
   Rows rows;
-  ASSERT_NO_FATAL_FAILURE(twice("read", [&] { return RowsOf(*file, &rows); }));
-  EXPECT_EQ(rows, *model) << "when it was opened";
-  for (int turn = kBefore; turn < kBefore + kTurns; ++turn) {
-    Rows next = *model;
-    const std::vector<Change> changes = Changes(turn, &next);
+  const auto read = [&](const std::string& when) {
+    ASSERT_NO_FATAL_FAILURE(twice("read", [&] { return RowsOf(*file, &rows); }));
+    EXPECT_EQ(rows, *model) << when;
+  };
+  ASSERT_NO_FATAL_FAILURE(open());
+  ASSERT_NO_FATAL_FAILURE(read("when it was opened"));
+  for (int turn = life.before; turn < life.before + life.turns; ++turn) {
+    if (life.reopens) {
+      ASSERT_NO_FATAL_FAILURE(open());
+    }
+    const std::vector<Change> changes = life.changes(turn);
     ASSERT_NO_FATAL_FAILURE(twice("write", [&]() -> absl::Status {
       absl::Status status = Apply(*file, changes);
       if (status.ok()) return status;
-      if (absl::Status read = RowsOf(*file, &rows); read.ok()) {
+      if (absl::Status found = RowsOf(*file, &rows); found.ok()) {
         EXPECT_EQ(rows, *model) << "part of what failed is there: " << status;
       }
       return status;
     }));
-    *model = std::move(next);
-    ASSERT_NO_FATAL_FAILURE(twice("read", [&] { return RowsOf(*file, &rows); }));
-    EXPECT_EQ(rows, *model) << "after turn " << turn;
+    Carry(changes, model);
+    ASSERT_NO_FATAL_FAILURE(read(absl::StrCat("after turn ", turn)));
   }
 }
 
-void MakeFile(CrashDisk& disk, Rows* model) {
+void OneFailure::MakeFile(CrashDisk& disk, Rows* model) const {
+  const Life& life = GetParam();
+  if (life.before == 0) return;
   auto file = OpenDisk(disk);
   ASSERT_TRUE(file.ok()) << file.status();
-  for (int turn = 0; turn < kBefore; ++turn) {
-    ASSERT_TRUE(Apply(**file, Changes(turn, model)).ok());
+  for (int turn = 0; turn < life.before; ++turn) {
+    const std::vector<Change> changes = life.changes(turn);
+    ASSERT_TRUE(Apply(**file, changes).ok());
+    Carry(changes, model);
   }
+  if (!life.power_off) return;
+  // While the next one is written: in its log is the beginning of it.
+  disk.StopAt(disk.steps() + 3);
+  ASSERT_FALSE(Apply(**file, life.changes(life.before)).ok());
+  file->reset();
+  disk.StopAt(UINT64_MAX);
+  disk.PowerCycle(1);
 }
 
-void ExpectKept(CrashDisk& disk, const Rows& model) {
+void OneFailure::ExpectKept(CrashDisk& disk, const Rows& model) {
   auto file = OpenDisk(disk);
   ASSERT_TRUE(file.ok()) << file.status();
   EXPECT_EQ((*file)->quarantined(), "");
@@ -113,10 +215,16 @@ void ExpectKept(CrashDisk& disk, const Rows& model) {
   EXPECT_EQ(rows, model) << "after it was opened anew";
 }
 
-TEST(OneFailure, EachCallOfTheDisk) {
+// What a life asks for at all, and how much of it its caller was told of when it failed.
+void OneFailure::ExpectTold(uint64_t asked, int failed) const {
+  EXPECT_GE(asked, GetParam().least_calls);
+  EXPECT_GT(failed, static_cast<int>(asked / 3)) << "they fail, and nobody is told";
+}
+
+TEST_P(OneFailure, EachCallOfTheDisk) {
   int failed = 0;
   uint64_t calls = 0;
-  for (uint64_t n = 0; n == 0 || (n <= calls && !::testing::Test::HasFailure()); ++n) {
+  for (uint64_t n = 0; n == 0 || (n <= calls && !HasFailure()); ++n) {
     SCOPED_TRACE(absl::StrCat("call ", n));
     CrashDisk disk("one");
     Rows model;
@@ -134,8 +242,7 @@ TEST(OneFailure, EachCallOfTheDisk) {
     failed += now;
   }
   std::cout << calls << " calls, " << failed << " of them told to the caller when they failed\n";
-  EXPECT_GT(calls, 100u);
-  EXPECT_GT(failed, static_cast<int>(calls / 3)) << "they fail, and nobody is told";
+  ExpectTold(calls, failed);
 }
 
 // ---- memory
@@ -180,11 +287,11 @@ class SqliteMemory {
   }
 };
 
-TEST(OneFailure, EachAllocationOfSqlite) {
+TEST_P(OneFailure, EachAllocationOfSqlite) {
   SqliteMemory sqlite;
   int failed = 0;
   uint64_t allocations = 0;
-  for (uint64_t n = 0; n == 0 || (n <= allocations && !::testing::Test::HasFailure()); ++n) {
+  for (uint64_t n = 0; n == 0 || (n <= allocations && !HasFailure()); ++n) {
     SCOPED_TRACE(absl::StrCat("allocation ", n));
     CrashDisk disk("one");
     Rows model;
@@ -201,9 +308,11 @@ TEST(OneFailure, EachAllocationOfSqlite) {
   }
   std::cout << allocations << " allocations, " << failed
             << " of them told to the caller when they failed\n";
-  EXPECT_GT(allocations, 100u);
-  EXPECT_GT(failed, static_cast<int>(allocations / 3)) << "they fail, and nobody is told";
+  ExpectTold(allocations, failed);
 }
+
+INSTANTIATE_TEST_SUITE_P(TenLives, OneFailure, ::testing::ValuesIn(kLives),
+                         [](const auto& life) { return std::string(life.param.name); });
 
 }  // namespace
 }  // namespace voxeld::daemon::state

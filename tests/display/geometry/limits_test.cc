@@ -82,7 +82,10 @@ TEST(Limits, PositionsOfAStroke) {
               StartsWith("positions_mm[3] is 2: it must be below positions_mm[2], 1:"));
   EXPECT_THAT(refusal({std::numeric_limits<double>::quiet_NaN(), 1}),
               StartsWith("positions_mm[0] is nan: "));
-  EXPECT_THAT(refusal({-1.1e6, 1}), StartsWith("positions_mm[0] is -1.1e+06: "));
+  // Not as the limit itself.
+  EXPECT_THAT(refusal({-1000000.5, 1}),
+              StartsWith("positions_mm[0] is -1000000.5: it must be from -1000000 to 1000000 mm"));
+  EXPECT_THAT(refusal({-1.1e6, 1}), StartsWith("positions_mm[0] is -1100000: "));
 }
 
 // At least 1/1024 of the pitch along the normal.
@@ -207,7 +210,7 @@ TEST(Limits, WhatAHelixSpans) {
   EXPECT_EQ(ShapeRefusal({helix, {}}), "");
   helix.span_turns = 0.5000001;
   EXPECT_THAT(ShapeRefusal({helix, {}}),
-              StartsWith("span_turns is 0.5: it must be from 0.1 to 1 / blades, 0.5: "));
+              StartsWith("span_turns is 0.5000001: it must be from 0.1 to 1 / blades, 0.5: "));
 }
 
 TEST(Limits, RowsMayBeOddButInHub75) {

@@ -1,9 +1,11 @@
 #include "tests/gpu/cuda/fault_scenario.h"
 
+#include <algorithm>
 #include <random>
 #include <utility>
 
 #include "gpu/implicit/graph.h"
+#include "tests/conformance/scene_generator.h"
 
 namespace voxeld::gpu {
 namespace {
@@ -58,7 +60,6 @@ ModelGeometry Ball(uint64_t id, float x, float y, float z, float radius, uint32_
   return g;
 }
 
-// Writes a scenario, step by step.
 // The lower half of a ball's shell, by an expression and its bound: all of them by one program.
 ModelGeometry Bowl(uint64_t id, double x, double y, double z, double radius) {
   implicit::Graph graph;
@@ -78,6 +79,7 @@ ModelGeometry Bowl(uint64_t id, double x, double y, double z, double radius) {
   return g;
 }
 
+// Writes a scenario, step by step.
 class Script {
  public:
   void SetTarget(const std::string& name, const Target& target) {
@@ -238,6 +240,45 @@ std::vector<FaultStep> FaultScenario() {
   script.Voxels("before the last frame, voxels");
   script.Frame("last frame");
   return script.Take();
+}
+
+std::vector<FaultStep> RandomFaultScenario(uint64_t seed) {
+  constexpr int kRandomSize = 24, kRounds = 5;
+  conformance::SceneGenerator generator(seed);
+  const auto roomy = [&] {
+    for (;;) {
+      Target target = generator.RandomTarget();
+      const display::VoxelGrid& grid = target.geometry.grid;
+      if (std::min({grid.nx, grid.ny, grid.nz}) >= 16) return target;
+    }
+  };
+  std::vector<FaultStep> steps;
+  FaultStep now{FaultStep::Kind::kTarget, "a target", roomy(), {}, {}};
+  const auto add = [&](FaultStep::Kind kind, const std::string& name) {
+    now.kind = kind;
+    now.name = name;
+    steps.push_back(now);
+    now.delta = {};
+  };
+  add(FaultStep::Kind::kTarget, "a target");
+  now.scene = generator.RandomScene(kRandomSize);
+  now.delta.PutWhole(now.scene);
+  add(FaultStep::Kind::kApply, "a scene");
+  add(FaultStep::Kind::kFrame, "its frame");
+  for (int round = 1; round <= 2 * kRounds; ++round) {
+    const std::string which = " of round " + std::to_string(round);
+    if (round == kRounds) {
+      now.target = roomy();
+      add(FaultStep::Kind::kTarget, "another target" + which);
+    }
+    for (int64_t n = generator.Int(2, 5); n > 0; --n) {
+      generator.Change(now.scene, kRandomSize, now.delta);
+    }
+    add(FaultStep::Kind::kApply, "changes" + which);
+    if (round % kRounds == 0) add(FaultStep::Kind::kVoxels, "voxels" + which);
+    add(FaultStep::Kind::kFrame, "the frame" + which);
+  }
+  return steps;
 }
 
 FaultPlayer::FaultPlayer(const conformance::EngineCase& engine)

@@ -21,10 +21,16 @@ struct FaultStep {
   conformance::SceneModel scene;   // after the step
 };
 
-// Targets, among them one of the same layout; lines that the CPU draws; a crowd that moves; deltas
+// Every kind of work: targets, among them one of the same layout; lines that the CPU draws; a crowd that moves; deltas
 // that add, replace, drop, hide, and outgrow tables; more that goes than an index keeps; frames
 // between; voxels read. Ends in a frame.
 std::vector<FaultStep> FaultScenario();
+
+// Another, by chance: a scene of every kind of drawable under one target and then another, which changes from
+// frame to frame. The same for a seed. Ends in a frame.
+std::vector<FaultStep> RandomFaultScenario(uint64_t seed);
+// Nine of which much is lit, with displays of every kind among them.
+inline constexpr uint64_t kFaultSeeds[] = {5, 13, 16, 18, 26, 28, 36, 42, 56};
 
 // What can be seen of an engine after a step.
 struct Seen {

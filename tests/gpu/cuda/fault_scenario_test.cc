@@ -33,5 +33,28 @@ TEST(FaultScenario, DrawsWhatItSaysAndSomethingNewWithEveryFrame) {
   EXPECT_EQ(frames, 14);
 }
 
+TEST(FaultScenario, DrawsByChanceWhatItSays) {
+  for (const uint64_t seed : kFaultSeeds) {
+    FaultPlayer player(conformance::CaseOf("cpu", EngineKind::kCpu, false));
+    uint64_t lit = 0;
+    std::vector<FaultStep> steps = RandomFaultScenario(seed);
+    for (const FaultStep& step : steps) {
+      SCOPED_TRACE("seed " + std::to_string(seed) + ", " + step.name);
+      const absl::Status status = player.Do(step);
+      ASSERT_TRUE(status.ok()) << status;
+      if (step.kind == FaultStep::Kind::kApply || step.kind == FaultStep::Kind::kTarget) continue;
+      const conformance::DenseVolume want = conformance::OracleVoxels(step.scene, step.target);
+      if (step.kind == FaultStep::Kind::kVoxels) {
+        EXPECT_EQ(conformance::FirstDifference(player.seen().voxels, want, step.target), "");
+        continue;
+      }
+      EXPECT_TRUE(player.seen().pictures == conformance::OraclePictures(want, step.target));
+      lit += player.seen().lit_voxels;
+    }
+    EXPECT_GT(lit, 1000u) << seed;
+    EXPECT_EQ(steps.back().kind, FaultStep::Kind::kFrame);
+  }
+}
+
 }  // namespace
 }  // namespace voxeld::gpu

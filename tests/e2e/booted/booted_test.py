@@ -1,0 +1,114 @@
+"""The daemon as its package installs it, under systemd itself: what kills it, stops it or takes its memory, and how long clients wait then.
+Runs in the container that `run` boots, as root. Each test prints what it measured."""
+import contextlib
+import os
+import signal
+import subprocess
+import time
+import unittest
+import urllib.request
+from pathlib import Path
+
+import numpy as np
+import voxeld as voxel
+
+from polling import LONG, until
+
+SERVER = "unix:/run/voxeld/voxeld.sock"
+WATCHDOG = 3.0  # seconds, here; the unit has 30
+CONFIG = ('[[display]]\nname = "sim"\ndriver = "simulated"\nsize = "16x16x12"\nrate = 60\n'
+          '[[display]]\nname = "other"\ndriver = "simulated"\nsize = "8x8x8"\nrate = 60\n')
+
+
+def systemctl(*arguments: str) -> str:
+    return subprocess.run(["systemctl", *arguments], check=True, capture_output=True, text=True).stdout.strip()
+
+
+def shows(what: str) -> str:
+    return systemctl("show", "--value", "-p", what, "voxeld.service")
+
+
+def health() -> str:
+    with urllib.request.urlopen("http://127.0.0.1:8088/healthz", timeout=LONG) as answer:
+        return str(answer.read().decode())
+
+
+class Booted(unittest.TestCase):
+    def setUp(self) -> None:
+        Path("/etc/voxeld/voxeld.toml").write_text(CONFIG, encoding="utf-8")
+        drop_in = Path("/run/systemd/system/voxeld.service.d/test.conf")
+        drop_in.parent.mkdir(parents=True, exist_ok=True)
+        drop_in.write_text(f"[Service]\nWatchdogSec={WATCHDOG:.0f}\n", encoding="utf-8")
+        systemctl("daemon-reload")
+        systemctl("restart", "voxeld.socket", "voxeld.service")
+        self.addCleanup(systemctl, "stop", "voxeld.service", "voxeld.socket")
+        self.restarts = int(shows("NRestarts"))
+        self.pid = int(shows("MainPID"))
+        v = voxel.connect(SERVER, timeout=LONG, name="keeps", on_disconnect="keep")
+        v.layer("stays").box("box", size=(1, 1, 1), color="white", fill="solid")
+        self.assertTrue(v.commit(durable=True).wait_durable(LONG).durable)
+        v.close(LONG)
+
+    def back(self, began: float, most: float, what: str) -> None:
+        """A client that asks at once is served, by another process, and what was durable is shown."""
+        with voxel.connect(SERVER, timeout=LONG) as v:
+            names = [entity.key.id for entity in v.entities(timeout=LONG)]
+            served = time.monotonic() - began
+            self.assertIn("box", names)
+            until(lambda: bool(np.any(v.capture("sim", timeout=LONG).rgb)), "what is kept is shown")
+        print(f"{what}: served again after {served:.2f} s", flush=True)
+        self.assertLess(served, most)
+        self.assertNotEqual(int(shows("MainPID")), self.pid)
+        self.assertEqual(int(shows("NRestarts")), self.restarts + 1)
+
+    def test_killed(self) -> None:
+        for number in (signal.SIGKILL, signal.SIGSEGV):
+            began = time.monotonic()
+            os.kill(self.pid, number)
+            self.back(began, 5, signal.Signals(number).name)  # RestartSec=1, and the start
+            self.pid, self.restarts = int(shows("MainPID")), int(shows("NRestarts"))
+
+    def test_stopped_for_longer_than_its_watchdog(self) -> None:
+        began = time.monotonic()
+        os.kill(self.pid, signal.SIGSTOP)
+        until(lambda: int(shows("NRestarts")) > self.restarts, "the watchdog")
+        self.back(began, WATCHDOG + 10 + 5, f"SIGSTOP, a watchdog of {WATCHDOG:.0f} s")
+
+    def test_stopped_for_less(self) -> None:
+        os.kill(self.pid, signal.SIGSTOP)
+        time.sleep(WATCHDOG / 3)  # so long it is stopped
+        os.kill(self.pid, signal.SIGCONT)
+        with voxel.connect(SERVER, timeout=LONG) as v:
+            v.sphere("ball", radius=0.3, color="green")
+            self.assertEqual(len(v.commit().wait_shown(timeout=LONG)), 2)
+        self.assertEqual((int(shows("MainPID")), int(shows("NRestarts"))), (self.pid, self.restarts))
+
+    def test_without_memory(self) -> None:
+        """The kernel ends it where the unit's memory does."""
+        used = int(shows("MemoryCurrent")) if shows("MemoryCurrent").isdigit() else 0
+        if used == 0:
+            self.fail("this container's memory is not counted")
+        systemctl("set-property", "--runtime", "voxeld.service", f"MemoryMax={used + (16 << 20)}")
+        self.addCleanup(systemctl, "set-property", "--runtime", "voxeld.service", "MemoryMax=infinity")
+        began = time.monotonic()
+        with contextlib.suppress(voxel.VoxelError, TimeoutError), voxel.connect(SERVER, timeout=LONG, name="brings") as v:
+            v.points("many", np.random.default_rng(1).random((6_000_000, 3), np.float32))
+            v.commit().wait(LONG)
+        until(lambda: int(shows("NRestarts")) > self.restarts, "the kernel")
+        self.back(began, 15, "out of the unit's memory")
+
+    def test_reloads_and_ends(self) -> None:
+        systemctl("reload", "voxeld.service")
+        self.assertIn('"status":"ok"', health())
+        self.assertEqual(int(shows("MainPID")), self.pid)
+        began = time.monotonic()
+        systemctl("stop", "voxeld.service")
+        print(f"stopped in {time.monotonic() - began:.2f} s", flush=True)
+        self.assertEqual((shows("Result"), shows("ExecMainStatus")), ("success", "0"))
+        # Its socket is still there, and whoever comes has it started.
+        with voxel.connect(SERVER, timeout=LONG) as v:
+            self.assertIn("box", [entity.key.id for entity in v.entities(timeout=LONG)])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,71 @@
+"""Many lives at a time, each with a client's process of its own: what gRPC keeps of one server would be in the next one's way."""
+import argparse
+import concurrent.futures
+import multiprocessing as mp
+import random
+import threading
+import time
+from multiprocessing.connection import Connection
+from typing import Any, Callable, Iterable, Sequence, TypeVar
+
+Case = TypeVar("Case", bound=tuple[Any, ...])
+Result = TypeVar("Result")
+
+_CONTEXT = mp.get_context("forkserver")
+_CONTEXT.set_forkserver_preload(["numpy", "voxeld", "scenarios"])  # read once; none of them starts a thread by that
+_STARTING = threading.Lock()
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--sample", type=int, default=0, help="so many of all, by chance")
+    parser.add_argument("--seed", type=int, default=1, help="of that chance (default: %(default)s)")
+    parser.add_argument("--part", default="1/1", help="of all that are wanted the K-th of N parts, as K/N: 1/1 is all")
+    parser.add_argument("--within", type=float, default=0, help="seconds after which none is begun any more; how many are left is told. 0: any number")
+    parser.add_argument("--jobs", type=int, default=1, help="so many lives at a time")
+    parser.add_argument("--json", action="store_true", help="what came of each as JSON, on standard output")
+
+
+def chosen(cases: Sequence[Case], options: argparse.Namespace) -> list[Case]:
+    """What of them the options want, in an order of chance, so that those that are left are like those that are not."""
+    part, parts = (int(number) for number in options.part.split("/"))
+    if not 1 <= part <= parts:
+        raise SystemExit(f"--part is {options.part}; it is K/N, from 1/N to N/N")
+    drawn = random.Random(options.seed).sample(cases, min(options.sample or len(cases), len(cases)))
+    return drawn[part - 1::parts]
+
+
+def _send(pipe: Connection, run: Callable[..., Any], case: tuple[Any, ...]) -> None:
+    pipe.send(run(*case))
+
+
+def _apart(run: Callable[..., Result], case: tuple[Any, ...]) -> Result:
+    here, there = _CONTEXT.Pipe(duplex=False)
+    process = _CONTEXT.Process(target=_send, args=(there, run, case))
+    with _STARTING:
+        process.start()
+    there.close()
+    try:
+        result: Result = here.recv()
+    except EOFError:
+        process.join()
+        raise SystemExit(f"{run.__name__}{case} ended with {process.exitcode}") from None
+    process.join()
+    return result
+
+
+def each(run: Callable[..., Result], cases: Iterable[tuple[Any, ...]], jobs: int, within: float = 0, tell: Callable[[Result], None] = lambda result: None) -> list[Result]:
+    """run(*case) of each, in their order as far as `jobs` at a time allow; `tell` of each as it is there."""
+    ends = time.monotonic() + within if within else float("inf")
+    left = iter(cases)
+    results: list[Result] = []
+    with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
+        waiting: set["concurrent.futures.Future[Result]"] = set()
+        while True:
+            while len(waiting) < jobs and time.monotonic() < ends and (case := next(left, None)) is not None:
+                waiting.add(pool.submit(_apart, run, case))
+            if not waiting:
+                return results
+            done, waiting = concurrent.futures.wait(waiting, return_when=concurrent.futures.FIRST_COMPLETED)
+            for one in done:
+                results.append(one.result())
+                tell(results[-1])
