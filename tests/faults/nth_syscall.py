@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Optional
 
 from apart import add_options, chosen, each
-from life import ENDS, Life, again, descriptors, end, judge, refuses
+from life import ENDS, Ending, Life, again, descriptors, end, judge, refuses
 from programs import program
 from scenarios import SCENARIOS
 
@@ -60,12 +60,11 @@ class Result:
     failed: list[str] = field(default_factory=list)
 
 
-def whose(trace: str) -> str:
-    """The library of others that made the call that failed first, by its stack; empty: it was our own."""
-    at = trace.find("(INJECTED)")
-    stack = re.match(r"\n((?: > .*\n)*)", trace[at + len("(INJECTED)"):]) if at >= 0 else None
-    found = THEIRS.search(stack[1]) if stack else None
-    return found[1] if found else ""
+def whose(trace: str) -> list[str]:
+    """Of each call that failed the library of others that made it, by its stack; empty: it was our own."""
+    stacks = re.findall(r"\(INJECTED\)\n((?: > .*\n)*)", trace)
+    found = [THEIRS.search(stack) for stack in stacks]
+    return [match[1] if match else "" for match in found]
 
 
 class Traced:
@@ -117,7 +116,7 @@ def run(scenario: str, call: str, error: str, n: int, most_descriptors: int, sta
         traced = Traced(scenario, Path(name), *(["-k"] if stacks else []), "-e", f"trace={call}",
                         *(["-P", f"{name}/output"] if call == "write" else []),  # what else is written to this way are events, which cannot fail
                         "-e", f"inject={call}:error={error}:when={n}")
-        life = traced.life
+        life, leak = traced.life, ""
         is_ready, wrong = traced.lived()
         alive = traced.alive()
         if alive and is_ready:
@@ -125,21 +124,24 @@ def run(scenario: str, call: str, error: str, n: int, most_descriptors: int, sta
             most = most_descriptors + (call in A_PIPE_INSTEAD)
             left = descriptors(life.pid, most, GIVES_UP)
             if left > most:
-                wrong = wrong or f"{left} descriptors are left, of {most}"
+                leak = f"{left} descriptors are left, of {most}"
         status = traced.end()
         trace = Path(name, "trace").read_text(encoding="utf-8", errors="replace")
-        theirs = whose(trace) if stacks else ""
-        ending = judge(life, status, is_ready, alive, f"{theirs} asked, and gives up" if theirs else "")
+        theirs = whose(trace) if stacks else [""]
+        # What ends a process is the call that failed last.
+        ending = judge(life, status, is_ready, alive, f"{theirs[-1]} asked, and gives up" if theirs and theirs[-1] else "")
         after = again(life)
-        wrong = wrong or ending.wrong or after
+        if leak and theirs and all(theirs):
+            ending, leak = Ending(f"known: {theirs[0]} asked, and keeps what it had"), ""
+        wrong = wrong or ending.wrong or leak or after
         missed = ending.how == "lived" and "(INJECTED)" not in trace  # no thread made so many of these calls this time
-        return Result(scenario, call, error, n, "missed" if missed else ending.how, wrong, life.told.failed)
+        return Result(scenario, call, error, n, "leaks" if leak else "missed" if missed else ending.how, wrong, life.told.failed)
 
 
 def run_or_excuse(scenario: str, call: str, error: str, n: int, most_descriptors: int) -> Result:
-    """What ends it by a signal, or hangs, is made again with stacks: others' code may have decided so. If not, the first time counts."""
+    """What ends it by a signal, hangs, or leaves descriptors is made again with stacks: others' code may have decided so. If not, the first time counts."""
     first = run(scenario, call, error, n, most_descriptors)
-    if first.how not in ("crashed", "hung"):
+    if first.how not in ("crashed", "hung", "leaks"):
         return first
     second = run(scenario, call, error, n, most_descriptors, stacks=True)
     return second if second.how.startswith("known") or second.wrong else first

@@ -34,7 +34,7 @@ class Draws(Life):
     """Ends with a red ball that must be seen where it was told to be shown."""
 
     def capture(self, display: str = "stack") -> None:
-        with self.connect(name="five", on_disconnect="clear") as v:
+        with self.connect(name="five", on_disconnect=30.0) as v:  # what is shown stays up where the connection is lost meanwhile
             v.layer("last", order=9).sphere("ball", radius=0.3, color="red", fill="solid")
             frame = v.commit()
             outcomes = frame.wait_shown(timeout=PATIENCE)
