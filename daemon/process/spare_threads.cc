@@ -165,7 +165,9 @@ extern "C" __attribute__((visibility("default"))) int pthread_create(
     pthread_t* thread, const pthread_attr_t* attributes, void* (*start)(void*),
     void* argument) noexcept {
   using namespace voxeld::daemon;  // NOLINT(google-build-using-namespace)
-  const int error = System()(thread, attributes, start, argument);
+  int error = System()(thread, attributes, start, argument);
+  // Who asks may create many, one by another (oneTBB ends the process where it gets none): those in hand are for what lasts.
+  if (error == EAGAIN) error = System()(thread, attributes, start, argument);
   return error == EAGAIN && Take(thread, attributes, start, argument) ? 0 : error;
 }
 #endif

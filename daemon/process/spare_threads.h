@@ -8,9 +8,9 @@
 
 namespace voxeld::daemon {
 
-// Once there are some, a pthread_create anywhere in this process (libraries and std::thread too) that fails for want of memory or of
-// numbers takes a thread that waits here, with what its attributes say of being detached alone. In a program that a sanitizer has made
-// its own of pthread_create: nothing of this.
+// A pthread_create anywhere in this process (libraries and std::thread too) that fails for want of memory or of numbers is made
+// again at once; if it fails then too, and once there are some here, it takes a thread that waits here, with what its attributes
+// say of being detached alone. In a program that a sanitizer has made its own of pthread_create: nothing of this.
 class SpareThreads {
  public:
   static constexpr int kMost = 16;
