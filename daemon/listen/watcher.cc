@@ -33,10 +33,15 @@ class WatchedWire final : public SocketWire {
   void SetWord(ConnectionId word) { word_ = word; }
   // With it the end is told of once as well: whoever lets it be armed arms it again.
   void Arm() override {
-    Control(EPOLL_CTL_MOD, epoll_, descriptor(), EPOLLET | EPOLLIN | EPOLLONESHOT, word_);
+    // Not armed, even its end would be told to nobody.
+    if (!Rearm()) Rearm();
   }
 
  private:
+  bool Rearm() {
+    return Control(EPOLL_CTL_MOD, epoll_, descriptor(), EPOLLET | EPOLLIN | EPOLLONESHOT, word_);
+  }
+
   const int epoll_;
   std::atomic<ConnectionId> word_ = kWake;
 };

@@ -131,8 +131,8 @@ def run(scenario: str, call: str, error: str, n: int, most_descriptors: int, sta
         # What ends a process is the call that failed last.
         ending = judge(life, status, is_ready, alive, f"{theirs[-1]} asked, and gives up" if theirs and theirs[-1] else "")
         after = again(life)
-        if leak and theirs and all(theirs):
-            ending, leak = Ending(f"known: {theirs[0]} asked, and keeps what it had"), ""
+        if leak and (names := [each for each in theirs if each]):
+            ending, leak = Ending(f"known: {names[0]} asked, and keeps what it had"), ""
         wrong = wrong or ending.wrong or leak or after
         missed = ending.how == "lived" and "(INJECTED)" not in trace  # no thread made so many of these calls this time
         return Result(scenario, call, error, n, "leaks" if leak else "missed" if missed else ending.how, wrong, life.told.failed)
