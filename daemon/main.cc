@@ -300,7 +300,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   } else if (config.server.http.has_value() && config.server.http_control && TellsControl(config)) {
     play = play::SetUpPlaying(config.server.listen);
   }
-  const auto phase = std::make_shared<std::atomic<http::Phase>>(http::Phase::kStarting);
+  const auto phase = std::make_shared<std::atomic<http::Phase>>();
   absl::StatusOr<std::unique_ptr<viewer::Viewer>> viewer = viewer::Viewer::Make(
       core, clock,
       {.version = Version(),
@@ -371,7 +371,6 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
     security->Look();
     process.Look();
   });
-
   watch.Tell([server = server->get()](bool serving) { server->SetServing(serving); });
   *phase = http::Phase::kServing;
 

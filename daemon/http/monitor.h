@@ -12,7 +12,7 @@
 namespace voxeld::daemon::http {
 
 // Whether clients can connect: before, the http port is there already.
-enum class Phase : uint8_t { kStarting, kServing, kEnding };
+enum class Phase : uint8_t { kStarting /* and so when it is made */, kServing, kEnding };
 
 // 200 while every display is there and is drawn for and the daemon serves, else 503:
 // {"status":"failing","reasons":[{"display":"sim","what":"lost","why":"…"}]}. A display that is

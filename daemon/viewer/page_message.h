@@ -1,6 +1,7 @@
 // What a page sends over its WebSocket (docs/protocols/viewer.md §1), read and checked.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <variant>

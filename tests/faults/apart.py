@@ -2,9 +2,9 @@
 import argparse
 import concurrent.futures
 import multiprocessing as mp
-import random
 import threading
 import time
+import zlib
 from multiprocessing.connection import Connection
 from typing import Any, Callable, Iterable, Sequence, TypeVar
 
@@ -12,26 +12,36 @@ Case = TypeVar("Case", bound=tuple[Any, ...])
 Result = TypeVar("Result")
 
 _CONTEXT = mp.get_context("forkserver")
-_CONTEXT.set_forkserver_preload(["numpy", "voxeld", "scenarios"])  # read once; none of them starts a thread by that
+_CONTEXT.set_forkserver_preload(["numpy", "voxeld"])  # read once, of the folders that PYTHONPATH has
 _STARTING = threading.Lock()
+
+
+def _part(text: str) -> str:
+    part, parts = (int(number) for number in text.split("/"))
+    if not 1 <= part <= parts:
+        raise ValueError
+    return text
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--sample", type=int, default=0, help="so many of all, by chance")
     parser.add_argument("--seed", type=int, default=1, help="of that chance (default: %(default)s)")
-    parser.add_argument("--part", default="1/1", help="of all that are wanted the K-th of N parts, as K/N: 1/1 is all")
+    parser.add_argument("--part", type=_part, default="1/1", help="of all that are wanted the K-th of N parts, as K/N: 1/1 is all")
     parser.add_argument("--within", type=float, default=0, help="seconds after which none is begun any more; how many are left is told. 0: any number")
     parser.add_argument("--jobs", type=int, default=1, help="so many lives at a time")
     parser.add_argument("--json", action="store_true", help="what came of each as JSON, on standard output")
 
 
-def chosen(cases: Sequence[Case], options: argparse.Namespace) -> list[Case]:
-    """What of them the options want, in an order of chance, so that those that are left are like those that are not."""
+def chosen(cases: Sequence[Case], key: Callable[[Case], object], options: argparse.Namespace) -> list[Case]:
+    """What of them the options want, in an order of chance, so that those that are left are like those that are not. Where a case comes, and into
+    which part, is by its key and the seed alone: also where there are some more or less of others."""
     part, parts = (int(number) for number in options.part.split("/"))
-    if not 1 <= part <= parts:
-        raise SystemExit(f"--part is {options.part}; it is K/N, from 1/N to N/N")
-    drawn = random.Random(options.seed).sample(cases, min(options.sample or len(cases), len(cases)))
-    return drawn[part - 1::parts]
+
+    def place(case: Case) -> int:
+        return zlib.crc32(f"{options.seed} {key(case)!r}".encode())
+
+    drawn = sorted(cases, key=place)[:options.sample or len(cases)]
+    return [case for case in drawn if place(case) % parts == part - 1]
 
 
 def _send(pipe: Connection, run: Callable[..., Any], case: tuple[Any, ...]) -> None:

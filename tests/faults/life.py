@@ -33,6 +33,8 @@ class Told:
 
     shown: bool = False  # what the last capture looked for, in its volume
     durable: bool = False  # the layer with the box, which a client told it to keep
+    kept: set[str] = field(default_factory=set)  # entities besides that are durable
+    gone: set[str] = field(default_factory=set)  # and those whose end is
     failed: list[str] = field(default_factory=list)  # steps that were refused, with what was said
 
 
@@ -43,9 +45,10 @@ class Life:
     steps: ClassVar[tuple[str, ...]]  # methods, in their order; each may be refused, and the next is done all the same
     shows: ClassVar[bool] = True  # unharmed, it has been told that something is shown,
     keeps: ClassVar[bool] = False  # and durable
-    from_start: ClassVar[bool] = False  # what fails may do so as it starts; else once it is ready
+    from_start: ClassVar[bool] = False  # what fails may do so as it starts, since that is a part of it; else once it is ready
 
-    engine: ClassVar[str] = ""  # more lines of the configuration: of the section [engine],
+    engine: ClassVar[str] = ""  # more lines of the configuration's section of that name
+
     def __init__(self, folder: Path, server: str = "") -> None:
         """`server`: more lines of the configuration's section."""
         self.folder = folder
@@ -174,6 +177,19 @@ def descriptors(pid: int, most: int, patience: float = PATIENCE) -> int:
         time.sleep(0.02)  # connections close by themselves, and nothing tells when
 
 
+def descriptors_at_rest(pid: int) -> int:
+    """How many a process has, once connections that have ended are closed: as many for half a second."""
+    deadline = time.monotonic() + PATIENCE
+    have, since = -1, 0.0
+    while True:
+        now = descriptors(pid, 1 << 20)
+        if now != have:
+            have, since = now, time.monotonic()
+        elif time.monotonic() > min(since + 0.5, deadline):
+            return have
+        time.sleep(0.02)  # nothing tells when
+
+
 def end(process: "subprocess.Popen[str]", pid: int) -> Optional[int]:
     """Its exit status when it was asked to end; None: it had to be killed."""
     if pid:
@@ -223,7 +239,7 @@ def again(before: Life) -> str:
     if not life.ready(process):
         wrong = f"it does not start any more: {life.said().strip().splitlines()[-1:]}"
     elif told.durable:
-        life.step("durable after", lambda: has_box(life))
+        life.step("durable after", lambda: has_kept(life, told))
         if life.told.failed:
             wrong = f"what was told to be durable is not there: {life.told.failed}"
     if end(process, process.pid) is None:
@@ -231,8 +247,8 @@ def again(before: Life) -> str:
     return wrong
 
 
-def has_box(life: Life) -> None:
+def has_kept(life: Life, told: Told) -> None:
     with life.connect(name="after") as v:
-        names = [entity.key.id for entity in v.entities()]
-        if "box" not in names:
-            raise AssertionError(f"entities are {names}")
+        names = {entity.key.id for entity in v.entities()}
+        if not {"box", *told.kept} <= names or names & told.gone:
+            raise AssertionError(f"entities are {sorted(names)}, durable were box and {sorted(told.kept)}, and gone {sorted(told.gone)}")

@@ -27,14 +27,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from apart import add_options, chosen, each
-from life import PATIENCE, Ending, Life, again, descriptors, end, judge
+from life import PATIENCE, Ending, Life, again, descriptors, descriptors_at_rest, end, judge
 from programs import program
 from scenarios import SCENARIOS
 
 # Who may end the process where it asked for memory itself: by an abort, or since it does not look at what it got (fontconfig, OpenSSL).
 GIVES_UP = re.compile(r"^(libfontconfig|libcrypto|libssl|libgrpc|libgrpc\+\+|libgpr|libabsl_\w+|libprotobuf|libupb|libtbb|libstdc\+\+|ld-linux-x86-64)[^ ]*\.so")
-# Seconds in which connections that have ended are closed.
-SETTLES = 3.0
 ENDED = "voxeld: out of memory: there are no"
 
 
@@ -136,7 +134,7 @@ def places(scenario: str) -> tuple[str, list[Place], int]:
         life.prepare()
         process = life.start(environment={"LD_PRELOAD": os.environ["FAIL_MALLOC"], "FAIL_MALLOC_LIST": f"{name}/list"})
         is_ready, wrong = life.lived(process, lambda: process.pid)
-        rest = descriptors(process.pid, 0, SETTLES)  # what it comes down to
+        rest = descriptors_at_rest(process.pid)
         status = end(process, process.pid)
         if not is_ready or wrong or not life.went_well() or status != 0:
             sys.exit(f"{scenario}: unharmed it failed: {wrong}{life.told}; it ended with {status}: {life.said()[-2000:]}")
@@ -177,7 +175,7 @@ def main() -> int:
     wanted = [found[site] for site in sorted(found) if not options.sites or site in options.sites.split(",")]
     cases = []
     for way in options.way or ["reserve"]:
-        cases += [(scenario, way, place, rest) for scenario, place, rest in chosen(wanted, options)]
+        cases += [(scenario, way, place, rest) for scenario, place, rest in chosen(wanted, lambda each: each[1].site, options)]
     done = 0
 
     def tell(last: Result) -> None:

@@ -33,6 +33,7 @@ from programs import program
 EVERY = 2.0  # seconds from sample to sample
 LONG = 60.0
 PARTS = 11
+WARM_UP = 10
 LEAST = 10  # minutes beyond warming up; of a shorter run slopes are told, and receipts alone are judged
 # By what part of its level a quantity may grow in an hour; of whole numbers, by how many.
 GROWTH = {"resident_mb": 0.02, "anonymous_mb": 0.02, "held_mb": 0.02, "descriptors": 0.5, "threads": 0.5, "p50_ms": 0.5, "p99_ms": 0.5}
@@ -203,13 +204,13 @@ def draw(path: str, rows: list[dict[str, float]]) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=45, help="how long (default: %(default)s)")
-    parser.add_argument("--warm-up", type=float, default=10, help="minutes from its start of which slopes know nothing (default: %(default)s, a fifth at the most)")
+    parser.add_argument("--warm-up", type=float, default=None, help=f"minutes from its start of which slopes know nothing (default: {WARM_UP}, or a third of a short run)")
     parser.add_argument("--roles", default=",".join(ROLES), help="which clients there are (default: %(default)s)")
     parser.add_argument("--csv", help="a file for each measurement, a line each")
     parser.add_argument("--svg", help="a file for a picture of them")
     parser.add_argument("--json", action="store_true", help="what came of it as JSON, on standard output")
     options = parser.parse_args()
-    warm_up = min(options.warm_up, options.minutes / 5)
+    warm_up = options.warm_up if options.warm_up is not None else min(WARM_UP, options.minutes / 3)
     judged = options.minutes - warm_up >= LEAST
     voxeld = program("VOXELD", "the daemon")
     heap_held = program("HEAP_HELD", "the library that tells what is held")

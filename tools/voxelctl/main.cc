@@ -1,5 +1,4 @@
 // voxelctl: command-line client of voxeld.
-#include <grpc/support/log.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -12,6 +11,7 @@
 #include "tools/voxelctl/cli/options.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/commands/console.h"
+#include "tools/voxelctl/connection/quiet_grpc.h"
 #include "tools/voxelctl/process/interrupt.h"
 
 namespace {
@@ -28,10 +28,7 @@ int main(int argc, char** argv) {
   try {
     // A reader that goes away is an error of the write, not the end of the process.
     std::signal(SIGPIPE, SIG_IGN);
-    // gRPC's own lines say again, in its words, what the error of a call says in ours. Who wants them tells gRPC.
-    if (EnvironmentVariable("GRPC_VERBOSITY").empty()) {
-      gpr_set_log_function([](gpr_log_func_args*) {});
-    }
+    QuietGrpc();
     const ParsedCommandLine parsed =
         ParseCommandLine(std::vector<std::string>(argv + 1, argv + argc));
     std::cout << parsed.out << std::flush;

@@ -120,7 +120,7 @@ void PrintTo(const Life& life, std::ostream* out) { *out << life.name; }
 const Life kLives[] = {
     {"ordinary", 4, 8, &Mixed},
     {"the_first", 0, 4, &Mixed},
-    {"many_rows", 2, 4, &Many},
+    {"many_rows", 2, 4, &Many, false, false, 20},
     {"large_rows", 2, 5, &Large},
     {"one_row", 1, 10, &OneRow},
     {"all_is_removed", 3, 5, &AllGone},

@@ -230,8 +230,8 @@ TEST_F(ViewerPlayTest, IsForPagesOfThisOriginWithControl) {
 
 TEST_F(ViewerPlayTest, WhatIsNoFileIsRefused) {
   Start(kPlays, {.max_bytes = 100});
-  for (const char* path :
-       {"/play", "/play?name=", "/play?name=a%2", "/play?name=a%zz.obj", "/play?title=a.obj"}) {
+  for (const char* path : {"/play", "/play?name=", "/play?name=a%2", "/play?name=a%zz.obj",
+                           "/play?name=a%2z.obj", "/play?title=a.obj"}) {
     const Answer answer = Post(path);
     EXPECT_EQ(answer.result_int(), 400u) << path;
     EXPECT_THAT(answer.body(), HasSubstr("/play?name=teapot.obj")) << path;
