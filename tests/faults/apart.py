@@ -17,9 +17,9 @@ _STARTING = threading.Lock()
 
 
 def _part(text: str) -> str:
-    part, parts = (int(number) for number in text.split("/"))
-    if not 1 <= part <= parts:
-        raise ValueError
+    part, _, parts = text.partition("/")
+    if not part.isdecimal() or not parts.isdecimal() or not 1 <= int(part) <= int(parts):
+        raise argparse.ArgumentTypeError(f"it is {text}; give K/N, the K-th of N parts, as 1/3")
     return text
 
 
