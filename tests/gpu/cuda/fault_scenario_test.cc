@@ -1,12 +1,31 @@
-// The scenario in which CUDA's calls are made to fail, played by the CPU engine.
+// The scenarios in which CUDA's calls are made to fail, played by the CPU engine.
 #include "tests/gpu/cuda/fault_scenario.h"
 
 #include <gtest/gtest.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
 
 #include "tests/conformance/conformance_test.h"
 
 namespace voxeld::gpu {
 namespace {
+
+// Does the step; what is seen then is what the oracle draws. True: it was a frame.
+bool DrawsWhatItSays(FaultPlayer& player, const FaultStep& step) {
+  const absl::Status status = player.Do(step);
+  EXPECT_TRUE(status.ok()) << status;
+  if (step.kind == FaultStep::Kind::kApply || step.kind == FaultStep::Kind::kTarget) return false;
+  const conformance::DenseVolume want = conformance::OracleVoxels(step.scene, step.target);
+  if (step.kind == FaultStep::Kind::kVoxels) {
+    EXPECT_EQ(conformance::FirstDifference(player.seen().voxels, want, step.target), "");
+    return false;
+  }
+  EXPECT_TRUE(player.seen().pictures == conformance::OraclePictures(want, step.target));
+  return true;
+}
 
 TEST(FaultScenario, DrawsWhatItSaysAndSomethingNewWithEveryFrame) {
   FaultPlayer player(conformance::CaseOf("cpu", EngineKind::kCpu, false));
@@ -14,16 +33,8 @@ TEST(FaultScenario, DrawsWhatItSaysAndSomethingNewWithEveryFrame) {
   int frames = 0;
   for (const FaultStep& step : FaultScenario()) {
     SCOPED_TRACE(step.name);
-    const absl::Status status = player.Do(step);
-    ASSERT_TRUE(status.ok()) << status;
-    if (step.kind == FaultStep::Kind::kApply || step.kind == FaultStep::Kind::kTarget) continue;
-    const conformance::DenseVolume want = conformance::OracleVoxels(step.scene, step.target);
-    if (step.kind == FaultStep::Kind::kVoxels) {
-      EXPECT_EQ(conformance::FirstDifference(player.seen().voxels, want, step.target), "");
-      continue;
-    }
+    if (!DrawsWhatItSays(player, step)) continue;
     ++frames;
-    EXPECT_TRUE(player.seen().pictures == conformance::OraclePictures(want, step.target));
     EXPECT_GT(player.seen().lit_voxels, 1000u);
     EXPECT_EQ(player.seen().singular_drawables, frames == 1 ? 0u : 1u);
     const bool out_of_sight = step.name == "the crowd has moved out of sight, drawn";
@@ -37,19 +48,10 @@ TEST(FaultScenario, DrawsByChanceWhatItSays) {
   for (const uint64_t seed : kFaultSeeds) {
     FaultPlayer player(conformance::CaseOf("cpu", EngineKind::kCpu, false));
     uint64_t lit = 0;
-    std::vector<FaultStep> steps = RandomFaultScenario(seed);
+    const std::vector<FaultStep> steps = RandomFaultScenario(seed);
     for (const FaultStep& step : steps) {
       SCOPED_TRACE("seed " + std::to_string(seed) + ", " + step.name);
-      const absl::Status status = player.Do(step);
-      ASSERT_TRUE(status.ok()) << status;
-      if (step.kind == FaultStep::Kind::kApply || step.kind == FaultStep::Kind::kTarget) continue;
-      const conformance::DenseVolume want = conformance::OracleVoxels(step.scene, step.target);
-      if (step.kind == FaultStep::Kind::kVoxels) {
-        EXPECT_EQ(conformance::FirstDifference(player.seen().voxels, want, step.target), "");
-        continue;
-      }
-      EXPECT_TRUE(player.seen().pictures == conformance::OraclePictures(want, step.target));
-      lit += player.seen().lit_voxels;
+      if (DrawsWhatItSays(player, step)) lit += player.seen().lit_voxels;
     }
     EXPECT_GT(lit, 1000u) << seed;
     EXPECT_EQ(steps.back().kind, FaultStep::Kind::kFrame);
