@@ -215,10 +215,16 @@ absl::StatusOr<access::AccessOptions> AccessOf(const SecurityConfig& config) {
   return options;
 }
 
+namespace {
+
+bool IsReachedInPlain(const Address& address, const SecurityConfig& security) {
+  return !address.tls && !address.is_local() && !security.allow_plain_beyond_loopback;
+}
+
+}  // namespace
+
 absl::Status CheckReach(const Address& address, const SecurityConfig& security) {
-  if (address.tls || address.is_local() || security.allow_plain_beyond_loopback) {
-    return absl::OkStatus();
-  }
+  if (!IsReachedInPlain(address, security)) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(
       address.ToString(),
       " may be reached from other machines, and all that goes over it could be read and changed; "
@@ -229,7 +235,6 @@ absl::Status CheckReach(const Address& address, const SecurityConfig& security) 
 }
 
 absl::Status CheckSecurity(const Config& config) {
-  std::vector<Address> plain = config.server.listen;
   if (config.server.http.has_value()) {
     if (config.server.http->tls) {
       return absl::InvalidArgumentError(
@@ -237,10 +242,16 @@ absl::Status CheckSecurity(const Config& config) {
                        "; /healthz and /metrics are served without TLS: give HOST:PORT, and let a "
                        "proxy add it"));
     }
-    plain.push_back(*config.server.http);
+    if (IsReachedInPlain(*config.server.http, config.security)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("http, ", config.server.http->ToString(),
+                       ", may be reached from other machines, and has no TLS: give an address of "
+                       "this machine, before which a proxy can add it, or "
+                       "security.allow_plain_beyond_loopback = true"));
+    }
   }
   bool tls = false;
-  for (const Address& address : plain) {
+  for (const Address& address : config.server.listen) {
     tls = tls || address.tls;
     if (absl::Status status = CheckReach(address, config.security); !status.ok()) return status;
   }

@@ -22,7 +22,11 @@ Response HealthResponse(const std::vector<DisplayDescription>& displays, const S
   Json reasons = Json::array();
   bool held = false;
   if (phase == Phase::kStarting) reasons.push_back({{"what", "starting"}});
-  if (phase == Phase::kEnding) reasons.push_back({{"what", "shutting down"}});
+  if (phase == Phase::kEnding) {
+    // That displays stop then is no trouble of theirs.
+    return {503, "application/json",
+            "{\"status\":\"failing\",\"reasons\":[{\"what\":\"shutting down\"}]}\n"};
+  }
   for (const DisplayDescription& display : displays) {
     if (display.state != display::DisplayState::kLost &&
         display.state != display::DisplayState::kStopped) {

@@ -16,6 +16,12 @@ _CONTEXT.set_forkserver_preload(["numpy", "voxeld"])  # read once, of the folder
 _STARTING = threading.Lock()
 
 
+def positive(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"it is {text}; give a number from 1 on")
+    return int(text)
+
+
 def _part(text: str) -> str:
     part, _, parts = text.partition("/")
     if not part.isdecimal() or not parts.isdecimal() or not 1 <= int(part) <= int(parts):
@@ -24,11 +30,11 @@ def _part(text: str) -> str:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--sample", type=int, default=0, help="so many of all, by chance")
+    parser.add_argument("--sample", type=positive, default=0, help="so many of all, by chance (default: all)")
     parser.add_argument("--seed", type=int, default=1, help="of that chance (default: %(default)s)")
     parser.add_argument("--part", type=_part, default="1/1", help="of all that are wanted the K-th of N parts, as K/N: 1/1 is all")
     parser.add_argument("--within", type=float, default=0, help="seconds after which none is begun any more; how many are left is told. 0: any number")
-    parser.add_argument("--jobs", type=int, default=1, help="so many lives at a time")
+    parser.add_argument("--jobs", type=positive, default=1, help="so many lives at a time")
     parser.add_argument("--json", action="store_true", help="what came of each as JSON, on standard output")
 
 

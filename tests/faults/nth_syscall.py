@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Optional
 
-from apart import add_options, chosen, each
+from apart import add_options, chosen, each, positive
 from life import ENDS, Ending, Life, again, descriptors, descriptors_at_rest, end, judge, refuses
 from programs import program
 from scenarios import SCENARIOS
@@ -183,7 +183,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenarios", default=",".join(SCENARIOS), help="only these, by comma (default: all ten: %(default)s)")
     parser.add_argument("--calls", help="only these, by comma")
-    parser.add_argument("--most", type=int, default=1 << 30, help="of each call the first so many")
+    parser.add_argument("--most", type=positive, default=1 << 30, help="of each call the first so many")
     add_options(parser)
     parser.add_argument("--list", action="store_true", help="say how often each is called, and how many cases that makes, and end")
     options = parser.parse_args()

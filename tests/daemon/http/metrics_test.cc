@@ -169,7 +169,11 @@ TEST(Health, IsWellUnlessADisplayIsLostOrAnEngineIsGone) {
   EXPECT_EQ(HealthResponse(displays, stats, Phase::kStarting).status, 503u);
   EXPECT_THAT(HealthResponse(displays, stats, Phase::kStarting).body, HasSubstr("\"starting\""));
   EXPECT_EQ(HealthResponse(displays, stats, Phase::kEnding).status, 503u);
-  EXPECT_THAT(HealthResponse(displays, stats, Phase::kEnding).body, HasSubstr("shutting down"));
+  // And nothing else: that displays stop then is no trouble of theirs.
+  stats.displays[0].state = display::DisplayState::kStopped;
+  EXPECT_EQ(HealthResponse(displays, stats, Phase::kEnding).body,
+            R"({"status":"failing","reasons":[{"what":"shutting down"}]})"
+            "\n");
 }
 
 }  // namespace
