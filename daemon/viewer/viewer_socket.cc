@@ -236,12 +236,12 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     }
     const uint64_t volume = shown->volume.volume;
     const auto& info = watches_[id].info;
-    shared_->comparer->Post(
-        {info->name, info, *std::move(shown), hidden,
-         Then<Comparison>([id, volume](ViewerSocket& self, const auto& comparison) {
-           self.End(Asked::kCompare);
-           self.Compared(id, volume, comparison);
-         })});
+    Core::Reply<Comparison> reply =
+        Then<Comparison>([id, volume](ViewerSocket& self, const auto& comparison) {
+          self.End(Asked::kCompare);
+          self.Compared(id, volume, comparison);
+        });
+    shared_->comparer->Post({info->name, info, *std::move(shown), hidden, std::move(reply)});
   }
 
   // Each that asks has an answer.

@@ -155,10 +155,11 @@ void OneFailure::Live(CrashDisk& disk, int* failed, Rows* model) const {
   };
   const auto open = [&] {
     file.reset();
-    ASSERT_NO_FATAL_FAILURE(twice("open", [&] {
+    ASSERT_NO_FATAL_FAILURE(twice("open", [&]() -> absl::Status {
       absl::StatusOr<std::unique_ptr<StateFile>> opened = OpenDisk(disk);
-      if (opened.ok()) file = *std::move(opened);
-      return opened.status();
+      if (!opened.ok()) return opened.status();
+      file = *std::move(opened);
+      return absl::OkStatus();
     }));
     EXPECT_EQ(file->quarantined(), "") << "a good file was put aside";
   };
