@@ -106,7 +106,7 @@ class Life:
         """What fails is noted and the next goes on; errors that are not the clients' own are the test's."""
         try:
             what()
-        except (voxel.VoxelError, grpc.RpcError, TimeoutError, ConnectionError, OSError, AssertionError) as error:
+        except (voxel.VoxelError, grpc.RpcError, TimeoutError, ConnectionError, OSError, AssertionError, StopIteration) as error:
             said = str(error.details() if isinstance(error, grpc.RpcError) else error)
             self.told.failed.append(f"{name}: {type(error).__name__}: {said.partition(chr(10))[0]}")
 
