@@ -7,7 +7,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 import urllib.request
 from pathlib import Path
 from typing import Any, Optional
@@ -19,6 +18,7 @@ from google.protobuf.message import Message
 from voxeld.v1 import display_pb2, scene_pb2
 
 from life import PATIENCE, Life, end, free_port
+from polling import until
 from relay import Relay
 
 TOKEN = "a-token-of-this-test-alone"
@@ -55,11 +55,7 @@ class Draws(Life):
             v.close(PATIENCE)
 
     def until(self, metric: str, least: float) -> None:
-        """Nothing tells a client when."""
-        deadline = time.monotonic() + PATIENCE
-        while self.metric(metric) < least:
-            assert time.monotonic() < deadline, f"{metric} is {self.metric(metric)} after {PATIENCE:.0f} s"
-            time.sleep(0.05)
+        until(lambda: self.metric(metric) >= least, f"{metric} is {least:g}", PATIENCE)
 
     def metric(self, name: str) -> float:
         with urllib.request.urlopen(f"http://127.0.0.1:{self.port}/metrics", timeout=PATIENCE) as answer:

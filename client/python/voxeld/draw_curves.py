@@ -90,9 +90,9 @@ class DrawCurves(DrawMeasured[Drawn]):
         return self._draw(name, grids.grid, (array,), dict(values=values, colors=colors, cmap=cmap, opacities=opacities,
                                                            extent=extent, filter=filter, color=color), Look.of(**look))
 
-    def isosurface(self, name: str, array: Union[npt.ArrayLike, Asset], level: float, *, extent: grids.Extent = None, filter: str = "linear",
-                   color: Optional[Colors] = None, fill: str = "surface", rule: str = "thin", shell: Optional[float] = None,
-                   unit: str = "voxels", **look: Any) -> Drawn:
+    def isosurface(self, name: str, array: Union[npt.ArrayLike, Asset], level: float, *, extent: grids.Extent = None,
+                   filter: str = "linear", color: Optional[Colors] = None, fill: str = "surface", rule: str = "thin",
+                   shell: Optional[float] = None, unit: str = "voxels", **look: Any) -> Drawn:
         """Where (nx, ny, nz) numbers are at a level, or, solid, no less than it."""
         return self._draw(name, grids.isosurface, (array, level), dict(
             extent=extent, filter=filter, color=color, fill=fill, rule=rule, shell=shell, unit=unit), Look.of(**look))
