@@ -151,10 +151,10 @@ class Life:
 
 
 def refuses(life: Life) -> str:
-    """What it says to one more client that draws, three times; nothing: it serves, as it should whatever failed once."""
+    """What it says to one more client that draws, again and again; nothing: it serves, as it should whatever failed once."""
     told, life.told = life.told, Told()
     try:
-        for _ in range(3):  # each new thread may meet a failure of its own
+        for _ in range(8):  # each thread that had not answered yet may meet a failure of its own
             life.told.failed.clear()
             life.step("draw afterwards", life.draw)
             if not life.told.failed:
@@ -175,6 +175,13 @@ def descriptors(pid: int, most: int, patience: float = PATIENCE) -> int:
         if have <= most or time.monotonic() > deadline:
             return have
         time.sleep(0.02)  # connections close by themselves, and nothing tells when
+
+
+def events(pid: int) -> int:
+    """How many of a process's descriptors are eventfds."""
+    with contextlib.suppress(OSError):
+        return sum(os.readlink(f"/proc/{pid}/fd/{name}") == "anon_inode:[eventfd]" for name in os.listdir(f"/proc/{pid}/fd"))
+    return 0
 
 
 def descriptors_at_rest(pid: int) -> int:
