@@ -139,6 +139,8 @@ constexpr Row<AssetFigures> kAssetRows[] = {
 };
 
 constexpr Row<ProcessFigures> kProcessRows[] = {
+    {"voxeld_process_heap_bytes", &ProcessFigures::heap_bytes, MetricType::Gauge,
+     "Bytes that are allocated, the reserve of memory among them"},
     {"voxeld_process_allocations_failed_total", &ProcessFigures::allocations_failed,
      MetricType::Counter, "Allocations that the system had no memory for, at first"},
     {"voxeld_process_allocations_refused_total", &ProcessFigures::allocations_refused,

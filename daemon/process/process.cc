@@ -41,6 +41,15 @@ void GiveBackFreeMemory() {
 #endif
 }
 
+uint64_t HeapBytes() {
+#ifdef __GLIBC__
+  const struct mallinfo2 heap = mallinfo2();
+  return uint64_t{heap.uordblks} + heap.hblkhd;
+#else
+  return 0;
+#endif
+}
+
 void RaiseDescriptorLimit() {
   rlimit limit;
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;

@@ -1,6 +1,7 @@
 // What a process that serves gRPC sets for itself as a whole, once, before it has a second thread.
 #pragma once
 
+#include <cstdint>
 #include <exception>
 #include <string>
 
@@ -15,6 +16,10 @@ void TuneProcess();
 // for ever else, each arena's, and higher ones come the longer the daemon runs. Takes longer the more
 // places are free, and others who want memory of that arena wait for it; what is wanted again is faulted in again.
 void GiveBackFreeMemory();
+
+// Bytes that are allocated, as the allocator counts: the reserve among them, and what it keeps for each thread. 0: it does
+// not tell.
+uint64_t HeapBytes();
 
 // As many descriptors as the process may have: every client holds two, what serves it and what guards it.
 void RaiseDescriptorLimit();

@@ -20,6 +20,7 @@ void ProcessWatch::Look() {
 ProcessFigures ProcessWatch::figures() const {
   ProcessFigures figures = reserve_.figures();
   time_.AddTo(figures);
+  figures.heap_bytes = HeapBytes();
   return figures;
 }
 

@@ -20,7 +20,7 @@ import voxeld as voxel
 
 from life import free_port
 from polling import LONG, until
-from programs import program
+from programs import ENDS_WITH_US, program
 
 DISPLAYS = 'driver = "simulated"\nsize = "16x16x12"\nrate = 60\n'
 HERE = Path(__file__).parent
@@ -60,7 +60,7 @@ class Cell:
 
     def start(self) -> None:
         self.log = open(f"{self.folder}/log", "a", encoding="utf-8")
-        self.daemon = subprocess.Popen([program("VOXELD", "the daemon"), "--config", f"{self.folder}/voxeld.toml", "--log-level", "info"],
+        self.daemon = subprocess.Popen([*ENDS_WITH_US, program("VOXELD", "the daemon"), "--config", f"{self.folder}/voxeld.toml", "--log-level", "info"],
                                        stdin=subprocess.DEVNULL, stdout=self.log, stderr=subprocess.STDOUT, env=self.environment)
         until(self.reachable, f"a daemon: {self.said()[-2000:]}")
 

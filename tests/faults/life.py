@@ -17,8 +17,11 @@ import grpc
 import numpy as np
 import voxeld as voxel
 
+from programs import ENDS_WITH_US
+
 PATIENCE = 8.0  # for what may not come any more
 ENDS = 30.0  # for a daemon to end by itself
+HEAP_SPREAD = 256 << 10  # bytes by which one unharmed life differs from another: 40 KiB were seen
 
 
 def free_port() -> int:
@@ -83,7 +86,8 @@ class Life:
         path = self.folder / "voxeld.toml"
         path.write_text(self.config(), encoding="utf-8")
         self.output = (self.folder / "output").open("w+", encoding="utf-8")
-        self.process = subprocess.Popen([*before, os.environ["VOXELD"], "--config", str(path), "--log-level", "info"],
+        ends_with_us = () if before or environment else ENDS_WITH_US  # what is traced or preloaded is the daemon alone
+        self.process = subprocess.Popen([*ends_with_us, *before, os.environ["VOXELD"], "--config", str(path), "--log-level", "info"],
                                         stdin=subprocess.DEVNULL, stdout=self.output, stderr=subprocess.STDOUT, text=True, start_new_session=True,
                                         env={**os.environ, **(environment or {})})
         return self.process
@@ -177,6 +181,24 @@ def descriptors(pid: int, most: int, patience: float = PATIENCE) -> int:
         time.sleep(0.02)  # connections close by themselves, and nothing tells when
 
 
+def metric(port: int, name: str) -> int:
+    """As the daemon tells it; -1: it does not."""
+    try:
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=PATIENCE) as answer:
+            found = re.search(rf"^{name} (\S+)", answer.read().decode(), re.M)
+            return int(float(found[1])) if found else -1
+    except OSError:
+        return -1
+
+
+def heap(port: int, most: int) -> int:
+    """Bytes that it has allocated, once they are no more than `most`, or after a while. -1: it does not tell."""
+    deadline = time.monotonic() + PATIENCE
+    while (have := metric(port, "voxeld_process_heap_bytes")) > most and time.monotonic() < deadline:
+        time.sleep(0.05)  # what is over is let go of by and by, and nothing tells when
+    return have
+
+
 def events(pid: int) -> int:
     """How many of a process's descriptors are eventfds."""
     with contextlib.suppress(OSError):
@@ -184,8 +206,15 @@ def events(pid: int) -> int:
     return 0
 
 
-def descriptors_at_rest(pid: int) -> int:
-    """How many a process has, once connections that have ended are closed: as many for half a second."""
+@dataclass(frozen=True)
+class Rest:
+    """What a daemon has before its end, when nobody is there."""
+    descriptors: int
+    heap: int  # bytes allocated
+
+
+def at_rest(life: Life, pid: int) -> Rest:
+    """Once connections that have ended are closed: as many descriptors for half a second."""
     deadline = time.monotonic() + PATIENCE
     have, since = -1, 0.0
     while True:
@@ -193,8 +222,16 @@ def descriptors_at_rest(pid: int) -> int:
         if now != have:
             have, since = now, time.monotonic()
         elif time.monotonic() > min(since + 0.5, deadline):
-            return have
+            return Rest(have, metric(life.port, "voxeld_process_heap_bytes"))
         time.sleep(0.02)  # nothing tells when
+
+
+def leaks(life: Life, most: Rest) -> str:
+    """Memory that is left beyond what there is unharmed, of a life in which its clients missed nothing; nothing: none."""
+    allowed = most.heap + HEAP_SPREAD
+    if life.told.failed or (left := heap(life.port, allowed)) <= allowed:
+        return ""
+    return f"{left} bytes are left allocated, of {most.heap}"
 
 
 def end(process: "subprocess.Popen[str]", pid: int) -> Optional[int]:

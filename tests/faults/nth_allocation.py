@@ -12,7 +12,7 @@ The way that it fails:
 
 What must hold: with the reserve the daemon lives, refuses nothing, and counts the failure; otherwise it lives, or ends with 1 and a line that says
 why, or by the abort of a library of others that gives up where it asked itself. In each case nothing hangs, what was told to be shown is shown, what
-was told to be durable is there after the next start, and in the end it has no more descriptors than unharmed. Paths are in VOXELD, FAIL_MALLOC (the
+was told to be durable is there after the next start, and in the end it has no more descriptors and memory than unharmed. Paths are in VOXELD, FAIL_MALLOC (the
 preloaded library) and PYTHONPATH; ends with 1 if one did not."""
 import argparse
 import collections
@@ -22,12 +22,11 @@ import re
 import subprocess
 import sys
 import tempfile
-import urllib.request
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from apart import add_options, chosen, each
-from life import PATIENCE, Ending, Life, again, descriptors, descriptors_at_rest, end, judge
+from life import Ending, Life, Rest, again, at_rest, descriptors, end, judge, leaks, metric
 from programs import program
 from scenarios import SCENARIOS
 
@@ -60,17 +59,7 @@ def place_of(line: str) -> Place:
     return Place(site, int(count), stack)
 
 
-def failures(life: Life) -> int:
-    """That the daemon counts itself; -1: it does not tell."""
-    try:
-        with urllib.request.urlopen(f"http://127.0.0.1:{life.port}/metrics", timeout=PATIENCE) as answer:
-            found = re.search(r"^voxeld_process_allocations_failed_total (\d+)", answer.read().decode(), re.M)
-            return int(found[1]) if found else -1
-    except OSError:
-        return -1
-
-
-def run(scenario: str, way: str, place: Place, most_descriptors: int) -> Result:
+def run(scenario: str, way: str, place: Place, rest: Rest) -> Result:
     with tempfile.TemporaryDirectory(prefix="voxeld-nth-") as name:
         life = SCENARIOS[scenario](Path(name), "memory_reserve_bytes = 0" if way == "bare" else "")
         life.prepare()
@@ -80,8 +69,9 @@ def run(scenario: str, way: str, place: Place, most_descriptors: int) -> Result:
             "FAIL_MALLOC_TIMES": {"reserve": "1", "bare": "2", "forever": "0"}[way]})
         is_ready, wrong = life.lived(process, lambda: process.pid)
         alive = process.poll() is None
-        left = descriptors(process.pid, most_descriptors)
-        counted = failures(life) if alive and told.exists() else -1  # it may come with the end
+        left = descriptors(process.pid, rest.descriptors)
+        leak = leaks(life, rest) if alive and is_ready else ""
+        counted = metric(life.port, "voxeld_process_allocations_failed_total") if alive and told.exists() else -1  # it may come with the end
         status = end(process, process.pid)
         said = life.said()
         met = told.exists()
@@ -109,17 +99,19 @@ def run(scenario: str, way: str, place: Place, most_descriptors: int) -> Result:
             wrong = wrong or f"it ended with {status}"
         elif ending.how == "ended" and ENDED not in said:
             wrong = wrong or "it ended, and did not say that there was no memory"
-        if ending.how == "lived" and left > most_descriptors:
-            wrong = wrong or f"{left} descriptors are left, of {most_descriptors}"
+        if ending.how == "lived" and left > rest.descriptors:
+            wrong = wrong or f"{left} descriptors are left, of {rest.descriptors}"
+        elif ending.how == "lived":
+            wrong = wrong or leak
         return Result(scenario, way, place.site, ending.how, stack, wrong, failed=life.told.failed)
 
 
-def run_twice(scenario: str, way: str, place: Place, most_descriptors: int) -> Result:
+def run_twice(scenario: str, way: str, place: Place, rest: Rest) -> Result:
     """What is wrong must be so again: a machine that is busy with other things leaves clients waiting, too."""
-    first = run(scenario, way, place, most_descriptors)
+    first = run(scenario, way, place, rest)
     if not first.wrong:
         return first
-    second = run(scenario, way, place, most_descriptors)
+    second = run(scenario, way, place, rest)
     if second.wrong:
         second.wrong = f"{first.wrong}; and again: {second.wrong}"
     else:
@@ -127,14 +119,14 @@ def run_twice(scenario: str, way: str, place: Place, most_descriptors: int) -> R
     return second
 
 
-def places(scenario: str) -> tuple[str, list[Place], int]:
-    """Where memory is asked for in a life without failures, and how many descriptors there are before its end."""
+def places(scenario: str) -> tuple[str, list[Place], Rest]:
+    """Where memory is asked for in a life without failures, and what there is before its end."""
     with tempfile.TemporaryDirectory(prefix="voxeld-nth-") as name:
         life = SCENARIOS[scenario](Path(name))
         life.prepare()
         process = life.start(environment={"LD_PRELOAD": os.environ["FAIL_MALLOC"], "FAIL_MALLOC_LIST": f"{name}/list"})
         is_ready, wrong = life.lived(process, lambda: process.pid)
-        rest = descriptors_at_rest(process.pid)
+        rest = at_rest(life, process.pid)
         status = end(process, process.pid)
         if not is_ready or wrong or not life.went_well() or status != 0:
             sys.exit(f"{scenario}: unharmed it failed: {wrong}{life.told}; it ended with {status}: {life.said()[-2000:]}")
@@ -160,7 +152,7 @@ def main() -> int:
         parser.error(f"no such scenarios: {', '.join(sorted(unknown))}; there are {', '.join(SCENARIOS)}")
     program("VOXELD", "the daemon")
     program("FAIL_MALLOC", "the library that makes allocations fail")
-    found: dict[str, tuple[str, Place, int]] = {}
+    found: dict[str, tuple[str, Place, Rest]] = {}
     counted = {scenario: (here, rest) for scenario, here, rest in each(places, [(scenario,) for scenario in scenarios], options.jobs)}
     for scenario in scenarios:
         here, rest = counted[scenario]
@@ -169,7 +161,7 @@ def main() -> int:
         if options.list:
             for place in new:
                 print(scenario, place.site, place.count, *place.stack)
-            print(f"{scenario}: {len(here)} places, {len(new)} new, {sum(place.count for place in here)} allocations, {rest} descriptors")
+            print(f"{scenario}: {len(here)} places, {len(new)} new, {sum(place.count for place in here)} allocations, {rest.descriptors} descriptors, {rest.heap} bytes")
     if options.list:
         return 0
     wanted = [found[site] for site in sorted(found) if not options.sites or site in options.sites.split(",")]

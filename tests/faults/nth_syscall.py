@@ -6,7 +6,7 @@ usage: nth_syscall.py [--scenarios NAME,…] [--calls NAME,…] [--most N] [--sa
                       [--jobs N] [--list] [--json]
 
 What must hold: no signal ends the daemon, nothing hangs, a start that fails says why, what was told to be shown is shown, what was told to be
-durable is there after the next start, whoever comes afterwards is served, no descriptor is left, and the daemon ends by itself when asked. Paths are in VOXELD and PYTHONPATH; ends with 1 if one did not."""
+durable is there after the next start, whoever comes afterwards is served, no descriptor and no memory is left, and the daemon ends by itself when asked. Paths are in VOXELD and PYTHONPATH; ends with 1 if one did not."""
 import argparse
 import collections
 import contextlib
@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Optional
 
 from apart import add_options, chosen, each, positive
-from life import ENDS, Ending, Life, again, descriptors, descriptors_at_rest, end, events, judge, refuses
+from life import ENDS, Ending, Life, Rest, again, at_rest, descriptors, end, events, judge, leaks, refuses
 from programs import program
 from scenarios import SCENARIOS
 
@@ -122,7 +122,7 @@ class Traced:
             time.sleep(0.005)  # nothing tells when it has all threads
 
 
-def run(scenario: str, call: str, error: str, n: int, most_descriptors: int, stacks: bool = False) -> Result:
+def run(scenario: str, call: str, error: str, n: int, rest: Rest, stacks: bool = False) -> Result:
     """With `stacks`, much slower, what others' code does when it is refused is told from what ours does."""
     with tempfile.TemporaryDirectory(prefix="voxeld-nth-") as name:
         traced = Traced(scenario, Path(name), *(["-k"] if stacks else []), "-e", f"trace={call}",
@@ -133,11 +133,13 @@ def run(scenario: str, call: str, error: str, n: int, most_descriptors: int, sta
         alive = traced.alive()
         if alive and is_ready:
             wrong = wrong or refuses(life)
-            most = most_descriptors + (call in A_PIPE_INSTEAD)
+            most = rest.descriptors + (call in A_PIPE_INSTEAD)
             left = descriptors(life.pid, most, GIVES_UP)
             if left > most and (call, error) not in LEAVES_IT_OPEN:
                 leak = f"{left} descriptors are left, of {most}"
                 others = left - events(life.pid)
+            elif left <= most and not wrong:
+                leak = leaks(life, rest)
         status = traced.end()
         trace = Path(name, "trace").read_text(encoding="utf-8", errors="replace")
         theirs = whose(trace) if stacks else [""]
@@ -151,27 +153,27 @@ def run(scenario: str, call: str, error: str, n: int, most_descriptors: int, sta
         return Result(scenario, call, error, n, "leaks" if leak else "missed" if missed else ending.how, wrong, life.told.failed)
 
 
-def run_or_excuse(scenario: str, call: str, error: str, n: int, most_descriptors: int) -> Result:
-    """What ends it by a signal, hangs, or leaves descriptors is made again with stacks: others' code may have decided so. If not, the first time counts."""
-    first = run(scenario, call, error, n, most_descriptors)
+def run_or_excuse(scenario: str, call: str, error: str, n: int, rest: Rest) -> Result:
+    """What ends it by a signal, hangs, or leaves something is made again with stacks: others' code may have decided so. If not, the first time counts."""
+    first = run(scenario, call, error, n, rest)
     if first.how not in ("crashed", "hung", "leaks"):
         return first
     for _ in range(3):  # which thread is refused is up to chance
-        again_with_stacks = run(scenario, call, error, n, most_descriptors, stacks=True)
+        again_with_stacks = run(scenario, call, error, n, rest, stacks=True)
         if again_with_stacks.how.startswith("known") or again_with_stacks.wrong:
             return again_with_stacks
     return first
 
 
-def count(scenario: str) -> tuple[str, dict[str, int], int]:
-    """How often a thread calls each at the most, and how many descriptors there are before the end."""
+def count(scenario: str) -> tuple[str, dict[str, int], Rest]:
+    """How often a thread calls each at the most, and what there is before the end."""
     with tempfile.TemporaryDirectory(prefix="voxeld-nth-") as name:
         traced = Traced(scenario, Path(name), "-e", f"trace={','.join(ERRORS)}")
         is_ready, wrong = traced.lived()
         life = traced.life
         if is_ready:
             wrong = wrong or ("" if life.went_well() else str(life.told)) or refuses(life)
-        rest = descriptors_at_rest(life.pid)
+        rest = at_rest(life, life.pid)
         status = traced.end()
         if not is_ready or wrong or status != 0:
             sys.exit(f"{scenario}: unharmed it failed: {wrong}; it ended with {status}: {life.said()[-2000:]}")

@@ -2,8 +2,8 @@
 """A long day in short: the real voxeld with three displays, state and http, and clients of every kind that come, draw, err and go. Its
 resident memory, what of it is held, descriptors, threads and latencies are measured all the while, and lines are laid through them.
 
-usage: soak.py [--minutes M] [--warm-up M] [--roles NAME,…] [--csv FILE] [--svg FILE] [--json]      Paths are in VOXELD, HEAP_HELD (the
-preloaded library that tells what is held) and PYTHONPATH (the client and tests/e2e).
+usage: soak.py [--minutes M] [--warm-up M] [--roles NAME,…] [--csv FILE] [--svg FILE] [--json]      Paths are in VOXELD and
+PYTHONPATH (the client and tests/e2e).
 
 Ends with 1 if a commit has not had all that it is owed, or if something grows: the 95 % confidence interval of its slope (by medians of
 elevenths of what comes after warming up) lies above zero by more than GROWTH says an hour."""
@@ -28,7 +28,7 @@ import numpy as np
 import voxeld as voxel
 
 from polling import until
-from programs import program
+from programs import ENDS_WITH_US, program
 
 EVERY = 2.0  # seconds from sample to sample
 LONG = 60.0
@@ -158,15 +158,14 @@ def role(name: str, server: str, stop: Stop, answer: Pipe) -> None:
     answer.send((tally.ends, why))
 
 
-def sample(pid: int, port: int, heap: Path) -> dict[str, float]:
+def sample(pid: int, port: int) -> dict[str, float]:
     status = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
     # Resident is what files hold too: programs' pages, which come as they are first used, and of which there are no more than files have.
     number = {key: int(value) for key, value in re.findall(r"^(VmRSS|RssAnon|Threads):\s+(\d+)", status, re.M)}
     with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=LONG) as answer:
-        answer.read()
-    held = re.match(r" *(\d+) +\d+\n", heap.read_text(encoding="ascii"))  # of the allocator's, as tests/faults/heap_held.c tells
+        held = re.search(r"^voxeld_process_heap_bytes (\S+)", answer.read().decode(), re.M)
     assert held is not None, "nothing tells what is held"
-    return {"resident_mb": number["VmRSS"] / 1024, "anonymous_mb": number["RssAnon"] / 1024, "held_mb": int(held[1]) / 2**20, "descriptors": len(os.listdir(f"/proc/{pid}/fd")), "threads": number["Threads"]}
+    return {"resident_mb": number["VmRSS"] / 1024, "anonymous_mb": number["RssAnon"] / 1024, "held_mb": float(held[1]) / 2**20, "descriptors": len(os.listdir(f"/proc/{pid}/fd")), "threads": number["Threads"]}
 
 
 def line_through(times: np.ndarray[Any, Any], values: np.ndarray[Any, Any]) -> tuple[float, float]:
@@ -213,19 +212,16 @@ def main() -> int:
     warm_up = options.warm_up if options.warm_up is not None else min(WARM_UP, options.minutes / 3)
     judged = options.minutes - warm_up >= LEAST
     voxeld = program("VOXELD", "the daemon")
-    heap_held = program("HEAP_HELD", "the library that tells what is held")
     with tempfile.TemporaryDirectory(prefix="voxeld-soak-") as folder:
         server = f"unix:{folder}/s"
         log = open(f"{folder}/log", "w+", encoding="utf-8")
         # Full after a minute or two, so that what is kept stays as much, and making room goes on all the time.
         Path(f"{folder}/voxeld.toml").write_text("[limits]\nmax_assets = 64\n", encoding="utf-8")
-        heap = Path(f"{folder}/heap")
-        heap.touch()
         daemon = subprocess.Popen(
-            [voxeld, "--config", f"{folder}/voxeld.toml", "--listen", server, "--http", "127.0.0.1:0", "--state-dir", f"{folder}/state", "--log-level", "info", "--engine", "cpu",
+            [*ENDS_WITH_US, voxeld, "--config", f"{folder}/voxeld.toml", "--listen", server, "--http", "127.0.0.1:0", "--state-dir", f"{folder}/state", "--log-level", "info", "--engine", "cpu",
              "--display", "stack=simulated,size=24x24x16,rate=60", "--display", "rotor=simulated,geometry=rotor,size=24x16,slices=60,rate=30",
              "--display", "lattice=simulated,profile=" + str(Path(__file__).parents[2] / "display/profiles/lattice-8.toml")],
-            stdout=log, stderr=subprocess.STDOUT, env={**os.environ, "LD_PRELOAD": heap_held, "HEAP_HELD_FILE": str(heap)})
+            stdout=log, stderr=subprocess.STDOUT)
 
         def listens() -> int:
             said = Path(f"{folder}/log").read_text(encoding="utf-8")
@@ -234,7 +230,6 @@ def main() -> int:
             return int(match[1]) if match else 0
 
         port = until(listens, "voxeld's page")
-        until(lambda: heap.stat().st_size > 0, "what is held")
         stop = mp.Event()
         clients = []
         for name in options.roles.split(","):
@@ -249,7 +244,7 @@ def main() -> int:
             while (now := time.monotonic()) - began < options.minutes * 60 and daemon.poll() is None and all(p.is_alive() for _, p, _ in clients):
                 stats = v.stats(timeout=LONG)
                 shown = stats.displays[0].commit_to_presented
-                rows.append({"minutes": (now - began) / 60, **sample(daemon.pid, port, heap), "p50_ms": shown.p50_ns / 1e6, "p99_ms": shown.p99_ns / 1e6})
+                rows.append({"minutes": (now - began) / 60, **sample(daemon.pid, port), "p50_ms": shown.p50_ns / 1e6, "p99_ms": shown.p99_ns / 1e6})
                 if now - told > 60 and not options.json:
                     told = now
                     print(" ".join(f"{key} {value:.1f}" for key, value in rows[-1].items()), file=sys.stderr, flush=True)

@@ -30,7 +30,8 @@ TEST(Metrics, EveryFigureStandsThereOnce) {
   stats.applying = {3, 1'000'000, 2, 3};
   stats.assets = {
       .count = 4, .bytes = 55, .uploaded = 6, .evicted = 7, .damaged = 1, .bytes_in = 66};
-  stats.process = {.allocations_failed = 9,
+  stats.process = {.heap_bytes = 15 << 20,
+                   .allocations_failed = 9,
                    .allocations_refused = 2,
                    .reserve_bytes = 4 << 20,
                    .reserve_held_bytes = 2 << 20,
@@ -41,6 +42,8 @@ TEST(Metrics, EveryFigureStandsThereOnce) {
                    .time_trouble = ""};
   stats.volume_watches_asleep = 77;
   const std::string text = MetricsText(stats);
+  EXPECT_THAT(text, HasSubstr("# TYPE voxeld_process_heap_bytes gauge\n"));
+  EXPECT_THAT(text, HasSubstr("voxeld_process_heap_bytes 15728640\n"));
   EXPECT_THAT(text, HasSubstr("# TYPE voxeld_process_allocations_failed_total counter\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_process_allocations_failed_total 9\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_process_allocations_refused_total 2\n"));

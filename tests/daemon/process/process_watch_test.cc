@@ -45,6 +45,22 @@ TEST(ProcessWatch, GivesBackFreeMemoryEachMinute) {
 }
 
 #if defined(__GLIBC__) && !defined(VOXELD_SANITIZED)
+TEST(ProcessWatch, TellsWhatIsAllocated) {
+  sync::FakeClock clock;
+  Logger log(Logger::Level::kOff, Logger::Format::kText);
+  const ProcessWatch watch(0, clock, log);
+  // One within an arena, and one that is mapped.
+  for (const size_t bytes : {size_t{100} << 10, size_t{64} << 20}) {
+    const uint64_t before = watch.figures().heap_bytes;
+    auto held = std::make_unique<char[]>(bytes);
+    const uint64_t during = watch.figures().heap_bytes;
+    EXPECT_GE(during, before + bytes);
+    EXPECT_LT(during, before + bytes + (16 << 10));
+    held.reset();
+    EXPECT_LT(watch.figures().heap_bytes, before + (16 << 10));
+  }
+}
+
 TEST(Process, WhatIsFreeBetweenWhatIsHeldIsGivenBack) {
   // Every other of many places of four pages is let go.
   constexpr size_t kPlace = 16 << 10, kPlaces = 4096;
