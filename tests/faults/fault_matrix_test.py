@@ -27,6 +27,10 @@ LOADS = {"idle": 0, "one": 1, "fifty": 50}
 # USB faults begin after so many transfers, the first of these by which the load is there.
 TRANSFERS = {"idle": (200, 1000, 5000), "one": (400, 1600, 6400), "fifty": (800, 3200, 12800)}
 WATCHDOG = 5.0  # seconds in which a daemon that has ended is there again, and serves
+if {"-h", "--help"} & set(sys.argv[1:]):
+    print(__doc__)
+    print("FAULT:", ", ".join(FAULTS))
+    sys.exit()
 program("VOXELD", "the daemon")
 
 

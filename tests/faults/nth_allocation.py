@@ -13,7 +13,10 @@ The way that it fails:
 What must hold: with the reserve the daemon lives, refuses nothing, and counts the failure; otherwise it lives, or ends with 1 and a line that says
 why, or by the abort of a library of others that gives up where it asked itself. In each case nothing hangs, what was told to be shown is shown, what
 was told to be durable is there after the next start, and in the end it has no more descriptors and memory than unharmed. Paths are in VOXELD, FAIL_MALLOC (the
-preloaded library) and PYTHONPATH; ends with 1 if one did not."""
+preloaded library) and PYTHONPATH; ends with 1 if one did not.
+
+What came of them, by the way that they fail: lived, refused, ended, late, known, wrong as nth_syscall.py says; missed: nobody came by that place; once:
+something was wrong, and not when it was made again, as on a machine that is busy with other things."""
 import argparse
 import collections
 import json

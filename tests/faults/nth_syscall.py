@@ -6,7 +6,13 @@ usage: nth_syscall.py [--scenarios NAME,…] [--calls NAME,…] [--most N] [--sa
                       [--jobs N] [--list] [--json]
 
 What must hold: no signal ends the daemon, nothing hangs, a start that fails says why, what was told to be shown is shown, what was told to be
-durable is there after the next start, whoever comes afterwards is served, no descriptor and no memory is left, and the daemon ends by itself when asked. Paths are in VOXELD and PYTHONPATH; ends with 1 if one did not."""
+durable is there after the next start, whoever comes afterwards is served, no descriptor and no memory is left, and the daemon ends by itself when asked. Paths are in VOXELD and PYTHONPATH; ends with 1 if one did not.
+
+What came of them, by scenario and by call:
+  lived     it went on                              late     it was asked to end, had not after 5 s, and ended itself with the reason
+  missed    no thread made so many of these calls   known    a library of others made the call, and ended the process, or kept something
+  refused   it did not start, and said why          wrong    something of the above does not hold; the lines before say what
+  ended     it ended with 1, and said why"""
 import argparse
 import collections
 import contextlib
