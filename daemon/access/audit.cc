@@ -4,8 +4,8 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstring>
 #include <nlohmann/json.hpp>
+#include <system_error>
 
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
@@ -50,16 +50,20 @@ void Audit::Record(const std::string& who, const std::string& peer, const std::s
       {"method", method},
       {"what", what},
       {"result", outcome}};
-  const std::string line =
+  std::string line =
       entry.dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace) + "\n";
   sync::MutexLock lock(mutex_);
+  if (cut_) line.insert(0, "\n");
   const ssize_t written = write(file_.get(), line.data(), line.size());
+  const int error = errno;
   const bool failed = written != static_cast<ssize_t>(line.size());
   if (failed && !failed_ && log_ != nullptr) {
-    log_->Error(
-        "the audit log cannot be written",
-        {{"file", path_}, {"why", written < 0 ? std::strerror(errno) : "the disk is full"}});
+    log_->Error("the audit log cannot be written",
+                {{"file", path_},
+                 {"why", written < 0 ? std::generic_category().message(error)
+                                     : std::string("the disk is full")}});
   }
+  if (written > 0) cut_ = failed;
   failed_ = failed;
 }
 
@@ -75,6 +79,7 @@ void Audit::Reopen() {
   }
   sync::MutexLock lock(mutex_);
   file_ = *std::move(file);
+  cut_ = false;
 }
 
 }  // namespace voxeld::daemon::access

@@ -40,6 +40,7 @@ class Audit {
   sync::Mutex mutex_;
   Descriptor file_ VOXELD_GUARDED_BY(mutex_);
   bool failed_ VOXELD_GUARDED_BY(mutex_) = false;  // the last line could not be written
+  bool cut_ VOXELD_GUARDED_BY(mutex_) = false;     // the file ends in the midst of a line
 };
 
 }  // namespace voxeld::daemon::access

@@ -92,11 +92,16 @@ absl::Status AssetFile::Write(uint64_t offset, std::string_view bytes) {
 
 absl::Status AssetFile::Keep(const std::string& path) {
   if (fdatasync(file_.get()) != 0) return Failed("cannot be written");
-  if (rename(path_.c_str(), path.c_str()) != 0) return Failed("cannot be renamed");
-  path_ = path;
   const Descriptor folder(
       open(path.substr(0, path.rfind('/')).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (!folder.ok() || fsync(folder.get()) != 0) return Failed("cannot be written");
+  if (!folder.ok()) return Failed("cannot be written");
+  if (rename(path_.c_str(), path.c_str()) != 0) return Failed("cannot be renamed");
+  if (fsync(folder.get()) != 0) {
+    const absl::Status status = Failed("cannot be written");
+    (void)rename(path.c_str(), path_.c_str());
+    return status;
+  }
+  path_ = path;
   return absl::OkStatus();
 }
 

@@ -21,7 +21,7 @@ class AssetFile {
   static absl::StatusOr<AssetFile> Open(const std::string& path, bool empty);
 
   absl::Status Write(uint64_t offset, std::string_view bytes);
-  // On the disk, under another path, when it returns.
+  // On the disk, under another path, when it returns. An error: it has the path that it had.
   absl::Status Keep(const std::string& path);
 
  private:

@@ -87,7 +87,7 @@ absl::Status AssetStore::ReadFolder(const std::string& folder) {
     return failed(std::error_code(errno, std::generic_category()));
   }
   struct Found {
-    std::filesystem::file_time_type used;
+    std::pair<time_t, long> used;
     Name name;
     uint64_t size = 0;
   };
@@ -95,11 +95,13 @@ absl::Status AssetStore::ReadFolder(const std::string& folder) {
   std::error_code error;
   for (std::filesystem::directory_iterator at(folder, error), end; !error && at != end;
        at.increment(error)) {
-    std::error_code gone;
-    const auto used = at->last_write_time(gone);
-    const uint64_t size = gone ? 0 : at->file_size(gone);
     auto name = ReadName(at->path().filename().string());
-    if (name.has_value() && !gone) found.push_back({used, *std::move(name), size});
+    struct stat file = {};
+    (void)lstat(at->path().c_str(), &file);
+    if (!name.has_value() || !S_ISREG(file.st_mode)) continue;
+    found.push_back({{file.st_mtim.tv_sec, file.st_mtim.tv_nsec},
+                     *std::move(name),
+                     static_cast<uint64_t>(file.st_size)});
   }
   if (error) return failed(error);
   std::ranges::sort(found, {}, [](const Found& f) { return std::tie(f.used, f.name.digest); });
@@ -205,7 +207,7 @@ absl::StatusOr<AssetStore::UploadId> AssetStore::Admit(std::string_view digest, 
   }
   const absl::StatusOr<Assets::iterator> displaced = UploadToDisplace();
   if (!displaced.ok()) return displaced.status();
-  const uint64_t had = at == assets_.end() || at->second.size == 0 ? 0 : CostOf(at->second.size);
+  const uint64_t had = at == assets_.end() ? 0 : CostOf(at->second.size);
   const uint64_t cost = CostOf(size) > had ? CostOf(size) - had : 0;
   if (absl::Status status = MakeRoom(digest, cost, at == assets_.end() ? 1 : 0, gone);
       !status.ok()) {
@@ -232,17 +234,15 @@ absl::StatusOr<AssetStore::UploadId> AssetStore::Admit(std::string_view digest, 
 
 absl::StatusOr<AssetStore::UploadId> AssetStore::Begin(std::string_view digest, uint64_t size,
                                                        uint64_t offset) {
-  uint64_t whole = 0;
+  bool whole = false;
   {
     sync::MutexLock lock(mutex_);
-    const auto at = assets_.find(digest);
-    if (at != assets_.end() && at->second.complete) {
-      whole = at->second.size;
-      at->second.used = ++uses_;
-    }
+    const auto at = FindWhole(digest);
+    whole = at != assets_.end();
+    if (whole) at->second.used = ++uses_;
   }
-  if (whole > 0) {
-    const absl::StatusOr<bool> right = Check(std::string(digest), whole);
+  if (whole) {
+    const absl::StatusOr<bool> right = Check(digest);
     if (!right.ok()) return Because(right.status(), digest);
     if (*right) return absl::AlreadyExistsError("it is here");
   }
@@ -269,6 +269,11 @@ absl::StatusOr<AssetStore::UploadId> AssetStore::Begin(std::string_view digest, 
 AssetStore::Assets::iterator AssetStore::FindUpload(UploadId upload) {
   const auto at = uploads_.find(upload);
   return at == uploads_.end() ? assets_.end() : assets_.find(at->second);
+}
+
+AssetStore::Assets::iterator AssetStore::FindWhole(std::string_view digest) {
+  const auto at = assets_.find(digest);
+  return at == assets_.end() || at->second.complete ? at : assets_.end();
 }
 
 absl::Status AssetStore::Append(UploadId upload, uint64_t offset, std::string_view bytes) {
@@ -353,6 +358,7 @@ absl::StatusOr<uint64_t> AssetStore::Finish(UploadId upload) {
                                                 "; it is not kept: send it anew"));
     } else {
       at->second.complete = at->second.checked = true;
+      at->second.brought = upload;
       EndUpload(at, &gone);
       ++figures_.uploaded;
     }
@@ -379,12 +385,12 @@ void AssetStore::Heard(UploadId upload) {
   if (at != assets_.end()) at->second.heard = clock_.Now();
 }
 
-void AssetStore::DropDamaged(const std::string& digest) {
+void AssetStore::DropDamaged(std::string_view digest, UploadId brought) {
   Paths gone;
   {
     sync::MutexLock lock(mutex_);
-    const auto at = assets_.find(digest);
-    if (at == assets_.end() || !at->second.complete) return;
+    const auto at = FindWhole(digest);
+    if (at == assets_.end() || at->second.brought != brought) return;
     ++figures_.damaged;
     Drop(at, &gone);
   }
@@ -394,24 +400,28 @@ void AssetStore::DropDamaged(const std::string& digest) {
   }
 }
 
-absl::StatusOr<bool> AssetStore::Check(const std::string& digest, uint64_t size) {
+absl::StatusOr<bool> AssetStore::Check(std::string_view digest) {
   if (folder_.empty()) return true;
   sync::MutexLock one(check_mutex_);
+  uint64_t size = 0;
+  UploadId brought = 0;
   {
     sync::MutexLock lock(mutex_);
-    const auto at = assets_.find(digest);
-    if (at == assets_.end() || !at->second.complete) return false;
+    const auto at = FindWhole(digest);
+    if (at == assets_.end()) return false;
     if (at->second.checked) return true;
+    size = at->second.size;
+    brought = at->second.brought;
   }
   const absl::StatusOr<std::string> hash = HashAssetFile(PathOf(digest, true), size);
   if (!hash.ok() && !absl::IsOutOfRange(hash.status())) return hash.status();
   if (!hash.ok() || *hash != digest) {
-    DropDamaged(digest);
+    DropDamaged(digest, brought);
     return false;
   }
   sync::MutexLock lock(mutex_);
-  const auto at = assets_.find(digest);
-  if (at != assets_.end() && at->second.complete) at->second.checked = true;
+  const auto at = FindWhole(digest);
+  if (at != assets_.end()) at->second.checked = true;
   return true;
 }
 
@@ -421,6 +431,7 @@ absl::StatusOr<wire::MappedRange> AssetStore::FindAsset(std::string_view digest,
     return absl::NotFoundError(absl::StrCat("is ", Hex(digest), ", which is ", why));
   };
   uint64_t has = 0;
+  UploadId brought = 0;
   std::shared_ptr<char[]> memory;
   {
     sync::MutexLock lock(mutex_);
@@ -432,6 +443,7 @@ absl::StatusOr<wire::MappedRange> AssetStore::FindAsset(std::string_view digest,
     }
     asset.used = ++uses_;
     has = asset.size;
+    brought = asset.brought;
     memory = asset.memory;
   }
   if (offset > has || size > has - offset) {
@@ -439,14 +451,14 @@ absl::StatusOr<wire::MappedRange> AssetStore::FindAsset(std::string_view digest,
         absl::StrCat("is ", size, " from ", offset, " on; the asset has ", has, " bytes"));
   }
   if (folder_.empty()) return wire::MappedRange{{memory.get() + offset, size}, memory};
-  const std::string name(digest), path = PathOf(digest, true);
-  const absl::StatusOr<bool> right = Check(name, has);
+  const std::string path = PathOf(digest, true);
+  const absl::StatusOr<bool> right = Check(digest);
   if (!right.ok()) return right.status();
   absl::StatusOr<wire::MappedRange> bytes = absl::OutOfRangeError("");
   if (*right) bytes = ReadAssetFile(path, offset, size);
   if (absl::IsOutOfRange(
           bytes.status())) {  // cut while the daemon runs, or gone for another's room
-    DropDamaged(name);
+    DropDamaged(digest, brought);
     return missing("damaged on the disk, or gone meanwhile; bring it anew by UploadAsset");
   }
   if (bytes.ok()) TouchAssetFile(path);

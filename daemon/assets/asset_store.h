@@ -97,6 +97,7 @@ class AssetStore final : public wire::AssetSource {
     bool complete = false;
     bool checked = false;            // since the start
     uint64_t used = 0;               // a number that grows with each use
+    UploadId brought = 0;            // by whom it is whole; 0: it was at the start
     UploadId upload = 0;             // under way; 0: none
     sync::TimeNs heard = 0;          // of it
     std::shared_ptr<char[]> memory;  // without a folder, of `size` bytes
@@ -115,16 +116,17 @@ class AssetStore final : public wire::AssetSource {
       VOXELD_REQUIRES(mutex_);
   absl::StatusOr<Assets::iterator> UploadToDisplace() VOXELD_REQUIRES(mutex_);
   Assets::iterator FindUpload(UploadId upload) VOXELD_REQUIRES(mutex_);
+  Assets::iterator FindWhole(std::string_view digest) VOXELD_REQUIRES(mutex_);
   void SetSize(Asset* asset, uint64_t size) VOXELD_REQUIRES(mutex_);
   void EndUpload(Assets::iterator at, Paths* gone) VOXELD_REQUIRES(mutex_);
   void Drop(Assets::iterator at, Paths* gone) VOXELD_REQUIRES(mutex_);
   absl::StatusOr<UploadId> Admit(std::string_view digest, uint64_t size, uint64_t offset,
                                  Paths* gone) VOXELD_EXCLUDES(mutex_);
 
-  // Of a whole one in the folder: hashes it, unless that has been done. False: it was damaged, and is gone.
-  absl::StatusOr<bool> Check(const std::string& digest, uint64_t size)
-      VOXELD_EXCLUDES(mutex_, check_mutex_);
-  void DropDamaged(const std::string& digest) VOXELD_EXCLUDES(mutex_);
+  // Of a whole one in the folder: hashes it, unless that has been done. False: it was damaged, or is gone.
+  absl::StatusOr<bool> Check(std::string_view digest) VOXELD_EXCLUDES(mutex_, check_mutex_);
+  // Unless another has brought it anew meanwhile.
+  void DropDamaged(std::string_view digest, UploadId brought) VOXELD_EXCLUDES(mutex_);
 
   std::string folder_;  // constant once it is open
   const AssetLimits limits_;

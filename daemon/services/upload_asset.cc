@@ -37,8 +37,9 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
 
   void Start() {
     self_ = shared_from_this();
-    context_.calls.Add(self_);
-    if (++context_.uploads > ServiceContext::kMostUploads) {
+    const bool too_many = ++context_.uploads > ServiceContext::kMostUploads;
+    context_.calls.Add(self_);  // ends it at once where the server does
+    if (too_many) {
       return End(absl::ResourceExhaustedError(
           absl::StrCat(ServiceContext::kMostUploads,
                        " uploads are open, which is the most; try again when one has ended")));
@@ -61,15 +62,15 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
   void OnReadDone(bool ok) override {
     const uint64_t bytes = ok ? request_.ByteSizeLong() : 0;
     heard_ = context_.clock.Now();
-    if (!budget_->Charge(Budget::Use::kArriving, bytes)) {
+    if (ok && !budget_->Charge(Budget::Use::kArriving, bytes)) {
       return End(absl::ResourceExhaustedError(
           absl::StrCat("a piece of ", bytes, " bytes would be held beside ", budget_->used_bytes(),
                        " of all clients; max_memory_bytes allows ", budget_->limit_bytes(),
                        "; go on when others have taken something away")));
     }
     context_.assets->Heard(upload_);
-    context_.asset_calls->Post([self = shared_from_this(), ok, bytes](bool cancelled) {
-      const bool more = !cancelled && self->Take(ok);
+    context_.asset_calls->Post([self = shared_from_this(), ok, bytes](bool) {
+      const bool more = self->Take(ok);  // false where the server is gone: calls have ended before
       v1::UploadAssetRequest().Swap(&self->request_);  // lets go of its memory
       self->budget_->Release(Budget::Use::kArriving, bytes);
       if (more) self->Read();

@@ -1,12 +1,18 @@
 #include "daemon/access/audit.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -15,6 +21,7 @@ namespace voxeld::daemon::access {
 namespace {
 
 using nlohmann::json;
+using ::testing::HasSubstr;
 
 class AuditTest : public ::testing::Test {
  protected:
@@ -28,7 +35,32 @@ class AuditTest : public ::testing::Test {
     for (std::string line; std::getline(file, line);) out.push_back(json::parse(line));
     return out;
   }
+  std::string Logged() {
+    std::string text = std::move(logged_).str();
+    logged_.str("");
+    return text;
+  }
   const std::string path_ = absl::StrCat(::testing::TempDir(), "/voxeld-audit-", getpid());
+  std::ostringstream logged_;
+  Logger log_{Logger::Level::kInfo, Logger::Format::kJson,
+              std::make_shared<spdlog::sinks::ostream_sink_mt>(logged_, true)};
+};
+
+// While it is there, files of this process have so many bytes at the most.
+class SmallFiles {
+ public:
+  explicit SmallFiles(rlim_t bytes) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    EXPECT_EQ(getrlimit(RLIMIT_FSIZE, &before_), 0);
+    const rlimit small{bytes, before_.rlim_max};
+    EXPECT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  }
+  ~SmallFiles() { EXPECT_EQ(setrlimit(RLIMIT_FSIZE, &before_), 0); }
+  SmallFiles(const SmallFiles&) = delete;
+  SmallFiles& operator=(const SmallFiles&) = delete;
+
+ private:
+  rlimit before_;
 };
 
 TEST_F(AuditTest, OneObjectALineWhateverTheWordsAre) {
@@ -63,6 +95,109 @@ TEST_F(AuditTest, GoesOnInANewFileWhenAsked) {
   EXPECT_EQ(Lines(path_ + ".1").size(), 2u);
   ASSERT_EQ(Lines(path_).size(), 1u);
   EXPECT_EQ(Lines(path_)[0]["method"], "Third");
+}
+
+TEST_F(AuditTest, WithoutAFileItIsLinesOfTheLog) {
+  auto audit = Audit::Open("", &log_);
+  ASSERT_TRUE(audit.ok());
+  (*audit)->Record("token a\"\n", "unix:", "ClearLayer", "layer", absl::NotFoundError("none"));
+  (*audit)->Reopen();
+  const json line = json::parse(Logged());
+  EXPECT_EQ(line["event"], "audit");
+  EXPECT_EQ(line["who"], "token a\"\n");
+  EXPECT_EQ(line["peer"], "unix:");
+  EXPECT_EQ(line["method"], "ClearLayer");
+  EXPECT_EQ(line["what"], "layer");
+  EXPECT_EQ(line["result"], "NOT_FOUND: none");
+  auto none = Audit::Open("", nullptr);
+  ASSERT_TRUE(none.ok());
+  (*none)->Record("a", "", "First", "", absl::OkStatus());
+}
+
+TEST_F(AuditTest, ADiskThatIsFullIsToldOnceUntilThereIsRoom) {
+  auto audit = Audit::Open(path_, &log_);
+  ASSERT_TRUE(audit.ok());
+  const auto record = [&](const char* method) {
+    (*audit)->Record("a", "", method, "", absl::OkStatus());
+  };
+  record("First");
+  const uint64_t first = std::filesystem::file_size(path_);
+  for (const char* again : {"Second", "Third"}) {
+    const uint64_t begins = std::filesystem::file_size(path_);
+    {
+      const SmallFiles full(begins);
+      record("Lost");
+      const std::string told = Logged();
+      EXPECT_THAT(told, HasSubstr("the audit log cannot be written"));
+      EXPECT_THAT(told, HasSubstr(path_));
+      EXPECT_THAT(told, HasSubstr("File too large"));
+      record("Lost");
+      EXPECT_EQ(Logged(), "");
+    }
+    record(again);
+    EXPECT_EQ(Logged(), "");
+  }
+  EXPECT_EQ(Lines(path_).size(), 3u);
+  EXPECT_EQ(Lines(path_)[2]["method"], "Third");
+  EXPECT_EQ(std::filesystem::file_size(path_), 3 * first + 1) << "Second has one byte more";
+}
+
+TEST_F(AuditTest, ALineThatIsCutSpoilsNoOther) {
+  auto audit = Audit::Open(path_, &log_);
+  ASSERT_TRUE(audit.ok());
+  const auto record = [&](const char* method) {
+    (*audit)->Record("a", "", method, "", absl::OkStatus());
+  };
+  {
+    const SmallFiles full(10);
+    record("Cut");
+    EXPECT_THAT(Logged(), HasSubstr("the disk is full"));
+    record("Lost");
+    EXPECT_EQ(std::filesystem::file_size(path_), 10u);
+  }
+  record("Second");
+  record("Third");
+  std::ifstream file(path_);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(file, line);) lines.push_back(line);
+  ASSERT_EQ(lines.size(), 3u);
+  EXPECT_EQ(lines[0].size(), 10u);
+  EXPECT_EQ(json::parse(lines[1])["method"], "Second");
+  EXPECT_EQ(json::parse(lines[2])["method"], "Third");
+  {
+    const SmallFiles full(std::filesystem::file_size(path_) + 10);
+    record("Cut");
+  }
+  std::filesystem::rename(path_, path_ + ".1");
+  (*audit)->Reopen();
+  record("Fourth");
+  ASSERT_EQ(Lines(path_).size(), 1u) << "a new file begins with its line";
+}
+
+TEST_F(AuditTest, WithoutALogItGoesOnAllTheSame) {
+  auto full = Audit::Open("/dev/full", nullptr);
+  ASSERT_TRUE(full.ok()) << full.status();
+  (*full)->Record("a", "", "First", "", absl::OkStatus());
+  auto audit = Audit::Open(path_, nullptr);
+  ASSERT_TRUE(audit.ok());
+  std::filesystem::rename(path_, path_ + ".1");
+  std::filesystem::create_symlink("/tmp/elsewhere", path_);
+  (*audit)->Reopen();
+  (*audit)->Record("a", "", "First", "", absl::OkStatus());
+  EXPECT_EQ(Lines(path_ + ".1").size(), 1u);
+}
+
+TEST_F(AuditTest, WhatCannotBeOpenedAnewStaysWhereItWas) {
+  auto audit = Audit::Open(path_, &log_);
+  ASSERT_TRUE(audit.ok());
+  std::filesystem::rename(path_, path_ + ".1");
+  std::filesystem::create_directory(path_);
+  (*audit)->Reopen();
+  const std::string told = Logged();
+  EXPECT_THAT(told, HasSubstr("the audit log stays where it was"));
+  EXPECT_THAT(told, HasSubstr(path_));
+  (*audit)->Record("a", "", "First", "", absl::OkStatus());
+  EXPECT_EQ(Lines(path_ + ".1").size(), 1u);
 }
 
 TEST_F(AuditTest, AFileThatCannotBeIsAnErrorAtOnce) {

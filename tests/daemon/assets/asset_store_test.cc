@@ -124,6 +124,27 @@ TEST_P(AssetStoreTest, AnUploadGoesOnWhereItBrokeOff) {
   EXPECT_EQ(Find(kHello), "hello");
 }
 
+TEST_P(AssetStoreTest, AnUploadThatHasEndedIsNone) {
+  Upload(kAbc);
+  const auto first = store_->Begin(kHello.digest(), 5, 0);
+  ASSERT_TRUE(first.ok());
+  ASSERT_TRUE(store_->Append(*first, 0, "hel").ok());
+  store_->Abandon(*first);
+  const auto second = store_->Begin(kHello.digest(), 5, 3);
+  ASSERT_TRUE(second.ok());
+  clock_.Advance(30 * sync::kSecond);
+  store_->Heard(*first);  // says nothing for the second
+  store_->Abandon(*first);
+  EXPECT_TRUE(absl::IsAborted(store_->Append(*first, 3, "lo")));
+  EXPECT_TRUE(absl::IsAborted(store_->Finish(*first).status()));
+  EXPECT_TRUE(store_->Append(*second, 3, "lo").ok()) << "nobody had its place";
+  const std::vector<AssetState> states =
+      store_->List(std::vector{kWorld.digest(), kAbc.digest(), kHello.digest()});
+  EXPECT_THAT(states, ElementsAre(::testing::FieldsAre(kWorld.digest(), 0u, false),
+                                  ::testing::FieldsAre(kAbc.digest(), 3u, true),
+                                  ::testing::FieldsAre(kHello.digest(), 5u, false)));
+}
+
 TEST_P(AssetStoreTest, AnEndTooEarlyLeavesWhatCame) {
   const auto upload = store_->Begin(kHello.digest(), 5, 0);
   ASSERT_TRUE(store_->Append(*upload, 0, "hell").ok());

@@ -205,6 +205,11 @@ TEST_F(Assets, AServerMayKeepNone) {
   const grpc::Status status = Upload(kPointHash, 12, {{kPoint}});
   EXPECT_EQ(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION);
   EXPECT_THAT(status.error_message(), HasSubstr("max_assets_bytes is 0"));
+  grpc::ClientContext context;
+  SetDeadline(context);
+  v1::ListAssetsResponse response;
+  EXPECT_EQ(daemon_->scene().ListAssets(&context, {}, &response).error_code(),
+            grpc::StatusCode::FAILED_PRECONDITION);
 }
 
 TEST_F(Assets, AnUploadUnderWayEndsWithTheServer) {

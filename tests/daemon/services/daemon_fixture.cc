@@ -61,7 +61,7 @@ Daemon::Daemon(DaemonOptions options)
   std::vector<Address> listen = {*ParseAddress(target_)};
   for (const std::string& address : options.listen) listen.push_back(*ParseAddress(address));
   auto server =
-      Server::Start(*core_, clock_,
+      Server::Start(*core_, options.clock == nullptr ? clock_ : *options.clock,
                     {.listen = listen,
                      .version = "9.8.7",
                      .streams = {.open_limit_ns = options.open_limit_ns,

@@ -49,6 +49,7 @@ struct DaemonOptions {
   const access::TlsStore* tls = nullptr;
   access::Audit* audit = nullptr;
   assets::AssetStore* assets = nullptr;  // outlives the daemon
+  sync::Clock* clock = nullptr;          // the server's; outlives the daemon; none: the system's
 };
 
 class Daemon {

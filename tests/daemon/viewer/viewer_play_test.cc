@@ -35,6 +35,24 @@ using ::testing::Not;
 
 constexpr char kOrigin[] = "http://localhost:8088";
 
+// Where temporary files are while it is there.
+class TemporaryFiles {
+ public:
+  explicit TemporaryFiles(const std::string& path) {
+    const char* const before = std::getenv("TMPDIR");
+    if (before != nullptr) before_ = before;
+    setenv("TMPDIR", path.c_str(), 1);
+  }
+  ~TemporaryFiles() {
+    before_.has_value() ? setenv("TMPDIR", before_->c_str(), 1) : unsetenv("TMPDIR");
+  }
+  TemporaryFiles(const TemporaryFiles&) = delete;
+  TemporaryFiles& operator=(const TemporaryFiles&) = delete;
+
+ private:
+  std::optional<std::string> before_;
+};
+
 class ViewerPlayTest : public ::testing::Test {
  protected:
   using Fields = std::vector<std::pair<std::string, std::string>>;
@@ -281,9 +299,7 @@ TEST_F(ViewerPlayTest, ADiskThatIsFullIsSaidAndNothingStays) {
 TEST_F(ViewerPlayTest, ADiskThatHangsKeepsNobodyOut) {
   const auto temporary = play::PrivateFolder::Make();
   ASSERT_TRUE(temporary.ok());
-  const char* const before = std::getenv("TMPDIR");
-  const std::string was = before == nullptr ? "" : before;
-  setenv("TMPDIR", temporary->path().c_str(), 1);
+  const TemporaryFiles there(temporary->path());
   sync::Mutex mutex;
   sync::CondVar changed;
   bool hangs = true;
@@ -327,7 +343,30 @@ TEST_F(ViewerPlayTest, ADiskThatHangsKeepsNobodyOut) {
   viewer_.reset();
   player_.reset();
   EXPECT_TRUE(std::filesystem::is_empty(temporary->path()));
-  before == nullptr ? unsetenv("TMPDIR") : setenv("TMPDIR", was.c_str(), 1);
+}
+
+TEST_F(ViewerPlayTest, WhatIsLargeComesInPieces) {
+  const std::string played = folder_->path() + "/played";
+  Start(absl::StrCat("cp \"$5\" ", played, ".part; mv ", played, ".part ", played, "; ", kPlays));
+  std::string body;
+  for (int i = 0; body.size() < 1'000'000; ++i) absl::StrAppend(&body, "v ", i, " 0 0\n");
+  EXPECT_EQ(Post("/play?name=a.obj", body).result_int(), 202u);
+  EXPECT_THAT(Audited(), HasSubstr(absl::StrCat("bytes=", body.size())));
+  while (!std::filesystem::exists(played)) std::this_thread::yield();
+  std::ifstream file(played);
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(file), {}), body);
+}
+
+TEST_F(ViewerPlayTest, WhereNoFileCanBeMadeItIsSaid) {
+  Start(kPlays);
+  {
+    const TemporaryFiles nowhere(folder_->path() + "/nowhere");
+    const Answer answer = Post("/play?name=a.obj");
+    EXPECT_EQ(answer.result_int(), 500u);
+    EXPECT_THAT(answer.body(), HasSubstr("no folder for files to be played can be made"));
+  }
+  EXPECT_EQ(player_->state(), play::Playing());
+  EXPECT_EQ(Post("/play?name=a.obj").result_int(), 202u) << "it can be made now";
 }
 
 TEST_F(ViewerPlayTest, WhereThereIsNoThreadItIsSaid) {
@@ -353,6 +392,59 @@ class TellingPeer final : public http::WebSocketPeer {
  private:
   const std::function<void()> told_;
 };
+
+TEST_F(ViewerPlayTest, PagesThatAreGoneAreNotTold) {
+  ASSERT_NO_FATAL_FAILURE(StartPlayer(kPlays));
+  int told = 0, gone_told = 0;
+  const auto page = std::make_shared<TellingPeer>([&] { ++told; });
+  auto gone = std::make_shared<TellingPeer>([&] { ++gone_told; });
+  const std::shared_ptr<ViewerPlay> play = ViewerPlay::Make({.player = player_.get()}, nullptr);
+  play->Join(gone);
+  gone.reset();
+  play->Join(page);
+  play->Join(page);  // once more: it is told once all the same
+  EXPECT_EQ(told, 2);
+  gone = std::make_shared<TellingPeer>([&] { ++gone_told; });
+  play->Join(gone);
+  gone.reset();
+  player_->Play(*play::PlayFile::Make("a.obj"));
+  EXPECT_EQ(told, 3);
+  EXPECT_EQ(gone_told, 2);
+}
+
+// Who sent it is gone as it is whole, and the worker has not come to it yet.
+TEST_F(ViewerPlayTest, WhatIsGivenUpIsNotPlayed) {
+  ASSERT_NO_FATAL_FAILURE(StartPlayer(kPlays));
+  const auto temporary = play::PrivateFolder::Make();
+  ASSERT_TRUE(temporary.ok());
+  const TemporaryFiles there(temporary->path());
+  std::shared_ptr<ViewerPlay> play = ViewerPlay::Make({.player = player_.get()}, audit_.get());
+  std::promise<void> taken, given_up;
+  http::Reception first = play->Receive("name=a.obj");
+  ASSERT_NE(first.receiver, nullptr);
+  first.receiver->Take("v 0 0 0\n", [&](std::optional<http::Response>) {
+    taken.set_value();
+    given_up.get_future().wait();
+  });
+  taken.get_future().wait();
+  bool answered = false;
+  first.receiver->Whole([&](const http::Response&) { answered = true; });
+  first.receiver.reset();
+  given_up.set_value();
+  http::Reception second = play->Receive("name=b.obj");
+  ASSERT_NE(second.receiver, nullptr);
+  std::promise<void> behind;
+  second.receiver->Take("v", [&](std::optional<http::Response>) { behind.set_value(); });
+  behind.get_future().wait();
+  EXPECT_FALSE(answered);
+  EXPECT_EQ(player_->state(), play::Playing());
+  EXPECT_EQ(Audited(), "");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temporary->path()), {}), 1)
+      << "that of the second alone";
+  second.receiver.reset();
+  play.reset();
+  EXPECT_TRUE(std::filesystem::is_empty(temporary->path()));
+}
 
 // Its end waits for the thread that writes, so it may not be that thread which has it last.
 TEST_F(ViewerPlayTest, MayEndWhilePagesAreTold) {
