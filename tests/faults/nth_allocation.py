@@ -29,7 +29,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from apart import add_options, chosen, each
-from life import Ending, Life, Rest, again, at_rest, descriptors, end, judge, leaks, metric
+from life import Ending, Life, Rest, again, at_rest, descriptors, end, judge, leaks, metric, sockets
 from programs import program
 from scenarios import SCENARIOS
 
@@ -66,13 +66,14 @@ def run(scenario: str, way: str, place: Place, rest: Rest) -> Result:
     with tempfile.TemporaryDirectory(prefix="voxeld-nth-") as name:
         life = SCENARIOS[scenario](Path(name), "memory_reserve_bytes = 0" if way == "bare" else "")
         life.prepare()
+        ours = sockets()
         told = Path(name, "told")
         process = life.start(environment={
             "LD_PRELOAD": os.environ["FAIL_MALLOC"], "FAIL_MALLOC_SITE": place.site, "FAIL_MALLOC_TOLD": str(told),
             "FAIL_MALLOC_TIMES": {"reserve": "1", "bare": "2", "forever": "0"}[way]})
         is_ready, wrong = life.lived(process, lambda: process.pid)
         alive = process.poll() is None
-        left = descriptors(process.pid, rest.descriptors)
+        left = descriptors(process.pid, rest.descriptors, ours=ours)
         leak = leaks(life, rest) if alive and is_ready else ""
         counted = metric(life.port, "voxeld_process_allocations_failed_total") if alive and told.exists() else -1  # it may come with the end
         status = end(process, process.pid)
