@@ -178,9 +178,8 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
 
   // The next change, if the page is ready for it and there is one.
   void Pump(uint16_t id) {
-    const auto found = watches_.find(id);
-    if (found == watches_.end() || found->second.feed == nullptr || !found->second.credit) return;
-    Watched& watch = found->second;
+    Watched& watch = watches_.at(id);
+    if (watch.feed == nullptr || !watch.credit) return;
     absl::StatusOr<std::optional<VolumeFeed::Change>> change = watch.feed->Take();
     if (!change.ok()) return End(id, change.status());
     if (!change->has_value()) return;
