@@ -15,6 +15,19 @@ enum class SystemCall {
   kSocketpair,
 };
 
+// ThreadSanitizer's own pthread_create finds the C library's past this one.
+#if defined(__SANITIZE_THREAD__)
+inline constexpr bool kRefusesThreads = false;
+#elif defined(__has_feature)
+#if __has_feature(thread_sanitizer)
+inline constexpr bool kRefusesThreads = false;
+#else
+inline constexpr bool kRefusesThreads = true;
+#endif
+#else
+inline constexpr bool kRefusesThreads = true;
+#endif
+
 // As long as it lives: of the thread that made it, and of each call one at a time.
 class RefusedCalls {
  public:
