@@ -197,7 +197,9 @@ TEST_F(SpareThreadsTest, AllThatWereAskedForAreInHandOrNone) {
   EXPECT_TRUE(absl::IsResourceExhausted(SpareThreads::Begin(3)));
   EXPECT_EQ(refused.made(), 1);
   EXPECT_EQ(SpareThreads::waiting(), 0);
+  EXPECT_TRUE(SpareThreads::Begin(2).ok());
   EXPECT_TRUE(SpareThreads::Begin(3).ok());
+  EXPECT_EQ(refused.made(), 4) << "those that wait are not begun again";
   EXPECT_EQ(SpareThreads::waiting(), 3);
 }
 

@@ -20,7 +20,7 @@ namespace voxeld::daemon::services {
 namespace {
 
 constexpr char kOwn[] = "/voxeld.v1.Anything/Ask";
-constexpr char kOthers[] = "/grpc.health.v1.Health/Check";
+constexpr char kOthers[] = "/others.v1.Anything/Ask";
 
 grpc::ByteBuffer SomeBytes() {
   const grpc::Slice slice("some");

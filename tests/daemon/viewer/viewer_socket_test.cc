@@ -79,6 +79,14 @@ class ViewerSocketTest : public ::testing::Test {
     folder_ = (std::filesystem::temp_directory_path() / "voxeld-socket-XXXXXX").string();
     EXPECT_NE(mkdtemp(folder_.data()), nullptr);
     audit_ = *access::Audit::Open(folder_ + "/audit", nullptr);
+    display::DisplayInfo lights = testing::SmallDisplay("lights");
+    lights.geometry.shape =
+        display::Lattice{.width_px = 1, .points_mm = {display::Vec3{}}, .cell_mm = {1, 1, 1}};
+    lights.geometry.grid = {1, 1, 1, {1, 1, 1}, {-0.5, -0.5, -0.5}};
+    lights.layout = {1, 1, 1, 1, display::PixelFormat::kRgb888};
+    EXPECT_TRUE(
+        sim_.core->AddDisplay(std::make_unique<testing::ScriptedDisplay>(lights, sim_.clock), {})
+            .ok());
     sim_.Start();
     shared_ = std::make_shared<ViewerShared>(
         ViewerShared{*sim_.core,
@@ -152,6 +160,19 @@ TEST_F(ViewerSocketTest, WhatIsAskedWhileItIsAnsweredIsPassedOver) {
   }
 }
 
+TEST_F(ViewerSocketTest, WhereEveryLightIsAPageIsNotTold) {
+  page_.Say({{"hello", true}});
+  Answer();
+  const Json displays = page_.Heard("hello").at(0)["displays"];
+  ASSERT_EQ(displays.size(), 3u);
+  EXPECT_TRUE(displays[0]["geometry"].contains("planar_stack")) << displays[0];
+  const Json& lattice = displays[2]["geometry"].at("lattice");
+  EXPECT_EQ(lattice["width_px"], 1);
+  for (const char* each : {"pixels", "x_mm", "y_mm", "z_mm"}) {
+    EXPECT_THAT(lattice[each], IsEmpty()) << each;
+  }
+}
+
 TEST_F(ViewerSocketTest, WhoIsGoneIsToldNothing) {
   page_.Say({{"hello", true}});
   Watch(1);
@@ -213,6 +234,17 @@ TEST_F(ViewerSocketTest, AllPagesTogetherHaveSoManyWatches) {
   for (uint16_t id = 2; id < 17; ++id) Watch(id);
   EXPECT_THAT(page_.Heard("error"), IsEmpty()) << "a page that goes leaves its room";
   EXPECT_EQ(shared_->watches, 63u);
+}
+
+TEST_F(ViewerSocketTest, AnIdIsOneWatchsAtATime) {
+  Watch(1);
+  Watch(1, "display1");
+  EXPECT_THAT(page_.Heard("error"), ElementsAre("a page has 16 watches with different ids"));
+  EXPECT_EQ(shared_->watches, 1u);
+  Answer();
+  const std::vector<Json> watching = page_.Heard("watching");
+  ASSERT_EQ(watching.size(), 1u);
+  EXPECT_EQ(watching[0]["display"]["name"], "main");
 }
 
 TEST_F(ViewerSocketTest, AWatchThatIsTakenBackBeforeItBeginsDoesNot) {
@@ -292,6 +324,19 @@ TEST_F(ViewerSocketTest, ADisplayThatEndsEndsItsWatches) {
   EXPECT_EQ(ended[0]["id"], 1);
   EXPECT_NE(ended[0]["why"], "");
   EXPECT_EQ(shared_->watches, 0u);
+}
+
+TEST_F(ViewerSocketTest, BeforeSomethingIsShownNothingIsCompared) {
+  Watch(1);
+  sim_.core->Step();
+  Peer::Do(page_.peer->TakePosted());
+  for (int i = 0; i < 2; ++i) {
+    page_.Say({{"compare", 1}});
+    sim_.core->Step();
+    Peer::Do(page_.peer->TakePosted());
+    EXPECT_THAT(page_.Heard("compared"),
+                ElementsAre(Json{{"id", 1}, {"why", "nothing has been shown yet"}}));
+  }
 }
 
 TEST_F(ViewerSocketTest, OneIsComparedAtATimeAndEachThatAsksIsAnswered) {

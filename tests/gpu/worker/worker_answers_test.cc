@@ -402,6 +402,34 @@ TEST_F(WorkerAnswers, ABulkSegmentMayOutliveTheEngine) {
   EXPECT_EQ(pool->held_bytes(), 0u);
 }
 
+TEST_F(WorkerAnswers, WhatTheWorkerCouldNotReadIsNotSent) {
+  Ready();
+  const auto pool = BulkPool::Create({.shared = false});
+  ToldStatus of_this_process, alone, next;
+  StagingBlock block = *engine_->AcquireStaging(64);
+  block.Refer({pool->Allocate(64)->block});
+  engine_->Apply(std::move(block), 0, of_this_process.done());
+  const absl::Status refused = of_this_process.get();
+  EXPECT_EQ(refused.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(refused.message(), HasSubstr("bulk memory of this process alone"));
+  struct {
+    RecordHeader header;
+    GeometryRecord geometry;
+    BulkRef ref;
+  } const delta{
+      {.op = Op::kPutBulkGeometry, .size = sizeof(delta)}, {.id = 1}, {.segment = 1, .size = 64}};
+  block = *engine_->AcquireStaging(sizeof(delta));
+  std::memcpy(block.bytes().data(), &delta, sizeof(delta));
+  engine_->Apply(std::move(block), sizeof(delta), alone.done());
+  EXPECT_EQ(alone.get().code(), absl::StatusCode::kInvalidArgument) << "its block did not come";
+  engine_->Apply(*engine_->AcquireStaging(64), 0, next.done());
+  const Message asked = worker_.Hear();
+  EXPECT_EQ(asked.type, MessageType::kApply);
+  EXPECT_EQ(asked.As<BulkMessage>()->size, 0u);
+  worker_.SayDone(asked);
+  EXPECT_TRUE(next.get().ok());
+}
+
 // ---- a system that has nothing left
 
 int OpenDescriptors() {
