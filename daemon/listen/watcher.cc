@@ -10,6 +10,7 @@
 #include <thread>
 #include <unordered_set>
 #include <utility>
+#include <vector>
 
 #include "daemon/listen/socket.h"
 
@@ -26,15 +27,41 @@ bool Control(int operation, int epoll, int descriptor, uint32_t events, Connecti
   return epoll_ctl(epoll, operation, descriptor, &event) == 0;
 }
 
+// Connections that epoll tells nothing of any more. Wires may outlive the watcher.
+class Unwatched {
+ public:
+  Descriptor wake;  // an eventfd of the watcher's thread
+
+  void Wake() const {
+    const uint64_t one = 1;
+    [[maybe_unused]] const ssize_t n = write(wake.get(), &one, sizeof(one));
+  }
+  void Add(ConnectionId id) {
+    sync::MutexLock lock(mutex_);
+    ids_.push_back(id);
+    Wake();
+  }
+  std::vector<ConnectionId> Take() {
+    sync::MutexLock lock(mutex_);
+    return std::exchange(ids_, {});
+  }
+
+ private:
+  sync::Mutex mutex_;
+  std::vector<ConnectionId> ids_ VOXELD_GUARDED_BY(mutex_);
+};
+
 class WatchedWire final : public SocketWire {
  public:
-  WatchedWire(Descriptor descriptor, bool tcp, int epoll)
-      : SocketWire(std::move(descriptor), tcp), epoll_(epoll) {}
+  WatchedWire(Descriptor descriptor, bool tcp, int epoll, std::shared_ptr<Unwatched> unwatched)
+      : SocketWire(std::move(descriptor), tcp), epoll_(epoll), unwatched_(std::move(unwatched)) {}
   void SetWord(ConnectionId word) { word_ = word; }
   // With it the end is told of once as well: whoever lets it be armed arms it again.
   void Arm() override {
-    // Not armed, even its end would be told to nobody.
-    if (!Rearm()) Rearm();
+    if (Rearm() || Rearm()) return;
+    // Nobody would be told of its end, so it ends here.
+    Cut();
+    unwatched_->Add(word_);
   }
 
  private:
@@ -43,6 +70,7 @@ class WatchedWire final : public SocketWire {
   }
 
   const int epoll_;
+  const std::shared_ptr<Unwatched> unwatched_;
   std::atomic<ConnectionId> word_ = kWake;
 };
 
@@ -57,16 +85,17 @@ class Watcher::Impl {
       sync::MutexLock lock(mutex_);
       stop_ = true;
     }
-    Wake();
+    unwatched_->Wake();
     if (thread_.joinable()) thread_.join();
     for (const ConnectionId id : connections_) guard_.Leave(id);
   }
 
   absl::Status Start() {
     epoll_.Reset(epoll_create1(EPOLL_CLOEXEC));
-    wake_.Reset(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
-    if (!epoll_.ok() || !wake_.ok() ||
-        !Control(EPOLL_CTL_ADD, epoll_.get(), wake_.get(), EPOLLIN, kWake)) {
+    Descriptor& wake = unwatched_->wake;
+    wake.Reset(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
+    if (!epoll_.ok() || !wake.ok() ||
+        !Control(EPOLL_CTL_ADD, epoll_.get(), wake.get(), EPOLLIN, kWake)) {
       return absl::ErrnoToStatus(errno, "watching connections");
     }
     thread_ = std::thread([this] { Run(); });
@@ -76,8 +105,8 @@ class Watcher::Impl {
   absl::StatusOr<ConnectionId> Add(const Peer& peer, bool own, Descriptor connection) {
     const int descriptor = connection.get();
     ConnectionId id = 0;
-    auto wire =
-        std::make_unique<WatchedWire>(std::move(connection), !peer.unix_socket, epoll_.get());
+    auto wire = std::make_unique<WatchedWire>(std::move(connection), !peer.unix_socket,
+                                              epoll_.get(), unwatched_);
     WatchedWire* const watched = wire.get();  // the guard's, until Leave below or on the thread
     {
       sync::MutexLock lock(mutex_);
@@ -92,16 +121,11 @@ class Watcher::Impl {
       Leave(id);
       return absl::ErrnoToStatus(error, "watching a connection");
     }
-    Wake();  // what is looked at may just have begun
+    unwatched_->Wake();  // what is looked at may just have begun
     return id;
   }
 
  private:
-  void Wake() {
-    const uint64_t one = 1;
-    [[maybe_unused]] const ssize_t n = write(wake_.get(), &one, sizeof(one));
-  }
-
   void Leave(ConnectionId id) {
     sync::MutexLock lock(mutex_);
     connections_.erase(id);
@@ -123,11 +147,13 @@ class Watcher::Impl {
         if (event.data.u64 == kWake) {
           woken = true;
           uint64_t count = 0;
-          [[maybe_unused]] const ssize_t read_bytes = read(wake_.get(), &count, sizeof(count));
+          [[maybe_unused]] const ssize_t read_bytes =
+              read(unwatched_->wake.get(), &count, sizeof(count));
         } else {
           Handle(event);
         }
       }
+      for (const ConnectionId id : unwatched_->Take()) Leave(id);
       if (woken || look <= clock_.Now()) look = guard_.Look();
     }
   }
@@ -146,7 +172,8 @@ class Watcher::Impl {
 
   Guard& guard_;
   sync::Clock& clock_;
-  Descriptor epoll_, wake_;
+  Descriptor epoll_;
+  const std::shared_ptr<Unwatched> unwatched_ = std::make_shared<Unwatched>();
   sync::Mutex mutex_;
   bool stop_ VOXELD_GUARDED_BY(mutex_) = false;
   // That have entered and not left.

@@ -92,7 +92,6 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     std::shared_ptr<const display::DisplayInfo> info;
     std::shared_ptr<PixelPlaces> places;
     std::shared_ptr<VolumeFeed> feed;
-    bool credit = true;  // the page has shown the last one
   };
 
   void Complain(const std::string& why) { peer_->Send(Text({{"error", why}}), false); }
@@ -176,23 +175,18 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     return found != watches_.end() && found->second.serial == serial;
   }
 
-  // The next change, if the page is ready for it and there is one.
+  // The next change, if there is one. The page is ready for it: it has shown the last one, or nothing has come since it did.
   void Pump(uint16_t id) {
-    const auto found = watches_.find(id);
-    if (found == watches_.end() || found->second.feed == nullptr || !found->second.credit) return;
-    Watched& watch = found->second;
+    const Watched& watch = watches_.at(id);
+    if (watch.feed == nullptr) return;
     absl::StatusOr<std::optional<VolumeFeed::Change>> change = watch.feed->Take();
     if (!change.ok()) return End(id, change.status());
     if (!change->has_value()) return;
-    watch.credit = false;
     peer_->Send(VolumeMessage(id, **change, *watch.places), true);
   }
 
   void On(const page::Shown& shown) {
-    const auto found = watches_.find(shown.id);
-    if (found == watches_.end()) return;  // it may have ended meanwhile
-    found->second.credit = true;
-    Pump(shown.id);
+    if (watches_.contains(shown.id)) Pump(shown.id);  // it may have ended meanwhile
   }
 
   void On(const page::Unwatch& unwatch) { Drop(unwatch.id); }

@@ -25,7 +25,7 @@ BulkSegment::~BulkSegment() {
     watchers.swap(watchers_);
   }
   for (const Watcher& watcher : watchers) {
-    if (watcher.alive.lock() != nullptr) watcher.gone();
+    if (const std::shared_ptr<void> alive = watcher.alive.lock()) watcher.gone();
   }
 }
 

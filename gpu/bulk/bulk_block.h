@@ -27,7 +27,7 @@ class BulkSegment {
   const std::shared_ptr<Segment>& memory() const { return memory_; }
 
   // Has `gone` called once, on any thread, when no block is left and the pool keeps it no longer;
-  // not if `alive` is gone by then. It must only post.
+  // not if `alive` is gone by then, and it is held meanwhile. It must only post.
   void WhenGone(std::weak_ptr<void> alive, std::function<void()> gone);
 
  private:

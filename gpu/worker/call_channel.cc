@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 
 namespace voxeld::gpu {
@@ -197,10 +196,7 @@ void CallChannel::Run() {
     while (absl::IsUnavailable(status) && ReceiveOne().ok()) {
     }
     if (!status.ok()) {
-      constexpr absl::string_view kLost = "the worker was lost: ";
-      const absl::string_view why = status.message();
-      return End(absl::DataLossError(absl::StartsWith(why, kLost) ? std::string(why)
-                                                                  : absl::StrCat(kLost, why)));
+      return End(absl::DataLossError(absl::StrCat("the worker was lost: ", status.message())));
     }
   }
 }

@@ -113,6 +113,7 @@ class WorkerEngine final : public RankWorker {
                      [this, layout = target.layout, lease = *lease,
                       answer](const absl::StatusOr<Message>& message) {
                        const absl::Status status = PlainStatus(message);
+                       Judge(status);
                        if (status.ok()) {
                          sync::MutexLock lock(mutex_);
                          layout_ = layout;
@@ -147,6 +148,7 @@ class WorkerEngine final : public RankWorker {
            answer](const absl::StatusOr<Message>& message) mutable {
             lease = nullptr;  // given back before the answer
             const absl::Status status = PlainStatus(message);
+            Judge(status);
             if (status.ok()) ledger_.Apply(std::move(change), info_.kind == EngineKind::kCuda);
             change = {};
             answer(status);
@@ -167,7 +169,7 @@ class WorkerEngine final : public RankWorker {
           [this, request, buffer, sent, slot = *slot,
            answer](const absl::StatusOr<Message>& message) {
             absl::StatusOr<FrameResult> result = TakeFrame(message, request, buffer, sent, slot);
-            if (absl::IsDataLoss(result.status())) channel_->Fail(result.status());
+            Judge(result.status());
             answer(std::move(result));
           },
           static_cast<int64_t>(buffer.bytes.size()) * kNsPerByte);
@@ -180,8 +182,9 @@ class WorkerEngine final : public RankWorker {
     Ask<absl::Status>(std::move(done), [&](auto answer) {
       channel_->Call(
           MakeMessage(MessageType::kVoxels, 0, VoxelsMessage{(*lease)->id, box, out.size()}),
-          nullptr, [lease = *lease, out, answer](const absl::StatusOr<Message>& message) {
+          nullptr, [this, lease = *lease, out, answer](const absl::StatusOr<Message>& message) {
             const absl::Status status = PlainStatus(message);
+            Judge(status);
             if (status.ok()) {
               std::memcpy(out.data(), lease->segment->bytes().data(), out.size_bytes());
             }
@@ -234,6 +237,11 @@ class WorkerEngine final : public RankWorker {
     return absl::OkStatus();
   }
 
+  // After an answer that comes to a DataLoss the engine is gone.
+  void Judge(const absl::Status& answered) {
+    if (absl::IsDataLoss(answered)) channel_->Fail(answered);
+  }
+
   // Has the worker know the segments of these blocks, before what is sent next.
   absl::Status Show(std::span<const BulkBlock> blocks) {
     sync::MutexLock lock(mutex_);
@@ -251,10 +259,8 @@ class WorkerEngine final : public RankWorker {
       Message message = MakeMessage(MessageType::kBulkSegment, 0, named);
       message.fd = segment->memory()->fd();
       channel_->Tell(std::move(message), segment->memory());
-      segment->WhenGone(channel_, [channel = std::weak_ptr<CallChannel>(channel_), named] {
-        if (const std::shared_ptr<CallChannel> open = channel.lock()) {
-          open->Tell(MakeMessage(MessageType::kDropBulkSegment, 0, named), nullptr);
-        }
+      segment->WhenGone(channel_, [channel = channel_.get(), named] {
+        channel->Tell(MakeMessage(MessageType::kDropBulkSegment, 0, named), nullptr);
       });
     }
     return absl::OkStatus();

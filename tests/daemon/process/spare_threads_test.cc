@@ -1,4 +1,4 @@
-// In children, which can be left without memory for a thread's stack.
+// What wants a thread's stack and has no memory for it is in children; else the system refuses threads as it is told to.
 #include "daemon/process/spare_threads.h"
 
 #include <gtest/gtest.h>
@@ -7,9 +7,12 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <cerrno>
 #include <fstream>
 #include <system_error>
 #include <thread>
+
+#include "tests/refused_calls.h"
 
 namespace voxeld::daemon {
 namespace {
@@ -119,6 +122,85 @@ TEST(SpareThreadsDeathTest, AreDetachedAsIsAsked) {
 
 TEST(SpareThreadsDeathTest, AreRefusedWhereTheyCannotBeHad) {
   EXPECT_EXIT(AsMany(), ::testing::ExitedWithCode(0), "");
+}
+
+class SpareThreadsTest : public ::testing::Test {
+ protected:
+  ~SpareThreadsTest() override { SpareThreads::End(); }
+  uint64_t taken() const { return SpareThreads::taken() - before_; }
+
+ private:
+  const uint64_t before_ = SpareThreads::taken();
+};
+
+TEST_F(SpareThreadsTest, WhatIsRefusedOnceIsAskedForAgainAndTakesNone) {
+  ASSERT_TRUE(SpareThreads::Begin(1).ok());
+  const RefusedCalls refused(SystemCall::kPthreadCreate, EAGAIN);
+  EXPECT_TRUE(ThreadRuns());
+  EXPECT_EQ(refused.made(), 2);
+  EXPECT_EQ(taken(), 0u);
+  EXPECT_EQ(SpareThreads::waiting(), 1);
+}
+
+TEST_F(SpareThreadsTest, WhatIsRefusedTwiceTakesOneAndItIsMissed) {
+  ASSERT_TRUE(SpareThreads::Begin(2).ok());
+  SpareThreads::Refill();
+  {
+    const RefusedCalls refused(SystemCall::kPthreadCreate, EAGAIN, 2);
+    EXPECT_TRUE(ThreadRuns());
+    EXPECT_EQ(refused.made(), 2);
+  }
+  EXPECT_EQ(taken(), 1u);
+  EXPECT_EQ(SpareThreads::waiting(), 1);
+  EXPECT_EQ(SpareThreads::Refill(), 1u);
+  EXPECT_EQ(SpareThreads::waiting(), 2);
+  EXPECT_EQ(SpareThreads::Refill(), 0u);
+}
+
+TEST_F(SpareThreadsTest, WithNoneInHandWhatIsRefusedTwiceIsNone) {
+  const RefusedCalls refused(SystemCall::kPthreadCreate, EAGAIN, 2);
+  EXPECT_FALSE(ThreadRuns());
+  EXPECT_EQ(refused.made(), 2);
+  EXPECT_EQ(taken(), 0u);
+}
+
+TEST_F(SpareThreadsTest, WhatFailsOtherwiseIsNotAskedForAgain) {
+  ASSERT_TRUE(SpareThreads::Begin(1).ok());
+  const RefusedCalls refused(SystemCall::kPthreadCreate, EPERM);
+  EXPECT_FALSE(ThreadRuns());
+  EXPECT_EQ(refused.made(), 1);
+  EXPECT_EQ(taken(), 0u);
+}
+
+TEST_F(SpareThreadsTest, OneThatIsTakenIsAsItsAttributesSay) {
+  ASSERT_TRUE(SpareThreads::Begin(2).ok());
+  const RefusedCalls refused(SystemCall::kPthreadCreate, EAGAIN, 4);
+  for (const int state : {PTHREAD_CREATE_JOINABLE, PTHREAD_CREATE_DETACHED}) {
+    pthread_attr_t attributes;
+    pthread_attr_init(&attributes);
+    pthread_attr_setdetachstate(&attributes, state);
+    std::atomic<int> answer = 0;
+    pthread_t thread;
+    ASSERT_EQ(pthread_create(&thread, &attributes, Answer, &answer), 0);
+    pthread_attr_destroy(&attributes);
+    if (state == PTHREAD_CREATE_JOINABLE) {
+      EXPECT_EQ(pthread_join(thread, nullptr), 0);
+      EXPECT_EQ(answer, 4711);
+    }
+    while (answer != 4711) std::this_thread::yield();
+  }
+  EXPECT_EQ(taken(), 2u);
+}
+
+TEST_F(SpareThreadsTest, AllThatWereAskedForAreInHandOrNone) {
+  const RefusedCalls refused(SystemCall::kPthreadCreate, EAGAIN);
+  EXPECT_TRUE(absl::IsResourceExhausted(SpareThreads::Begin(3)));
+  EXPECT_EQ(refused.made(), 1);
+  EXPECT_EQ(SpareThreads::waiting(), 0);
+  EXPECT_TRUE(SpareThreads::Begin(2).ok());
+  EXPECT_TRUE(SpareThreads::Begin(3).ok());
+  EXPECT_EQ(refused.made(), 4) << "those that wait are not begun again";
+  EXPECT_EQ(SpareThreads::waiting(), 3);
 }
 
 }  // namespace

@@ -175,6 +175,21 @@ TEST_F(SharedWorker, ThatIsNotWaitedForAnswersWhenItIsThere) {
   EXPECT_EQ(a.engine().info().device, "CPU, 1 thread, in a process of its own");
 }
 
+TEST_F(SharedWorker, WhoseCallsAreInlineAnswersWithinThem) {
+  EngineOptions options = Options();
+  options.inline_execution = true;
+  const absl::StatusOr<std::unique_ptr<Engine>> engine = CreateEngine(options);
+  ASSERT_TRUE(engine.ok()) << engine.status();
+  absl::Status set = absl::UnknownError("no answer yet"), drawn = set;
+  (*engine)->SetTarget(target_, [&](absl::Status status) { set = std::move(status); });
+  EXPECT_TRUE(set.ok()) << set;
+  std::vector<std::byte> bytes(target_.layout.bytes());
+  std::vector<uint64_t> numbers(target_.layout.pictures());
+  (*engine)->SubmitFrame({1, 0}, {bytes, numbers},
+                         [&](absl::StatusOr<FrameResult> result) { drawn = result.status(); });
+  EXPECT_TRUE(drawn.ok()) << drawn;
+}
+
 TEST_F(SharedWorker, ThatIsNotWaitedForAndCannotServeSaysWhy) {
   EngineOptions options = Options();
   options.wait_until_ready = false;
