@@ -80,10 +80,8 @@ absl::Status AssetStore::ReadFolder(const std::string& folder) {
   const auto failed = [&folder](const std::error_code& error) {
     return absl::UnavailableError(absl::StrCat(folder, ": ", error.message()));
   };
-  if (mkdir(folder.c_str(), S_IRWXU) != 0 && errno != EEXIST) {
-    return failed(std::error_code(errno, std::generic_category()));
-  }
-  if (access(folder.c_str(), R_OK | W_OK | X_OK) != 0) {
+  if ((mkdir(folder.c_str(), S_IRWXU) != 0 && errno != EEXIST) ||
+      access(folder.c_str(), R_OK | W_OK | X_OK) != 0) {
     return failed(std::error_code(errno, std::generic_category()));
   }
   struct Found {
@@ -430,27 +428,24 @@ absl::StatusOr<wire::MappedRange> AssetStore::FindAsset(std::string_view digest,
   const auto missing = [&digest](absl::string_view why) {
     return absl::NotFoundError(absl::StrCat("is ", Hex(digest), ", which is ", why));
   };
-  uint64_t has = 0;
-  UploadId brought = 0;
-  std::shared_ptr<char[]> memory;
+  Asset asset;
   {
     sync::MutexLock lock(mutex_);
     const auto at = assets_.find(digest);
     if (at == assets_.end()) return missing("not here, or not any more; bring it by UploadAsset");
-    Asset& asset = at->second;
-    if (!asset.complete) {
-      return missing(absl::StrCat("not whole: ", asset.stored, " bytes are here; bring the rest"));
-    }
-    asset.used = ++uses_;
-    has = asset.size;
-    brought = asset.brought;
-    memory = asset.memory;
+    if (at->second.complete) at->second.used = ++uses_;
+    asset = at->second;
   }
-  if (offset > has || size > has - offset) {
+  if (!asset.complete) {
+    return missing(absl::StrCat("not whole: ", asset.stored, " bytes are here; bring the rest"));
+  }
+  if (offset > asset.size || size > asset.size - offset) {
     return absl::OutOfRangeError(
-        absl::StrCat("is ", size, " from ", offset, " on; the asset has ", has, " bytes"));
+        absl::StrCat("is ", size, " from ", offset, " on; the asset has ", asset.size, " bytes"));
   }
-  if (folder_.empty()) return wire::MappedRange{{memory.get() + offset, size}, memory};
+  if (folder_.empty()) {
+    return wire::MappedRange{{asset.memory.get() + offset, size}, asset.memory};
+  }
   const std::string path = PathOf(digest, true);
   const absl::StatusOr<bool> right = Check(digest);
   if (!right.ok()) return right.status();
@@ -458,7 +453,7 @@ absl::StatusOr<wire::MappedRange> AssetStore::FindAsset(std::string_view digest,
   if (*right) bytes = ReadAssetFile(path, offset, size);
   if (absl::IsOutOfRange(
           bytes.status())) {  // cut while the daemon runs, or gone for another's room
-    DropDamaged(digest, brought);
+    DropDamaged(digest, asset.brought);
     return missing("damaged on the disk, or gone meanwhile; bring it anew by UploadAsset");
   }
   if (bytes.ok()) TouchAssetFile(path);

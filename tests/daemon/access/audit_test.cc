@@ -121,6 +121,7 @@ TEST_F(AuditTest, ADiskThatIsFullIsToldOnceUntilThereIsRoom) {
     (*audit)->Record("a", "", method, "", absl::OkStatus());
   };
   record("First");
+  EXPECT_EQ(Logged(), "");
   const uint64_t first = std::filesystem::file_size(path_);
   for (const char* again : {"Second", "Third"}) {
     const uint64_t begins = std::filesystem::file_size(path_);

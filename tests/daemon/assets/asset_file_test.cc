@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -87,6 +88,28 @@ TEST_F(AssetFileTest, WhatIsInterruptedGoesOn) {
   ASSERT_TRUE(read.ok()) << read.status();
   EXPECT_EQ(read->bytes, "ell");
   EXPECT_EQ(interrupted, 6);
+}
+
+TEST_F(AssetFileTest, WhatGoesInPartsIsWhole) {
+  const DiskCalls little([](DiskCall) { return DiskCalls::kOneByte; });
+  auto file = AssetFile::Open(part_, true);
+  ASSERT_TRUE(file.ok());
+  ASSERT_TRUE(file->Write(0, "hello").ok());
+  ASSERT_TRUE(file->Write(5, ", you").ok());
+  EXPECT_EQ(Read(part_), "hello, you");
+  const auto read = ReadAssetFile(part_, 4, 5);
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->bytes, "o, yo");
+  EXPECT_EQ(HashAssetFile(part_, 10).value(), HashBytes("hello, you"));
+}
+
+TEST_F(AssetFileTest, ThatItIsUsedIsSeen) {
+  using namespace std::chrono_literals;
+  std::ofstream(whole_) << "hello";
+  const auto before = std::filesystem::last_write_time(whole_) - 24h;
+  std::filesystem::last_write_time(whole_, before);
+  TouchAssetFile(whole_);
+  EXPECT_GT(std::filesystem::last_write_time(whole_), before + 23h);
 }
 
 TEST_F(AssetFileTest, WhatCannotBeReadIsNotTakenForMissing) {
@@ -169,6 +192,8 @@ TEST_F(AssetFileKept, WhereTheDiskDoesNotTakeItsName) {
   EXPECT_TRUE(file->Keep(whole_).ok()) << "the disk takes it now";
   EXPECT_TRUE(std::filesystem::exists(whole_));
   EXPECT_FALSE(std::filesystem::exists(part_));
+  EXPECT_TRUE(file->Keep(part_).ok()) << "and is known by it";
+  EXPECT_FALSE(std::filesystem::exists(whole_));
 }
 
 TEST_F(AssetFileKept, WhereAFolderHasItsName) {

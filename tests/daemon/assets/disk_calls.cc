@@ -3,8 +3,10 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "display/sync/mutex.h"
@@ -15,16 +17,22 @@ namespace {
 sync::Mutex asked_mutex;
 std::shared_ptr<const std::function<int(DiskCall)>> asked VOXELD_GUARDED_BY(asked_mutex);
 
-// Whether it is to fail; errno says why.
-bool Fails(DiskCall call) {
+int Answer(DiskCall call) {
   std::shared_ptr<const std::function<int(DiskCall)>> answer;
   {
     const sync::MutexLock lock(asked_mutex);
     answer = asked;
   }
-  const int error = answer == nullptr ? 0 : (*answer)(call);
-  if (error != 0) errno = error;
-  return error != 0;
+  return answer == nullptr ? 0 : (*answer)(call);
+}
+
+// With the bytes that the system is to take; nothing: it fails, and errno says why.
+std::optional<size_t> Ask(DiskCall call, size_t size) {
+  const int answer = Answer(call);
+  if (answer == 0) return size;
+  if (answer == DiskCalls::kOneByte) return std::min<size_t>(size, 1);
+  errno = answer;
+  return std::nullopt;
 }
 
 }  // namespace
@@ -41,25 +49,24 @@ DiskCalls::~DiskCalls() {
 
 }  // namespace voxeld::daemon::assets
 
+using voxeld::daemon::assets::Ask;
 using voxeld::daemon::assets::DiskCall;
-using voxeld::daemon::assets::Fails;
 
 // In place of the C library's.
 extern "C" {
 
 ssize_t pread(int file, void* bytes, size_t size, off_t offset) {
-  if (Fails(DiskCall::kRead)) return -1;
-  return syscall(SYS_pread64, file, bytes, size, offset);
+  const auto some = Ask(DiskCall::kRead, size);
+  return some.has_value() ? syscall(SYS_pread64, file, bytes, *some, offset) : -1;
 }
 
 ssize_t pwrite(int file, const void* bytes, size_t size, off_t offset) {
-  if (Fails(DiskCall::kWrite)) return -1;
-  return syscall(SYS_pwrite64, file, bytes, size, offset);
+  const auto some = Ask(DiskCall::kWrite, size);
+  return some.has_value() ? syscall(SYS_pwrite64, file, bytes, *some, offset) : -1;
 }
 
 int fsync(int file) {
-  if (Fails(DiskCall::kSync)) return -1;
-  return static_cast<int>(syscall(SYS_fsync, file));
+  return Ask(DiskCall::kSync, 0).has_value() ? static_cast<int>(syscall(SYS_fsync, file)) : -1;
 }
 
 }  // extern "C"
