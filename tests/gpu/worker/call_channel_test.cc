@@ -72,8 +72,9 @@ TEST_F(CallChannelTest, WhatTheSocketDoesNotTakeGoesNextAndOnce) {
   EXPECT_TRUE(second.get().ok());
   std::promise<int> made;
   channel_->Later([&] {
-    made.set_value(refused->made());
+    const int calls = refused->made();
     refused.reset();
+    made.set_value(calls);
   });
   EXPECT_EQ(made.get_future().get(), 4) << "twice refused, then both";
   EXPECT_EQ(completed, 1);
