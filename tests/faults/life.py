@@ -208,7 +208,7 @@ def metric(port: int, name: str) -> int:
 def heap(port: int, most: int) -> int:
     """Bytes that it has allocated, once they are no more than `most`, or after a while. -1: it does not tell."""
     deadline = time.monotonic() + PATIENCE
-    while (have := metric(port, "voxeld_process_heap_bytes")) > most and time.monotonic() < deadline:
+    while not 0 <= (have := metric(port, "voxeld_process_heap_bytes")) <= most and time.monotonic() < deadline:
         time.sleep(0.05)  # what is over is let go of by and by, and nothing tells when
     return have
 
@@ -243,9 +243,9 @@ def at_rest(life: Life, pid: int) -> Rest:
 def leaks(life: Life, most: Rest) -> str:
     """Memory that is left beyond what there is unharmed, of a life in which its clients missed nothing; nothing: none."""
     allowed = most.heap + HEAP_SPREAD
-    if life.told.failed or (left := heap(life.port, allowed)) <= allowed:
+    if life.told.failed or 0 <= (left := heap(life.port, allowed)) <= allowed:
         return ""
-    return f"{left} bytes are left allocated, of {most.heap}"
+    return f"{left} bytes are left allocated, of {most.heap}" if left >= 0 else "it does not tell what it has allocated"
 
 
 def end(process: "subprocess.Popen[str]", pid: int) -> Optional[int]:
