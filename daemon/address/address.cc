@@ -40,6 +40,7 @@ absl::StatusOr<Address> ParseUnix(std::string_view text) {
   std::string_view path = text.substr(kUnixPrefix.size());
   if (path.starts_with("//")) path.remove_prefix(2);  // unix:///path
   if (path.empty() || path.front() != '/') return Wrong(text, "has no absolute path");
+  while (path.starts_with("//")) path.remove_prefix(1);  // so that what is printed reads back
   if (path.size() > kPathBytes) {
     return Wrong(text, absl::StrCat("has a path of ", path.size(), " bytes, and ", kPathBytes,
                                     " is the most that a unix socket can have"));

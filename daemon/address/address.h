@@ -15,9 +15,9 @@ struct Address {
   bool tls = false;   // not of a unix socket
   std::string host;   // name or number; an IPv6 number without its brackets
   uint16_t port = 0;  // 0: any that is free
-  std::string path;   // unix_socket: absolute
+  std::string path;   // unix_socket: absolute, begins with one slash
 
-  std::string ToString() const;  // as it was written
+  std::string ToString() const;  // as it was written, a path with one slash before it
   // Whether only this machine can connect to it: a unix socket, "localhost", a loopback number.
   bool is_local() const;
   bool operator==(const Address&) const = default;

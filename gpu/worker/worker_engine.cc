@@ -55,12 +55,9 @@ std::function<void(Message&)> NameBulk(SegmentPool::Lease lease, size_t size) {
 class WorkerEngine final : public RankWorker {
  public:
   WorkerEngine(const EngineOptions& options, std::string reason,
-               std::shared_ptr<WorkerStaging> staging, std::shared_ptr<WorkerProcess> process,
-               int socket, int wake)
+               std::shared_ptr<WorkerStaging> staging, std::shared_ptr<CallChannel> channel)
       : options_(options),
-        channel_(std::make_shared<CallChannel>(
-            std::move(process), socket, wake, options.worker_deadline_ns,
-            options.worker_deadline_ns * kFirstAnswerFactor, options.lost)),
+        channel_(std::move(channel)),
         staging_(std::move(staging)),
         results_(UINT64_MAX, staging_->ids(), SegmentNews::Added(news_, false),
                  SegmentNews::Dropped(news_)) {
@@ -388,9 +385,7 @@ std::string DefaultWorkerProgram(const std::filesystem::path& running) {
 
 namespace {
 
-absl::StatusOr<std::unique_ptr<WorkerEngine>> Create(
-    const EngineOptions& options, std::string reason, std::shared_ptr<WorkerStaging> staging,
-    std::function<void(const absl::Status&)> opened) {
+absl::StatusOr<std::shared_ptr<CallChannel>> Connect(const EngineOptions& options) {
   const std::string program =
       options.worker.empty() ? DefaultWorkerProgram(RunningProgram()) : options.worker;
   absl::StatusOr<std::shared_ptr<WorkerProcess>> process =
@@ -405,15 +400,24 @@ absl::StatusOr<std::unique_ptr<WorkerEngine>> Create(
     return absl::FailedPreconditionError(
         absl::StrCat("no event for a worker: ", std::generic_category().message(errno)));
   }
-  std::unique_ptr<WorkerEngine> engine;
   try {
-    engine = std::make_unique<WorkerEngine>(options, std::move(reason), std::move(staging),
-                                            *std::move(process), *socket, wake);
+    return std::make_shared<CallChannel>(
+        *std::move(process), *socket, wake, options.worker_deadline_ns,
+        options.worker_deadline_ns * kFirstAnswerFactor, options.lost);
   } catch (const std::exception& e) {
     close(*socket);
     close(wake);
     return absl::FailedPreconditionError(absl::StrCat("no thread for a worker: ", e.what()));
   }
+}
+
+absl::StatusOr<std::unique_ptr<WorkerEngine>> Create(
+    const EngineOptions& options, std::string reason, std::shared_ptr<WorkerStaging> staging,
+    std::function<void(const absl::Status&)> opened) {
+  absl::StatusOr<std::shared_ptr<CallChannel>> channel = Connect(options);
+  if (!channel.ok()) return channel.status();
+  auto engine = std::make_unique<WorkerEngine>(options, std::move(reason), std::move(staging),
+                                               *std::move(channel));
   if (absl::Status status = engine->Open(std::move(opened)); !status.ok()) return status;
   return engine;
 }

@@ -18,6 +18,8 @@ TEST(ParseAddress, HostsPortsAndPaths) {
   EXPECT_EQ(ParseAddress("[::1]:5")->host, "::1");
   EXPECT_EQ(ParseAddress("[::1]:5")->port, 5);
   EXPECT_EQ(ParseAddress("unix:///run/a.sock")->path, "/run/a.sock");
+  EXPECT_EQ(ParseAddress("unix:////run//a.sock")->path, "/run//a.sock");
+  EXPECT_EQ(ParseAddress("unix://///")->path, "/");
   EXPECT_TRUE(ParseAddress("unix:/a")->unix_socket);
 }
 
