@@ -59,7 +59,7 @@ class DoctorTest : public testing::Test {
   std::string Told(bool json, absl::Status* status) const {
     std::ostringstream out, err;
     Console console(out, err, json, false);
-    *status = Doctor(machine_, console);
+    *status = Doctor(machine_, server_, console);
     return out.str();
   }
 
@@ -67,6 +67,7 @@ class DoctorTest : public testing::Test {
   Machine machine_;
   std::set<std::string> writable_;
   CudaState cuda_;
+  std::string server_;
   uint16_t taken_ = 0;
   PortState port_ = PortState::kFree;
 };
@@ -148,6 +149,26 @@ TEST_F(DoctorTest, PortsOfOthers) {
   absl::Status status;
   EXPECT_THAT(Told(true, &status), HasSubstr("\"state\": \"bad\""));
   EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
+}
+
+TEST_F(DoctorTest, TheServerThatIsAskedFor) {
+  taken_ = 7001;
+  port_ = PortState::kOther;
+  server_ = "localhost:7001";
+  absl::Status status;
+  EXPECT_THAT(Told(false, &status),
+              HasSubstr("bad  port   127.0.0.1:7001 (clients) is taken by another program\n"
+                        "             voxeld --listen 127.0.0.1:7002 "));
+  for (const char* elsewhere :
+       {"there.example:50551", "unix:/run/voxeld.sock", "tls:127.0.0.1:1"}) {
+    server_ = elsewhere;
+    EXPECT_EQ(Told(false, &status), "");
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_THAT(status.message(), HasSubstr(server_));
+  }
+  server_ = "there";
+  Told(false, &status);
+  EXPECT_THAT(status.message(), HasSubstr("has no port"));
 }
 
 TEST(ThisMachineTest, KnowsAPortThatIsTaken) {

@@ -36,7 +36,8 @@ absl::Status Dispatch(const Options& options, const Environment& environment,
   }
   if (const auto* verify = std::get_if<VerifyOptions>(&options.command))
     return Verify(*verify, interrupt, console);
-  if (std::holds_alternative<DoctorOptions>(options.command)) return Doctor(ThisMachine(), console);
+  if (std::holds_alternative<DoctorOptions>(options.command))
+    return Doctor(ThisMachine(), options.server, console);
   if (const auto* init = std::get_if<InitOptions>(&options.command)) {
     return Init(*init, std::cin, console);
   }

@@ -13,6 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
+#include "daemon/address/address.h"
 #include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/proto_json.h"
 
@@ -146,7 +147,8 @@ Finding OfCuda(const Machine& machine) {
   return {"cuda", State::kGood, absl::StrJoin(cuda.devices, ", "), ""};
 }
 
-Finding OfPort(const Machine& machine, uint16_t port, const char* use, const char* elsewhere) {
+Finding OfPort(const Machine& machine, uint16_t port, const char* use,
+               const std::string& elsewhere) {
   const std::string name = absl::StrCat("127.0.0.1:", port, " (", use, ")");
   switch (machine.port(port)) {
     case PortState::kFree:
@@ -179,12 +181,24 @@ std::vector<Finding> Examine(const Machine& machine) {
   findings.push_back(OfRules(machine));
   findings.push_back(OfUsbfs(machine));
   findings.push_back(OfCuda(machine));
-  findings.push_back(OfPort(machine, 50551, "clients", "voxeld --listen 127.0.0.1:50552"));
+  const uint16_t port = machine.clients_port;
+  findings.push_back(OfPort(machine, port, "clients",
+                            absl::StrCat("voxeld --listen 127.0.0.1:", port % UINT16_MAX + 1)));
   findings.push_back(OfPort(machine, 8088, "health and metrics", "voxeld --http 127.0.0.1:8089"));
   return findings;
 }
 
-absl::Status Doctor(const Machine& machine, Console& console) {
+absl::Status Doctor(Machine machine, const std::string& server, Console& console) {
+  if (!server.empty()) {
+    const absl::StatusOr<daemon::Address> address = daemon::ParseAddress(server);
+    if (!address.ok()) return address.status();
+    if (address->unix_socket || address->tls || !address->is_local() || address->port == 0) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("doctor looks at this machine, and --server ", server,
+                       " is no plain TCP port of it; give 127.0.0.1:PORT, or leave it out"));
+    }
+    machine.clients_port = address->port;
+  }
   const std::vector<Finding> findings = Examine(machine);
   const auto bad = std::count_if(findings.begin(), findings.end(),
                                  [](const Finding& f) { return f.state == State::kBad; });

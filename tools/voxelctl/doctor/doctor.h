@@ -25,7 +25,8 @@ struct Finding {
 
 std::vector<Finding> Examine(const Machine& machine);
 
-// FailedPrecondition if something is bad, after all has been told.
-absl::Status Doctor(const Machine& machine, Console& console);
+// `server`: the address that was asked for, a TCP port of this machine; empty: the usual one.
+// FailedPrecondition if something is bad, after all has been told; InvalidArgument: `server` is elsewhere.
+absl::Status Doctor(Machine machine, const std::string& server, Console& console);
 
 }  // namespace voxeld::voxelctl

@@ -23,6 +23,7 @@ struct Machine {
   std::vector<std::string> rule_folders = {"/etc/udev/rules.d", "/run/udev/rules.d",
                                            "/usr/lib/udev/rules.d", "/lib/udev/rules.d"};
   std::string group_file = "/etc/group";
+  uint16_t clients_port = 50551;                          // that clients connect to
   std::function<bool(const std::string& path)> writable;  // by whoever runs this
   std::function<CudaState()> cuda;
   std::function<PortState(uint16_t port)> port;  // of 127.0.0.1
