@@ -12,14 +12,27 @@
 #include "absl/time/time.h"
 
 namespace voxeld::daemon::access {
+namespace {
+
+// Whether it is a file that can be read, and its last line has no end.
+bool EndsWithinALine(int file) {
+  const Descriptor reader(open(absl::StrCat("/proc/self/fd/", file).c_str(),
+                               O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
+  char last = '\n';
+  const off_t end = lseek(reader.get(), 0, SEEK_END);
+  if (end > 0) [[maybe_unused]]
+    const ssize_t got = pread(reader.get(), &last, 1, end - 1);
+  return last != '\n';
+}
+
+}  // namespace
 
 absl::StatusOr<std::unique_ptr<Audit>> Audit::Open(const std::string& path, Logger* log) {
   std::unique_ptr<Audit> audit(new Audit(path, log));
   if (path.empty()) return audit;
   absl::StatusOr<Descriptor> file = audit->OpenFile();
   if (!file.ok()) return file.status();
-  sync::MutexLock lock(audit->mutex_);
-  audit->file_ = *std::move(file);
+  audit->Take(*std::move(file));
   return audit;
 }
 
@@ -77,9 +90,14 @@ void Audit::Reopen() {
     }
     return;
   }
+  Take(*std::move(file));
+}
+
+void Audit::Take(Descriptor file) {
+  const bool cut = EndsWithinALine(file.get());
   sync::MutexLock lock(mutex_);
-  file_ = *std::move(file);
-  cut_ = false;
+  file_ = std::move(file);
+  cut_ = cut;
 }
 
 }  // namespace voxeld::daemon::access

@@ -34,6 +34,7 @@ class Audit {
  private:
   Audit(std::string path, Logger* log) : path_(std::move(path)), log_(log) {}
   absl::StatusOr<Descriptor> OpenFile() const;
+  void Take(Descriptor file);
 
   const std::string path_;
   Logger* const log_;

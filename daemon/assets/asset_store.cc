@@ -384,15 +384,15 @@ void AssetStore::Heard(UploadId upload) {
 }
 
 void AssetStore::DropDamaged(std::string_view digest, UploadId brought) {
-  Paths gone;
   {
     sync::MutexLock lock(mutex_);
     const auto at = FindWhole(digest);
     if (at == assets_.end() || at->second.brought != brought) return;
     ++figures_.damaged;
+    Paths gone;
     Drop(at, &gone);
+    RemoveFiles(gone);  // before anybody can bring it anew
   }
-  RemoveFiles(gone);
   if (log_ != nullptr) {
     log_->Error("an asset was damaged, and is gone", {{"sha256", Hex(digest)}});
   }

@@ -58,7 +58,10 @@ class WatchedWire final : public SocketWire {
   void SetWord(ConnectionId word) { word_ = word; }
   // With it the end is told of once as well: whoever lets it be armed arms it again.
   void Arm() override {
-    if (Rearm() || Rearm()) return;
+    if (Rearm()) return;
+    // Add is about to watch it: by the name of one before it, it was answered before that.
+    if (errno == ENOENT) return;
+    if (Rearm()) return;
     // Nobody would be told of its end, so it ends here.
     Cut();
     unwatched_->Add(word_);

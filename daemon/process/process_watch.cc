@@ -1,5 +1,7 @@
 #include "daemon/process/process_watch.h"
 
+#include <algorithm>
+
 #include "absl/strings/str_cat.h"
 #include "daemon/process/spare_threads.h"
 
@@ -11,16 +13,24 @@ void ProcessWatch::Look() {
               {{"threads", absl::StrCat(taken)}});
   }
   reserve_.Look();
-  if (clock_.Now() >= give_back_at_) {
-    give_back_();
-    give_back_at_ = clock_.Now() + kGiveBack;
+  if (const sync::TimeNs begun = clock_.Now(); begun >= give_back_at_) {
+    allocator_.give_back();
+    give_back_at_ = Next(begun, kGiveBack);
   }
+  if (const sync::TimeNs begun = clock_.Now(); begun >= count_at_) {
+    heap_bytes_ = allocator_.count();
+    count_at_ = Next(begun, kCount);
+  }
+}
+
+sync::TimeNs ProcessWatch::Next(sync::TimeNs begun, sync::TimeNs period) const {
+  return begun + std::max(period, kRest * (clock_.Now() - begun));
 }
 
 ProcessFigures ProcessWatch::figures() const {
   ProcessFigures figures = reserve_.figures();
   time_.AddTo(figures);
-  figures.heap_bytes = HeapBytes();
+  figures.heap_bytes = heap_bytes_;
   return figures;
 }
 

@@ -1,7 +1,9 @@
 // Looks after the process as a whole: its reserves of memory and threads, and whether it runs and by which time.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
+#include <cstdint>
 
 #include "daemon/core/stats.h"
 #include "daemon/log/logger.h"
@@ -15,29 +17,43 @@ namespace voxeld::daemon {
 // Thread-safe but for Look. One a process; all that it is made with outlives it.
 class ProcessWatch {
  public:
-  // How often the system is given what the allocator keeps.
-  static constexpr sync::TimeNs kGiveBack = 60 * sync::kSecond;
+  // How often the system is given what the allocator keeps, and what is allocated is counted. Both go through all that is
+  // free, and whoever wants memory waits meanwhile: of the time they may have a thousandth.
+  static constexpr sync::TimeNs kGiveBack = 60 * sync::kSecond, kCount = sync::kSecond;
+  static constexpr int64_t kRest = 1000;
 
-  ProcessWatch(size_t reserve_bytes, sync::Clock& clock, Logger& log,
-               void (*give_back)() = &GiveBackFreeMemory)
+  struct Allocator {
+    void (*give_back)() = &GiveBackFreeMemory;
+    uint64_t (*count)() = &HeapBytes;
+  };
+
+  ProcessWatch(size_t reserve_bytes, sync::Clock& clock, Logger& log)
+      : ProcessWatch(reserve_bytes, clock, log, Allocator{}) {}
+  ProcessWatch(size_t reserve_bytes, sync::Clock& clock, Logger& log, Allocator allocator)
       : clock_(clock),
         log_(log),
-        give_back_(give_back),
+        allocator_(allocator),
         reserve_(reserve_bytes, clock, log),
         time_(log),
-        give_back_at_(clock.Now() + kGiveBack) {}
+        heap_bytes_(allocator.count()),
+        give_back_at_(clock.Now() + kGiveBack),
+        count_at_(clock.Now() + kCount) {}
 
   void Look();                         // every second or so, from one thread
   void LookAtTime() { time_.Look(); }  // as TimeWatch says
   ProcessFigures figures() const;
 
  private:
+  // When it is time again for what has begun at `begun`, each `period` if it is quick.
+  sync::TimeNs Next(sync::TimeNs begun, sync::TimeNs period) const;
+
   sync::Clock& clock_;
   Logger& log_;
-  void (*const give_back_)();
+  const Allocator allocator_;
   ReserveWatch reserve_;
   TimeWatch time_;
-  sync::TimeNs give_back_at_;  // of the thread that looks
+  std::atomic<uint64_t> heap_bytes_;
+  sync::TimeNs give_back_at_, count_at_;  // of the thread that looks
 };
 
 }  // namespace voxeld::daemon

@@ -9,7 +9,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <climits>
 #include <cstring>
 #include <string_view>
 #include <system_error>
@@ -124,6 +126,22 @@ bool WorkerProcess::lost() const {
   if (killed_) return true;
   pollfd end{control_, POLLIN, 0};
   return poll(&end, 1, 0) > 0 && (end.revents & (POLLHUP | POLLERR)) != 0;
+}
+
+std::string DefaultWorkerProgram(const std::filesystem::path& running) {
+  const std::filesystem::path folder = running.parent_path();
+  const std::filesystem::path above = folder.parent_path();
+  for (const std::filesystem::path& place : {folder, above}) {
+    std::error_code error;
+    if (std::filesystem::exists(place / "voxeld-engine", error)) return place / "voxeld-engine";
+  }
+  return above / "libexec/voxeld/voxeld-engine";
+}
+
+std::filesystem::path RunningProgram() {
+  char path[PATH_MAX];
+  const ssize_t size = readlink("/proc/self/exe", path, sizeof(path));
+  return std::string(path, static_cast<size_t>(std::max<ssize_t>(0, size)));
 }
 
 }  // namespace voxeld::gpu

@@ -4,6 +4,7 @@
 #include <sys/types.h>
 
 #include <atomic>
+#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -43,5 +44,12 @@ class WorkerProcess {
 };
 
 inline constexpr int kWorkerSocket = 3;
+
+// The program that is started unless the options name another: voxeld-engine, in the folder of the
+// program `running`, in the one above (a build's tests), or in ../libexec/voxeld (installed); the
+// first that is there, the last if none is.
+std::string DefaultWorkerProgram(const std::filesystem::path& running);
+// This process's own.
+std::filesystem::path RunningProgram();
 
 }  // namespace voxeld::gpu

@@ -6,10 +6,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
-#include <climits>
 #include <cstring>
 #include <exception>
-#include <filesystem>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -42,6 +40,14 @@ absl::Status PlainStatus(const absl::StatusOr<Message>& answer) {
   if (!answer.ok()) return answer.status();
   if (answer->type != MessageType::kDone) return absl::DataLossError("an answer of another type");
   return StatusOf(*answer);
+}
+
+absl::StatusOr<RankLink::Invitation> InvitationOf(const absl::StatusOr<Message>& answer) {
+  if (!answer.ok()) return answer.status();
+  const auto invited = answer->As<InvitedMessage>();
+  if (answer->type == MessageType::kInvited && invited) return invited->invitation;
+  const absl::Status status = PlainStatus(answer);
+  return status.ok() ? absl::DataLossError("the worker's invitation is none") : status;
 }
 
 // Names the first `size` bytes of a segment, their CRC worked out when they go.
@@ -183,7 +189,8 @@ class WorkerEngine final : public RankWorker {
             const absl::Status status = PlainStatus(message);
             Judge(status);
             if (status.ok()) {
-              std::memcpy(out.data(), lease->segment->bytes().data(), out.size_bytes());
+              std::copy_n(lease->segment->bytes().begin(), out.size_bytes(),
+                          std::as_writable_bytes(out).begin());
             }
             answer(status);
           });
@@ -194,12 +201,10 @@ class WorkerEngine final : public RankWorker {
               std::function<void(absl::StatusOr<RankLink::Invitation>)> done) override {
     channel_->Call(
         MakeMessage(MessageType::kInvite, 0, InviteMessage{}, library), nullptr,
-        [done = std::move(done)](const absl::StatusOr<Message>& answer) {
-          if (!answer.ok()) return done(answer.status());
-          const auto invited = answer->As<InvitedMessage>();
-          if (answer->type == MessageType::kInvited && invited) return done(invited->invitation);
-          const absl::Status status = PlainStatus(answer);
-          done(status.ok() ? absl::DataLossError("the worker's invitation is none") : status);
+        [this, done = std::move(done)](const absl::StatusOr<Message>& answer) {
+          const absl::StatusOr<RankLink::Invitation> invitation = InvitationOf(answer);
+          Judge(invitation.status());
+          done(invitation);
         },
         options_.worker_deadline_ns * kFirstAnswerFactor);
   }
@@ -208,8 +213,10 @@ class WorkerEngine final : public RankWorker {
             Done done) override {
     channel_->Call(
         MakeMessage(MessageType::kJoin, 0, JoinMessage{invitation, rank, ranks}, library), nullptr,
-        [done = std::move(done)](const absl::StatusOr<Message>& answer) {
-          done(PlainStatus(answer));
+        [this, done = std::move(done)](const absl::StatusOr<Message>& answer) {
+          const absl::Status status = PlainStatus(answer);
+          Judge(status);
+          done(status);
         },
         options_.worker_deadline_ns * kFirstAnswerFactor);
   }
@@ -363,28 +370,6 @@ class WorkerEngine final : public RankWorker {
   std::unique_ptr<Executor> executor_;  // to look through frames
 };
 
-std::filesystem::path RunningProgram() {
-  char path[PATH_MAX];
-  const ssize_t size = readlink("/proc/self/exe", path, sizeof(path));
-  return std::string(path, static_cast<size_t>(std::max<ssize_t>(0, size)));
-}
-
-}  // namespace
-
-bool IsLate(const absl::Status& status) { return status.GetPayload(kLatePayload).has_value(); }
-
-std::string DefaultWorkerProgram(const std::filesystem::path& running) {
-  const std::filesystem::path folder = running.parent_path();
-  const std::filesystem::path above = folder.parent_path();
-  for (const std::filesystem::path& place : {folder, above}) {
-    std::error_code error;
-    if (std::filesystem::exists(place / "voxeld-engine", error)) return place / "voxeld-engine";
-  }
-  return above / "libexec/voxeld/voxeld-engine";
-}
-
-namespace {
-
 absl::StatusOr<std::shared_ptr<CallChannel>> Connect(const EngineOptions& options) {
   const std::string program =
       options.worker.empty() ? DefaultWorkerProgram(RunningProgram()) : options.worker;
@@ -423,6 +408,8 @@ absl::StatusOr<std::unique_ptr<WorkerEngine>> Create(
 }
 
 }  // namespace
+
+bool IsLate(const absl::Status& status) { return status.GetPayload(kLatePayload).has_value(); }
 
 absl::StatusOr<std::unique_ptr<Engine>> CreateWorkerEngine(const EngineOptions& options,
                                                            std::string reason) {

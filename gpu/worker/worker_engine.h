@@ -3,7 +3,6 @@
 // ends in DataLoss here.
 #pragma once
 
-#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -50,10 +49,5 @@ absl::StatusOr<std::unique_ptr<RankWorker>> CreateRankWorker(
 
 // Whether a DataLoss says that no answer came in time: the engine may have been slow, not faulty.
 bool IsLate(const absl::Status& status);
-
-// The program that is started unless the options name another: voxeld-engine, in the folder of the
-// program `running`, in the one above (a build's tests), or in ../libexec/voxeld (installed); the
-// first that is there, the last if none is.
-std::string DefaultWorkerProgram(const std::filesystem::path& running);
 
 }  // namespace voxeld::gpu

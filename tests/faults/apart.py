@@ -2,11 +2,12 @@
 import argparse
 import concurrent.futures
 import multiprocessing as mp
+import sys
 import threading
 import time
 import zlib
 from multiprocessing.connection import Connection
-from typing import Any, Callable, Iterable, Sequence, TypeVar
+from typing import Any, Callable, Iterable, Protocol, Sequence, TypeVar
 
 Case = TypeVar("Case", bound=tuple[Any, ...])
 Result = TypeVar("Result")
@@ -48,6 +49,21 @@ def chosen(cases: Sequence[Case], key: Callable[[Case], object], options: argpar
 
     drawn = sorted(cases, key=place)[:options.sample or len(cases)]
     return [case for case in drawn if place(case) % parts == part - 1]
+
+
+class Judged(Protocol):
+    how: str
+    wrong: str
+
+
+def verdict(results: Sequence[Judged]) -> int:
+    """The program's exit status: 1 if one of them is wrong, or if nothing failed in any."""
+    if any(result.wrong for result in results):
+        return 1
+    if all(result.how == "missed" for result in results):
+        print("nothing failed in any case, so that none says anything", file=sys.stderr)
+        return 1
+    return 0
 
 
 def _send(pipe: Connection, run: Callable[..., Any], case: tuple[Any, ...]) -> None:

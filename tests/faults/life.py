@@ -228,21 +228,21 @@ class Rest:
 
 
 def at_rest(life: Life, pid: int) -> Rest:
-    """Once connections that have ended are closed: as many descriptors for half a second."""
+    """Once connections that have ended are closed: as many descriptors until memory has been counted since."""
     deadline = time.monotonic() + PATIENCE
     have, since = -1, 0.0
     while True:
         now = descriptors(pid, 1 << 20)
         if now != have:
             have, since = now, time.monotonic()
-        elif time.monotonic() > min(since + 0.5, deadline):
+        elif time.monotonic() > min(since + 1.2, deadline):  # memory is counted each second
             return Rest(have, metric(life.port, "voxeld_process_heap_bytes"))
         time.sleep(0.02)  # nothing tells when
 
 
-def leaks(life: Life, most: Rest) -> str:
-    """Memory that is left beyond what there is unharmed, of a life in which its clients missed nothing; nothing: none."""
-    allowed = most.heap + HEAP_SPREAD
+def leaks(life: Life, most: Rest, more: int = 0) -> str:
+    """Memory that is left beyond what there is unharmed and `more`, of a life in which its clients missed nothing; nothing: none."""
+    allowed = most.heap + HEAP_SPREAD + more
     if life.told.failed or 0 <= (left := heap(life.port, allowed)) <= allowed:
         return ""
     return f"{left} bytes are left allocated, of {most.heap}" if left >= 0 else "it does not tell what it has allocated"

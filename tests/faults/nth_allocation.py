@@ -28,7 +28,7 @@ import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from apart import add_options, chosen, each
+from apart import add_options, chosen, each, verdict
 from life import Ending, Life, Rest, again, at_rest, descriptors, end, judge, leaks, metric, sockets
 from programs import program
 from scenarios import SCENARIOS
@@ -193,7 +193,7 @@ def main() -> int:
         for way, counts in sorted(table.items()):
             print(f"{way:<10}" + "".join(f"{counts[kind]:>9}" for kind in kinds))
         print(f"{len(results)} cases of {len(found)} places, {len(cases) - len(results)} left, {sum(1 for result in results if result.wrong)} wrong")
-    return 1 if any(result.wrong for result in results) else 0
+    return verdict(results)
 
 
 if __name__ == "__main__":

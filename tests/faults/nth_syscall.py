@@ -27,7 +27,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Optional
 
-from apart import add_options, chosen, each, positive
+from apart import add_options, chosen, each, positive, verdict
 from life import ENDS, Ending, Life, Rest, again, at_rest, descriptors, end, events, judge, leaks, sockets, refuses
 from programs import program
 from scenarios import SCENARIOS
@@ -56,8 +56,12 @@ GIVES_UP = 40.0
 POLLS_INSTEAD = re.compile(r"\(INJECTED\)\n(?: > .*\n)*? > .*grpc_ev_epoll1_posix")
 # oneTBB that cannot load its allocator takes its memory of the C library's, half a megabyte.
 WITHOUT_ALLOCATOR = re.compile(r"\(INJECTED\)\n(?: > .*\n)*? > .*/libtbb\.so")
+# What that may be at the most.
+ALLOCATORS_SHARE = 1 << 20
 # Where others decide what becomes of the process when they are refused memory, threads or descriptors.
 THEIRS = re.compile(r"/(libgrpc|libgrpc\+\+|libgpr|ld-linux-x86-64|libsqlite3|libtbb)[^/]*\.so")
+# What is asked on somebody's behalf.
+BASE = re.compile(r"/(libc|libstdc\+\+|libgcc_s|libm|libabsl_\w+)[^/]*\.so")
 
 
 @dataclass
@@ -73,9 +77,17 @@ class Result:
 
 def whose(trace: str) -> list[str]:
     """Of each call that failed the library of others that made it, by its stack; empty: it was our own."""
-    stacks = re.findall(r"\(INJECTED\)\n((?: > .*\n)*)", trace)
-    found = [THEIRS.search(stack) for stack in stacks]
-    return [match[1] if match else "" for match in found]
+    return [of_stack(stack) for stack in re.findall(r"\(INJECTED\)\n((?: > .*\n)*)", trace)]
+
+
+def of_stack(stack: str) -> str:
+    """Whoever asked first what only passes it on."""
+    for frame in stack.splitlines():
+        if match := THEIRS.search(frame):
+            return match[1]
+        if not BASE.search(frame):
+            return ""
+    return ""
 
 
 class Traced:
@@ -137,7 +149,7 @@ def run(scenario: str, call: str, error: str, n: int, rest: Rest, stacks: bool =
         traced = Traced(scenario, Path(name), *(["-k"] if stacks else []), "-e", f"trace={call}",
                         *(["-P", f"{name}/output"] if call == "write" else []),  # what else is written to this way are events, which cannot fail
                         "-e", f"inject={call}:error={error}:when={n}")
-        life, leak, others = traced.life, "", 0
+        life, leak, much, others = traced.life, "", "", 0
         is_ready, wrong = traced.lived()
         alive = traced.alive()
         if alive and is_ready:
@@ -149,13 +161,14 @@ def run(scenario: str, call: str, error: str, n: int, rest: Rest, stacks: bool =
                 others = left - events(life.pid)
             elif left <= most and not wrong:
                 leak = leaks(life, rest)
+                much = leak and leaks(life, rest, ALLOCATORS_SHARE)
         status = traced.end()
         trace = Path(name, "trace").read_text(encoding="utf-8", errors="replace")
         theirs = whose(trace) if stacks else [""]
         # What ends a process is the call that failed last.
         ending = judge(life, status, is_ready, alive, f"{theirs[-1]} asked, and gives up" if theirs and theirs[-1] else "")
         after = again(life)
-        excused = all(theirs) or (others and others <= most and POLLS_INSTEAD.search(trace)) or (not others and WITHOUT_ALLOCATOR.search(trace))
+        excused = all(theirs) or (others and others <= most and POLLS_INSTEAD.search(trace)) or (not others and not much and WITHOUT_ALLOCATOR.search(trace))
         if leak and not ending.wrong and theirs and excused:
             ending, leak = Ending(f"known: {next(filter(None, theirs))} asked, and keeps what it had"), ""
         wrong = wrong or ending.wrong or leak or after
@@ -248,7 +261,7 @@ def main() -> int:
                 print(f"{name:<18}" + "".join(f"{counted_kinds[kind]:>9}" for kind in kinds))
         wrong = sum(1 for result in results if result.wrong)
         print(f"{len(results)} cases, {len(cases) - len(results)} left, {wrong} wrong")
-    return 1 if any(result.wrong for result in results) else 0
+    return verdict(results)
 
 
 if __name__ == "__main__":

@@ -130,6 +130,42 @@ def workers(put, text):
     put("worker_messages", front + segment(0, 0) + bytes([3, 0, 0, 0, 0, 0, 1]) + bytes([3, 0, 0, 0, 1, 0, 0, 9, 0, 0]) + bytes([3, 0, 0, 0, 0, 0, 2]) + bytes(8) + bytes([3, 0, 0, 0, 0, 3, 0]))
 
 
+def owners(put, text):
+    """What an engine's owner is answered (tests/fuzz/worker/worker_answers_fuzz.cc)."""
+    say = lambda *words: b"".join(bytes([w]) if isinstance(w, int) else w for w in words)
+    ready, right = say(10, 0, 0, text(b"a device")), say(7, 0)
+    target = lambda shape=0, sub_frames=0, form=0: say(0, shape, sub_frames, form)
+    frame = lambda number, holds=0, off=0: say(3, number, holds, off)
+    draw = lambda value, numbers, wrong=0: say(9, 0, value, bytes(numbers), wrong)
+    delta, voxels, invite, join = say(1, 0, 7), say(4, 1, 64), say(5, text(b"a")), say(6, text(b"a"), 0, 2)
+    none = say(12, 33, 0, 77, text(b""), 0)  # of a call that was never made
+    front = ready + target() + right
+    for shape, pictures in ((0, 4), (1, 4), (2, 4), (3, 1), (4, 4)):
+        for sub_frames in (0, 1):
+            for form in range(5):
+                numbers = [1] * (pictures * (1 + sub_frames))
+                put("worker_answers", ready + target(shape, sub_frames, form) + right + frame(1) + draw(7, numbers) + frame(2, 1) + draw(8, [2] + numbers[1:]))
+    for how in range(8):  # with bulk memory
+        put("worker_answers", front + say(13, how, 0, 7) + right + say(13, how ^ 3, 0, 7) + right + delta + right + say(14) + say(2, text(b"ab"), 9) + delta)
+    put("worker_answers", front + delta + right + say(2, text(b"no delta"), 0) + voxels + right + invite + say(11, 0) + join + right + frame(1) + draw(3, [1] * 4))
+    put("worker_answers", front + frame(1) + frame(2) + say(9, 1, 5) + bytes([2] * 4) + b"\0" + draw(4, [1] * 4) + frame(3, 2) + draw(5, [3, 2, 3, 2]))  # in another order
+    for wrong in (1, 2):
+        put("worker_answers", front + frame(1) + draw(3, [1] * 4, wrong) + delta)
+    for off in range(1, 9):  # a buffer of another size
+        put("worker_answers", front + frame(1, 0, off) + draw(3, [1] * 4))
+    asked = {"open": b"", "target": ready + target(), "delta": front + delta, "frame": front + frame(1), "voxels": front + voxels, "invite": front + invite, "join": front + join}
+    for what in asked.values():
+        for answer in (right, say(8, 0, 15, text(b"lost")), say(8, 0, 3, text(b"refused")), say(8, 0, 200, text(b"")), ready, say(11, 0), say(9, 0, 1, bytes(4), 0), none, say(15, 0), say(15, 1)):
+            put("worker_answers", what + answer + delta + right)
+        for kind in (33, 34, 35, 32, 0, 1, 255):  # too short, with a descriptor, too long, and what is no message
+            for how in (0, 1, 2, 4):
+                put("worker_answers", what + say(12, kind, 1, 0, text(b"ab"), how) + delta + right)
+    put("worker_answers", ready + frame(1) + say(9, 0, 1, bytes(4), 0))  # before there is a target
+    put("worker_answers", front + frame(1) + target(1) + say(7, 1) + draw(1, [1] * 4) + frame(2) + draw(2, [2] * 4))  # of the target before
+    for kind in range(3):
+        put("worker_answers", say(10, 0, kind, text(b"x" * 200)) + target() + right)
+
+
 def viewers(put, text):
     say = lambda page, *messages: b"".join(bytes([3 | page << 3]) + text(m.encode() if isinstance(m, str) else json.dumps(m).encode()) for m in messages)
     show = b"\x01\x00\x01\x01\x01\xd0"
@@ -260,5 +296,5 @@ def assets(put, text):
 
 
 def sessions(put, text):
-    for each in (devices, hosts, producers, assets, states, foxglove, lights, deltas, workers, viewers):
+    for each in (devices, hosts, producers, assets, states, foxglove, lights, deltas, workers, owners, viewers):
         each(put, text)

@@ -175,6 +175,31 @@ TEST_F(AuditTest, ALineThatIsCutSpoilsNoOther) {
   ASSERT_EQ(Lines(path_).size(), 1u) << "a new file begins with its line";
 }
 
+TEST_F(AuditTest, ALineThatWasCutBeforeTheFileWasOpenedSpoilsNoOther) {
+  const auto cut = [](Audit& audit, const std::string& path) {
+    const SmallFiles full(std::filesystem::exists(path) ? std::filesystem::file_size(path) + 10
+                                                        : 10);
+    audit.Record("a", "", "Cut", "", absl::OkStatus());
+  };
+  const auto last = [this] {
+    std::ifstream file(path_);
+    std::string line, found;
+    while (std::getline(file, line)) found = line;
+    return json::parse(found);
+  };
+  auto audit = Audit::Open(path_, nullptr);
+  ASSERT_TRUE(audit.ok());
+  cut(**audit, path_);
+  (*audit)->Reopen();
+  (*audit)->Record("a", "", "Second", "", absl::OkStatus());
+  EXPECT_EQ(last()["method"], "Second");
+  cut(**audit, path_);
+  audit = Audit::Open(path_, nullptr);
+  ASSERT_TRUE(audit.ok());
+  (*audit)->Record("a", "", "Third", "", absl::OkStatus());
+  EXPECT_EQ(last()["method"], "Third");
+}
+
 TEST_F(AuditTest, WithoutALogItGoesOnAllTheSame) {
   auto full = Audit::Open("/dev/full", nullptr);
   ASSERT_TRUE(full.ok()) << full.status();

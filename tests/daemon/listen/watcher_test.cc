@@ -110,6 +110,20 @@ TEST_F(WatcherTest, OneThatCannotBeArmedAtAllIsCutAndLeaves) {
   EXPECT_TRUE(AllHaveLeft());
 }
 
+TEST_F(WatcherTest, OneThatIsNotWatchedYetIsNotCut) {
+  Start();
+  ASSERT_TRUE(Add().ok());
+  {
+    const RefusedCalls refused(SystemCall::kEpollControl, ENOENT);
+    Authorise();
+    EXPECT_EQ(refused.made(), 1);
+  }
+  EXPECT_EQ(send(client_.get(), "x", 1, MSG_NOSIGNAL), 1);
+  char byte = 0;
+  EXPECT_EQ(recv(served_.get(), &byte, 1, 0), 1) << "it was not cut";
+  EXPECT_EQ(counters_.Read().open, 1u);
+}
+
 TEST_F(WatcherTest, OneThatIsCutAndCannotBeArmedLeavesAsWell) {
   Start();
   const auto id = watcher_->Add(peer_, false, Descriptor(dup(served_.get())));

@@ -31,33 +31,82 @@ TEST(ProcessWatch, HasTheFiguresOfAll) {
   EXPECT_EQ(watch.figures().clock_steps, 0u);
 }
 
-int given_back = 0;
+// An allocator that takes its time.
+class SlowAllocator : public ::testing::Test {
+ protected:
+  SlowAllocator() { given_back_ = counted_ = 0; }
 
-TEST(ProcessWatch, GivesBackFreeMemoryEachMinute) {
-  sync::FakeClock clock;
-  Logger log(Logger::Level::kOff, Logger::Format::kText);
-  ProcessWatch watch(0, clock, log, [] { ++given_back; });
-  for (int second = 1; second <= 150; ++second) {
-    clock.Advance(sync::kSecond);
-    watch.Look();
-    EXPECT_EQ(given_back, second / 60) << second;
+  void Watch(int seconds) {
+    for (int i = 0; i < seconds; ++i) {
+      clock_.Advance(sync::kSecond);
+      watch_.Look();
+    }
   }
+
+  static inline sync::FakeClock clock_{sync::kSecond};
+  static inline sync::TimeNs gives_back_for_ = 0, counts_for_ = 0;
+  static inline int given_back_ = 0;
+  static inline uint64_t counted_ = 0;
+  Logger log_{Logger::Level::kOff, Logger::Format::kText};
+  ProcessWatch watch_{0,
+                      clock_,
+                      log_,
+                      {.give_back =
+                           [] {
+                             ++given_back_;
+                             clock_.Advance(gives_back_for_);
+                           },
+                       .count =
+                           [] {
+                             clock_.Advance(counts_for_);
+                             return ++counted_;
+                           }}};
+};
+
+TEST_F(SlowAllocator, GivesBackEachMinuteAndCountsEachSecondIfThatIsQuick) {
+  gives_back_for_ = counts_for_ = 0;
+  for (int second = 1; second <= 150; ++second) {
+    Watch(1);
+    EXPECT_EQ(given_back_, second / 60) << second;
+    EXPECT_EQ(watch_.figures().heap_bytes, static_cast<uint64_t>(second));
+  }
+  EXPECT_EQ(counted_, 150u) << "asking does not count";
+}
+
+TEST_F(SlowAllocator, HasAThousandthOfTheTime) {
+  gives_back_for_ = 120 * sync::kMillisecond;
+  counts_for_ = 5 * sync::kMillisecond;
+  Watch(60);
+  EXPECT_EQ(given_back_, 1);
+  Watch(115);
+  EXPECT_EQ(given_back_, 1);
+  Watch(10);
+  EXPECT_EQ(given_back_, 2);
+  const uint64_t counted = counted_;
+  Watch(100);
+  EXPECT_LE(counted_, counted + 20);
+  EXPECT_GE(counted_, counted + 18);
 }
 
 #if defined(__GLIBC__) && !defined(VOXELD_SANITIZED)
 TEST(ProcessWatch, TellsWhatIsAllocated) {
   sync::FakeClock clock;
   Logger log(Logger::Level::kOff, Logger::Format::kText);
-  const ProcessWatch watch(0, clock, log);
+  ProcessWatch watch(0, clock, log);
+  const auto told = [&] {
+    clock.Advance(ProcessWatch::kCount);
+    watch.Look();
+    return watch.figures().heap_bytes;
+  };
   // One within an arena, and one that is mapped.
   for (const size_t bytes : {size_t{100} << 10, size_t{64} << 20}) {
-    const uint64_t before = watch.figures().heap_bytes;
+    const uint64_t before = told();
     auto held = std::make_unique<char[]>(bytes);
-    const uint64_t during = watch.figures().heap_bytes;
+    const uint64_t during = told();
     EXPECT_GE(during, before + bytes);
     EXPECT_LT(during, before + bytes + (16 << 10));
     held.reset();
-    EXPECT_LT(watch.figures().heap_bytes, before + (16 << 10));
+    EXPECT_LT(told(), before + (16 << 10));
   }
 }
 

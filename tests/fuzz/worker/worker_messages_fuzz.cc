@@ -26,6 +26,8 @@
 #include "gpu/worker/worker_connection.h"
 #include "tests/fuzz/expect.h"
 #include "tests/fuzz/script.h"
+#include "tests/fuzz/worker/open_descriptors.h"
+#include "tests/fuzz/worker/small_target.h"
 #include "tests/fuzz/worker/sound_delta.h"
 
 namespace voxeld::fuzz {
@@ -35,53 +37,6 @@ using namespace voxeld::gpu;  // NOLINT(google-build-using-namespace)
 
 constexpr int kMostMessages = 64;
 constexpr size_t kSegmentBytes = 16 << 10;
-
-// What the descriptors that are open are of.
-std::multiset<std::string> OpenDescriptors() {
-  std::multiset<std::string> open;
-  DIR* const folder = opendir("/proc/self/fd");
-  while (const dirent* entry = readdir(folder)) {
-    char target[256];
-    const ssize_t size = readlinkat(dirfd(folder), entry->d_name, target, sizeof(target));
-    if (size > 0) open.emplace(target, static_cast<size_t>(size));
-  }
-  closedir(folder);
-  return open;
-}
-
-// A display that is worked out in no time.
-Target SmallTarget(Script& script) {
-  Target target;
-  display::PlanarStack stack{.width_px = 4, .height_px = 4};
-  stack.positions_mm = {0, 1, 2, 3};
-  target.geometry.shape = stack;
-  const uint8_t shape = script.Byte() % 8;
-  if (shape == 1) {
-    target.geometry.shape = display::Rotor{
-        .slices_per_turn = 4, .width_px = 4, .height_px = 4, .panels = {display::Rotor::Panel{}}};
-  } else if (shape == 2) {
-    target.geometry.shape = display::Helix{
-        .slices_per_turn = 4, .width_px = 4, .height_px = 4, .height_mm = 4, .radius_mm = 2};
-  } else if (shape == 3) {
-    target.geometry.shape = display::Lattice{
-        .width_px = 4,
-        .points_mm = {display::Vec3{0, 0, 0}, std::nullopt, display::Vec3{1, 1, 1}, std::nullopt}};
-  } else if (shape == 4) {
-    target.geometry.correction.emplace().displacement =
-        display::DisplacementGrid{.nx = 2,
-                                  .ny = 2,
-                                  .nz = 2,
-                                  .low_mm = {0, 0, 0},
-                                  .high_mm = {4, 4, 4},
-                                  .at_mm = std::vector<display::Vec3>(8)};
-  }
-  target.geometry.grid = {.nx = 4, .ny = 4, .nz = 4, .pitch_mm = {1, 1, 1}, .origin_mm = {}};
-  target.layout = {.slices = 4, .width = 4, .height = 4, .sub_frames = 1 + script.Byte() % 2};
-  if (shape == 3) target.layout.slices = target.layout.height = 1;
-  target.layout.format = static_cast<display::PixelFormat>(script.Byte() % 5);
-  target.tone.lut.fill(display::Tone::Linear());
-  return target;
-}
 
 bool IsSmall(const Target& target) {
   const auto& grid = target.geometry.grid;

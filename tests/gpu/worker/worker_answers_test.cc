@@ -205,22 +205,48 @@ TEST_F(WorkerAnswers, AnInvitationIsOneOrTheReasonWhyNot) {
   ASSERT_TRUE(good.ok()) << good.status();
   EXPECT_EQ(*good, invited.invitation);
   EXPECT_EQ(invite([&](const Message& asked) {
-              worker_.Say(MakeMessage(MessageType::kInvited, asked.call, uint32_t{0}));
-            }).status(),
-            absl::DataLossError("an answer of another type"));
-  EXPECT_EQ(invite([&](const Message& asked) {
-              worker_.Say(MakeMessage(MessageType::kVoxels, asked.call, invited));
-            }).status(),
-            absl::DataLossError("an answer of another type"));
-  EXPECT_EQ(invite([&](const Message& asked) { worker_.SayDone(asked); }).status(),
-            absl::DataLossError("the worker's invitation is none"));
-  EXPECT_EQ(invite([&](const Message& asked) {
               worker_.SayDone(asked, absl::NotFoundError("no library"));
             }).status(),
             absl::NotFoundError("no library"));
+  const std::vector<std::pair<std::function<void(const Message&)>, const char*>> damaged = {
+      {[&](const Message& asked) {
+         worker_.Say(MakeMessage(MessageType::kInvited, asked.call, uint32_t{0}));
+       },
+       "an answer of another type"},
+      {[&](const Message& asked) {
+         worker_.Say(MakeMessage(MessageType::kVoxels, asked.call, invited));
+       },
+       "an answer of another type"},
+      {[&](const Message& asked) { worker_.SayDone(asked); }, "the worker's invitation is none"}};
+  for (const auto& [answer, why] : damaged) {
+    EXPECT_EQ(invite(answer).status(), absl::DataLossError(why));
+    ExpectGone(why);
+    Ready();
+  }
   const absl::Status gone = invite([&](const Message&) { worker_.HangUp(); }).status();
   EXPECT_EQ(gone.code(), absl::StatusCode::kDataLoss);
   EXPECT_THAT(gone.message(), HasSubstr("the worker was lost: the other process has ended"));
+}
+
+TEST_F(WorkerAnswers, WhoeverJoinsWithoutAnAnswerThatIsOneIsGone) {
+  Ready();
+  ToldStatus refused;
+  engine_->Join("a library", {}, 0, 2, refused.done());
+  worker_.SayDone(worker_.Hear(), absl::NotFoundError("no library"));
+  EXPECT_EQ(refused.get(), absl::NotFoundError("no library"));
+  ToldStatus damaged;
+  engine_->Join("a library", {}, 0, 2, damaged.done());
+  worker_.Say(MakeMessage(MessageType::kVoxels, worker_.Hear().call, ReadyMessage{}));
+  EXPECT_EQ(damaged.get(), absl::DataLossError("an answer of another type"));
+  ExpectGone("an answer of another type");
+}
+
+TEST_F(WorkerAnswers, NoVoxelsAreReadIntoNothing) {
+  Ready();
+  ToldStatus told;
+  engine_->ReadVoxels({0, 0, 0, 0, 4, 4}, {}, told.done());
+  worker_.SayDone(worker_.Hear());
+  EXPECT_TRUE(told.get().ok());
 }
 
 // ---- frames

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "gpu/worker/process.h"
 #include "gpu/worker/worker_pool.h"
 #include "tests/conformance/engine_driver.h"
 #include "tests/conformance/scene_generator.h"
