@@ -215,8 +215,8 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="voxeld-soak-") as folder:
         server = f"unix:{folder}/s"
         log = open(f"{folder}/log", "w+", encoding="utf-8")
-        # Full after a minute or two, so that what is kept stays as much, and making room goes on all the time.
-        Path(f"{folder}/voxeld.toml").write_text("[limits]\nmax_assets = 64\n", encoding="utf-8")
+        # Full after a minute or two, assets and sessions that have gone, so that what is kept stays as much, and making room goes on all the time.
+        Path(f"{folder}/voxeld.toml").write_text("[limits]\nmax_assets = 64\nmax_sessions = 64\n", encoding="utf-8")
         daemon = subprocess.Popen(
             [*ENDS_WITH_US, voxeld, "--config", f"{folder}/voxeld.toml", "--listen", server, "--http", "127.0.0.1:0", "--state-dir", f"{folder}/state", "--log-level", "info", "--engine", "cpu",
              "--display", "stack=simulated,size=24x24x16,rate=60", "--display", "rotor=simulated,geometry=rotor,size=24x16,slices=60,rate=30",
