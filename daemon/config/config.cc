@@ -110,6 +110,7 @@ struct ChoiceSetter {
   void Listen(const char*, std::vector<Address>&) {}
   void Http(const char*, std::optional<Address>&, bool&) {}
   void LocalSocket(const char*, std::string&) {}
+  void Program(const char*, std::string&) {}
   void Engine(const char*, gpu::EngineKind&) {}
   template <typename T>
   void Integer(const char*, T&, int64_t, int64_t) {}

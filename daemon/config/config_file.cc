@@ -9,6 +9,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "daemon/config/config.h"
@@ -108,6 +109,19 @@ class FileReader {
     if (!text.has_value()) return;
     if (absl::Status status = CheckLocalSocket(*text); !status.ok()) {
       return Wrong(*Find(key), key, absl::StrCat("is refused: ", status.message()));
+    }
+    out = *std::move(text);
+  }
+
+  void Program(const char* key, std::string& out) {
+    std::optional<std::string> text = QuotedText(key);
+    if (!text.has_value()) return;
+    if (text->starts_with("unix:") && !text->starts_with("unix:/")) {
+      return Wrong(
+          *Find(key), key,
+          absl::StrCat("is \"", absl::Utf8SafeCHexEscape(*text),
+                       "\", which is no absolute path; give a program's file, or unix: and "
+                       "a socket's absolute path"));
     }
     out = *std::move(text);
   }
@@ -300,6 +314,7 @@ class Printer {
     Line(key, Quoted(address.has_value() ? address->ToString() : "off"));
   }
   void LocalSocket(const char* key, const std::string& value) { Line(key, Quoted(value)); }
+  void Program(const char* key, const std::string& value) { Line(key, Quoted(value)); }
   void Choice(const char* key, const std::string& value, std::initializer_list<const char*>) {
     Line(key, Quoted(value));
   }

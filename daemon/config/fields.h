@@ -20,6 +20,7 @@ namespace voxeld::daemon {
 //   Real(key, double&, least, greatest)
 //   Flag(key, bool&)
 //   Text(key, string&)                    any
+//   Program(key, string&)                 a file, or unix: and an absolute path
 //   Scopes(key, string&, auto_too)        what access::ParseScopes takes, or "auto"
 template <typename Visitor, typename ConfigType>
 void VisitFields(ConfigType& config, Visitor& visitor) {
@@ -82,7 +83,7 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Integer("device", config.engine.device, 0, 1023);
   visitor.Integer("index_bytes", config.engine.index_bytes, 0, 1024 * kGiB);
   visitor.Flag("in_worker", config.engine.in_worker);
-  visitor.Text("worker", config.engine.worker);
+  visitor.Program("worker", config.engine.worker);
   visitor.Text("nccl", config.engine.nccl);
   visitor.Integer("worker_deadline_ns", config.engine.worker_deadline_ns, kSecond / 100, kHour);
 

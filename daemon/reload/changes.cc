@@ -44,6 +44,7 @@ class Values {
     Add(key, address.has_value() ? address->ToString() : "off");
   }
   void LocalSocket(const char* key, const std::string& value) { Add(key, value); }
+  void Program(const char* key, const std::string& value) { Add(key, value); }
   void Choice(const char* key, const std::string& value, std::initializer_list<const char*>) {
     Add(key, value);
   }

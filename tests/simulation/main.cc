@@ -38,35 +38,48 @@ struct Options {
   bool verbose = false, json = false, quiet = false;
 };
 
-bool Parse(const std::vector<std::string>& args, Options* options) {
+// What is wrong; empty: nothing.
+std::string Parse(const std::vector<std::string>& args, Options* options) {
+  const auto wrong = [](const std::string& arg, const std::string& value, const char* right) {
+    return absl::StrCat(arg, " is \"", value, "\"; give ", right);
+  };
   for (size_t i = 0; i < args.size(); ++i) {
     const std::string& arg = args[i];
     if (arg == "--verbose") {
       options->verbose = true;
-    } else if (arg == "--json") {
+      continue;
+    }
+    if (arg == "--json") {
       options->json = true;
-    } else if (arg == "--quiet") {
+      continue;
+    }
+    if (arg == "--quiet") {
       options->quiet = true;
-    } else if (i + 1 == args.size()) {
-      return false;
-    } else if (arg == "--seeds") {
-      const std::vector<std::string> ends = absl::StrSplit(args[++i], "..");
+      continue;
+    }
+    const std::string value = i + 1 < args.size() ? args[++i] : "";
+    if (arg == "--seeds") {
+      const std::vector<std::string> ends = absl::StrSplit(value, "..");
       if (ends.size() != 2 || !absl::SimpleAtoi(ends[0], &options->first) ||
           !absl::SimpleAtoi(ends[1], &options->last) || options->last < options->first) {
-        return false;
+        return wrong(arg, value, "A..B, B no less than A, such as 1..1000");
       }
     } else if (arg == "--seed") {
-      if (!absl::SimpleAtoi(args[++i], &options->first)) return false;
+      if (!absl::SimpleAtoi(value, &options->first)) return wrong(arg, value, "a seed's number");
       options->last = options->first;
     } else if (arg == "--jobs") {
-      if (!absl::SimpleAtoi(args[++i], &options->jobs) || options->jobs == 0) return false;
+      if (!absl::SimpleAtoi(value, &options->jobs) || options->jobs == 0) {
+        return wrong(arg, value, "a number from 1 on");
+      }
     } else if (arg == "--most-failures") {
-      if (!absl::SimpleAtoi(args[++i], &options->most_failures)) return false;
+      if (!absl::SimpleAtoi(value, &options->most_failures)) {
+        return wrong(arg, value, "a number");
+      }
     } else {
-      return false;
+      return absl::StrCat(arg, " is no option here");
     }
   }
-  return true;
+  return "";
 }
 
 struct Failure {
@@ -191,8 +204,8 @@ int main(int argc, char** argv) {
     std::fputs(voxeld::simulation::kUsage, stdout);
     return 0;
   }
-  if (!voxeld::simulation::Parse(args, &options)) {
-    std::fputs(voxeld::simulation::kUsage, stderr);
+  if (const std::string wrong = voxeld::simulation::Parse(args, &options); !wrong.empty()) {
+    std::fprintf(stderr, "simulation: %s\n%s", wrong.c_str(), voxeld::simulation::kUsage);
     return 2;
   }
   return voxeld::simulation::Main(options);

@@ -264,7 +264,8 @@ class Frame:
         except FutureTimeout:
             missing = "an answer"
             if self.accepted is not None:
-                missing = "the outcome on " + ", ".join(d for d in self.accepted.displays if d not in self.outcomes)
+                displays = ", ".join(d for d in self.accepted.displays if d not in self.outcomes)
+                missing = f"the outcome on {displays}" if displays else "word that it is on the server's disk"
             raise TimeoutError(f"frame {self.id} is {self.state} and {missing} has not come in {timeout} s") from None
 
     def _tell(self) -> None:

@@ -123,6 +123,13 @@ class Waiting(unittest.TestCase):
         self.assertEqual(caught.exception.issues, (issue,))
         self.assertNotIsInstance(caught.exception, CommitRefused)
 
+    def test_what_durable_waits_for_is_named(self) -> None:
+        book, frame = Book(), Frame(1)
+        book.add(frame)
+        book.receipt(pb.Receipt(frame_id=1, accepted=pb.Accepted(durable=True)))
+        with self.assertRaisesRegex(TimeoutError, "frame 1 is accepted and word that it is on the server's disk has not come in 0 s"):
+            frame.wait_durable(0)
+
     def test_words_of_newer_servers_are_borne(self) -> None:
         book, frame = Book(), Frame(1)
         book.add(frame)

@@ -376,6 +376,15 @@ TEST_F(HttpServer, MayGoBeforeItsAnswers) {
   EXPECT_EQ(connection.ReadAll(), "");
 }
 
+TEST_F(HttpServer, MayGoWhenAllItsConnectionsAreTaken) {
+  Start({.max_connections = 1});
+  Connection only(server_->address());
+  only.Send(Get("/hello"));
+  EXPECT_THAT(only.ReadTo("hello\n"), StartsWith("HTTP/1.1 200 "));
+  server_.reset();
+  EXPECT_EQ(only.ReadAll(), "");
+}
+
 TEST_F(HttpServer, ServesAUnixSocketAndRemovesIt) {
   const std::string path = absl::StrCat(::testing::TempDir(), "/voxeld-http-", getpid(), ".sock");
   Start({.listen = *ParseAddress(absl::StrCat("unix:", path))});

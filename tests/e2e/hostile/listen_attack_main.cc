@@ -196,6 +196,22 @@ void Print(const Json& line, bool json) {
   std::fflush(stdout);
 }
 
+void Usage(std::FILE* out) {
+  std::fputs(
+      "usage: listen_attack [ATTACK …] [--seconds S] [--peers N] [--cycles N] [--option OPTION]… "
+      "[--json]\n"
+      "  Attacks a voxeld of its own over loopback (all of them, one after another, if none is "
+      "named), and says what came of it.\n"
+      "  --seconds S      of each attack, a quarter of it before (10)\n"
+      "  --peers N        that attack at once (4)\n"
+      "  --cycles N       of the attack \"descriptors\" (100)\n"
+      "  --option OPTION  for voxeld\n"
+      "  Ends with 1 if a target was not reached. Attacks:\n",
+      out);
+  for (const Attack attack : AllAttacks()) std::fprintf(out, "    %s\n", AttackName(attack));
+  std::fputs("    descriptors\n", out);
+}
+
 int Run(const Options& options) {
   bool kept = true;
   for (const std::string& what : options.what) {
@@ -209,6 +225,7 @@ int Run(const Options& options) {
     }
     if (line.is_null()) {
       std::fprintf(stderr, "listen_attack: there is no attack \"%s\"\n", what.c_str());
+      Usage(stderr);
       return 2;
     }
     Print(line, options.json);
@@ -232,6 +249,10 @@ int main(int argc, char** argv) {
       options.json = true;
       continue;
     }
+    if (argument == "--help") {
+      voxeld::e2e::Usage(stdout);
+      return 0;
+    }
     const char* value = i + 1 < argc ? argv[++i] : "";
     if (argument == "--seconds") {
       options.seconds = std::atof(value);
@@ -243,6 +264,7 @@ int main(int argc, char** argv) {
       options.daemon.emplace_back(value);
     } else {
       std::fprintf(stderr, "listen_attack: there is no option %s\n", argument.c_str());
+      voxeld::e2e::Usage(stderr);
       return 2;
     }
   }

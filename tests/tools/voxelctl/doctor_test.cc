@@ -141,8 +141,10 @@ TEST_F(DoctorTest, Gpus) {
 
 TEST_F(DoctorTest, PortsOfOthers) {
   taken_ = 8088;
-  port_ = PortState::kVoxeld;
+  port_ = PortState::kHttp;
   EXPECT_THAT(Of("port")[1].text, HasSubstr("voxeld answers at 127.0.0.1:8088"));
+  port_ = PortState::kClients;
+  EXPECT_THAT(Of("port")[1].text, HasSubstr("is taken by a voxeld's port for clients"));
   port_ = PortState::kOther;
   EXPECT_EQ(Of("port")[1].state, State::kBad);
   EXPECT_THAT(Of("port")[1].fix, HasSubstr("voxeld --http 127.0.0.1:8089"));
@@ -159,13 +161,20 @@ TEST_F(DoctorTest, TheServerThatIsAskedFor) {
   EXPECT_THAT(Told(false, &status),
               HasSubstr("bad  port   127.0.0.1:7001 (clients) is taken by another program\n"
                         "             voxeld --listen 127.0.0.1:7002 "));
-  for (const char* elsewhere :
-       {"there.example:50551", "unix:/run/voxeld.sock", "tls:127.0.0.1:1"}) {
+  for (const char* elsewhere : {"there.example:50551", "unix:/run/voxeld.sock", "tls:127.0.0.1:1",
+                                "[::1]:50551", "127.0.0.2:50551"}) {
     server_ = elsewhere;
     EXPECT_EQ(Told(false, &status), "");
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
     EXPECT_THAT(status.message(), HasSubstr(server_));
   }
+  server_ = "127.0.0.1:7001";
+  port_ = PortState::kHttp;
+  EXPECT_THAT(Told(false, &status),
+              HasSubstr("(clients) is taken by a voxeld's port for health and metrics"));
+  port_ = PortState::kClients;
+  EXPECT_THAT(Told(false, &status),
+              HasSubstr("good  port   voxeld answers at 127.0.0.1:7001 (clients)"));
   server_ = "there";
   Told(false, &status);
   EXPECT_THAT(status.message(), HasSubstr("has no port"));

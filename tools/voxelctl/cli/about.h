@@ -143,6 +143,6 @@ inline constexpr const char* kCompletionAbout =
     "  voxelctl completion fish >~/.config/fish/completions/voxelctl.fish";
 inline constexpr const char* kDoctorAbout =
     "Says what of this machine keeps voxeld from its work, and the command that mends it; "
-    "needs no daemon. --server 127.0.0.1:PORT: a daemon of this machine's at another port";
+    "needs no daemon. Ports are 50551, or that of --server 127.0.0.1:PORT, and 8088";
 
 }  // namespace voxeld::voxelctl

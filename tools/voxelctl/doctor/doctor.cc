@@ -147,18 +147,22 @@ Finding OfCuda(const Machine& machine) {
   return {"cuda", State::kGood, absl::StrJoin(cuda.devices, ", "), ""};
 }
 
-Finding OfPort(const Machine& machine, uint16_t port, const char* use,
-               const std::string& elsewhere) {
-  const std::string name = absl::StrCat("127.0.0.1:", port, " (", use, ")");
-  switch (machine.port(port)) {
-    case PortState::kFree:
-      return {"port", State::kGood, absl::StrCat(name, " is free"), ""};
-    case PortState::kVoxeld:
-      return {"port", State::kGood, absl::StrCat("voxeld answers at ", name), ""};
-    case PortState::kOther:
-      break;
+// `own`: who answers there when voxeld runs.
+Finding OfPort(const Machine& machine, uint16_t port, PortState own, const std::string& elsewhere) {
+  const auto use_of = [](PortState state) {
+    return state == PortState::kHttp ? "health and metrics" : "clients";
+  };
+  const std::string name = absl::StrCat("127.0.0.1:", port, " (", use_of(own), ")");
+  const PortState state = machine.port(port);
+  if (state == PortState::kFree) {
+    return {"port", State::kGood, absl::StrCat(name, " is free"), ""};
   }
-  return {"port", State::kBad, absl::StrCat(name, " is taken by another program"),
+  if (state == own) return {"port", State::kGood, absl::StrCat("voxeld answers at ", name), ""};
+  return {"port", State::kBad,
+          absl::StrCat(name, " is taken by ",
+                       state == PortState::kOther
+                           ? "another program"
+                           : absl::StrCat("a voxeld's port for ", use_of(state))),
           absl::StrCat(elsewhere, "   # ss -ltnp 'sport = :", port, "' says whose it is")};
 }
 
@@ -182,9 +186,9 @@ std::vector<Finding> Examine(const Machine& machine) {
   findings.push_back(OfUsbfs(machine));
   findings.push_back(OfCuda(machine));
   const uint16_t port = machine.clients_port;
-  findings.push_back(OfPort(machine, port, "clients",
+  findings.push_back(OfPort(machine, port, PortState::kClients,
                             absl::StrCat("voxeld --listen 127.0.0.1:", port % UINT16_MAX + 1)));
-  findings.push_back(OfPort(machine, 8088, "health and metrics", "voxeld --http 127.0.0.1:8089"));
+  findings.push_back(OfPort(machine, 8088, PortState::kHttp, "voxeld --http 127.0.0.1:8089"));
   return findings;
 }
 
@@ -192,10 +196,11 @@ absl::Status Doctor(Machine machine, const std::string& server, Console& console
   if (!server.empty()) {
     const absl::StatusOr<daemon::Address> address = daemon::ParseAddress(server);
     if (!address.ok()) return address.status();
-    if (address->unix_socket || address->tls || !address->is_local() || address->port == 0) {
+    const bool here = address->host == "127.0.0.1" || address->host == "localhost";
+    if (address->tls || !here || address->port == 0) {
       return absl::InvalidArgumentError(
-          absl::StrCat("doctor looks at this machine, and --server ", server,
-                       " is no plain TCP port of it; give 127.0.0.1:PORT, or leave it out"));
+          absl::StrCat("doctor looks at plain ports of 127.0.0.1, and --server ", server,
+                       " is none; give 127.0.0.1:PORT, or leave it out"));
     }
     machine.clients_port = address->port;
   }

@@ -90,11 +90,11 @@ PortState LookAtPort(uint16_t port) {
   using namespace std::string_literals;
   const std::string settings =
       Socket(port).Ask("PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\4\0\0\0\0\0"s);
-  if (settings.size() >= 9 && settings[3] == 4 && settings[0] == 0) return PortState::kVoxeld;
+  if (settings.size() >= 9 && settings[3] == 4 && settings[0] == 0) return PortState::kClients;
   // The http port says how it is.
   const std::string health =
       Socket(port).Ask("GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n");
-  return absl::StrContains(health, "\"reasons\"") ? PortState::kVoxeld : PortState::kOther;
+  return absl::StrContains(health, "\"reasons\"") ? PortState::kHttp : PortState::kOther;
 }
 
 }  // namespace

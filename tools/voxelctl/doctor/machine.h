@@ -15,8 +15,8 @@ struct CudaState {
   std::vector<std::string> devices;
 };
 
-// Who has a TCP port of this machine's.
-enum class PortState : uint8_t { kFree, kVoxeld, kOther };
+// Who has a TCP port of this machine's: a voxeld's port for clients, its http port.
+enum class PortState : uint8_t { kFree, kClients, kHttp, kOther };
 
 struct Machine {
   std::string sys = "/sys", dev = "/dev";
