@@ -71,18 +71,24 @@ def _send(pipe: Connection, run: Callable[..., Any], case: tuple[Any, ...]) -> N
 
 
 def _apart(run: Callable[..., Result], case: tuple[Any, ...]) -> Result:
-    here, there = _CONTEXT.Pipe(duplex=False)
-    process = _CONTEXT.Process(target=_send, args=(there, run, case))
-    with _STARTING:
-        process.start()
-    there.close()
-    try:
-        result: Result = here.recv()
-    except EOFError:
-        process.join()
-        raise SystemExit(f"{run.__name__}{case} ended with {process.exitcode}") from None
-    process.join()
-    return result
+    """What it comes to. What ends without that, in what is made ready for it (a port that another life has taken meanwhile), is begun once more."""
+    for last in (False, True):
+        here, there = _CONTEXT.Pipe(duplex=False)
+        process = _CONTEXT.Process(target=_send, args=(there, run, case))
+        with _STARTING:
+            process.start()
+        there.close()
+        try:
+            result: Result = here.recv()
+            return result
+        except EOFError:
+            process.join()
+            print(f"{run.__name__}{case} ended with {process.exitcode}", file=sys.stderr)
+            if last:
+                raise SystemExit(1) from None
+        finally:
+            process.join()
+    raise AssertionError
 
 
 def each(run: Callable[..., Result], cases: Iterable[tuple[Any, ...]], jobs: int, within: float = 0, tell: Callable[[Result], None] = lambda result: None) -> list[Result]:

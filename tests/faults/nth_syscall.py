@@ -163,7 +163,8 @@ def run(scenario: str, call: str, error: str, n: int, rest: Rest, stacks: bool =
                 leak = leaks(life, rest)
                 much = leak and leaks(life, rest, ALLOCATORS_SHARE)
         status = traced.end()
-        trace = Path(name, "trace").read_text(encoding="utf-8", errors="replace")
+        found = Path(name, "trace")
+        trace = found.read_text(encoding="utf-8", errors="replace") if found.exists() else ""  # it did not come that far
         theirs = whose(trace) if stacks else [""]
         # What ends a process is the call that failed last.
         ending = judge(life, status, is_ready, alive, f"{theirs[-1]} asked, and gives up" if theirs and theirs[-1] else "")
