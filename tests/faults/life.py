@@ -23,6 +23,7 @@ from programs import ENDS_WITH_US
 PATIENCE = 8.0  # for what may not come any more
 ENDS = 30.0  # for a daemon to end by itself
 HEAP_SPREAD = 256 << 10  # bytes by which one unharmed life differs from another: 40 KiB were seen
+COUNTED_AGAIN = 30.0  # by when memory has been counted again on a busy machine: counting may have a thousandth of the time, and being kept from it counts too
 
 
 def free_port() -> int:
@@ -207,7 +208,7 @@ def metric(port: int, name: str) -> int:
 
 def heap(port: int, most: int) -> int:
     """Bytes that it has allocated, once they are no more than `most`, or after a while. -1: it does not tell."""
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + COUNTED_AGAIN
     while not 0 <= (have := metric(port, "voxeld_process_heap_bytes")) <= most and time.monotonic() < deadline:
         time.sleep(0.05)  # what is over is let go of by and by, and nothing tells when
     return have

@@ -146,7 +146,8 @@ def owners(put, text):
                 numbers = [1] * (pictures * (1 + sub_frames))
                 put("worker_answers", ready + target(shape, sub_frames, form) + right + frame(1) + draw(7, numbers) + frame(2, 1) + draw(8, [2] + numbers[1:]))
     for how in range(8):  # with bulk memory
-        put("worker_answers", front + say(13, how, 0, 7) + right + say(13, how ^ 3, 0, 7) + right + delta + right + say(14) + say(2, text(b"ab"), 9) + delta)
+        put("worker_answers", front + say(13, how, 0, 7) + right + say(13, how ^ 3, 0, 7) + right + delta + right + say(14, 0) + say(2, text(b"ab"), 9) + delta)
+    put("worker_answers", front + say(14, 95) + say(11, 3) + say(7, 9) + delta)
     put("worker_answers", front + delta + right + say(2, text(b"no delta"), 0) + voxels + right + invite + say(11, 0) + join + right + frame(1) + draw(3, [1] * 4))
     put("worker_answers", front + frame(1) + frame(2) + say(9, 1, 5) + bytes([2] * 4) + b"\0" + draw(4, [1] * 4) + frame(3, 2) + draw(5, [3, 2, 3, 2]))  # in another order
     for wrong in (1, 2):
