@@ -40,8 +40,12 @@ void SimulationRun::CheckQuiet() {
       seen = seat.device->Seen();
       brightness = seat.device->brightness();
     });
-    if ((is.blanked || is.brightness == 0) && seen.has_value()) {
-      Fail(absl::StrCat("display ", d, " is to be dark, and is lit"));
+    // Of a device that had denied, lying, that it has a brightness, the picture is black.
+    const bool lit = seen.has_value() &&
+                     std::ranges::any_of(seen->Rgb(), [](uint8_t level) { return level != 0; });
+    if ((is.blanked && seen.has_value()) || (is.brightness == 0 && lit)) {
+      Fail(absl::StrCat("display ", d, " is to be dark, and is lit: its device has brightness ",
+                        brightness, ", and is to have ", is.brightness));
     }
     if (is.blanked) continue;
     if (seat.display->state() != display::DisplayState::kShowing) {
