@@ -330,8 +330,8 @@ function(voxeld_test name)
 endfunction()
 
 # voxeld_fuzz(NAME SOURCES … LINK …): a fuzz target `NAME_fuzz` in bin/fuzz, of NAME_fuzz.cc and SOURCES. With VOXELD_FUZZ libFuzzer
-# drives it (tools/fuzz runs it); elsewhere it is a test, fuzz.NAME, which replays the corpus in the tree, and where edges are counted
-# (VOXELD_FUZZ_TESTS) has libFuzzer look for more for VOXELD_FUZZ_SECONDS.
+# drives it (tools/fuzz runs it); elsewhere it is a test, fuzz.NAME, which replays its corpus as unpacked into fuzz/corpus/NAME of the build
+# (target fuzz_corpora), and where edges are counted (VOXELD_FUZZ_TESTS) has libFuzzer look for more for VOXELD_FUZZ_SECONDS.
 function(voxeld_fuzz name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
   set(target ${name}_fuzz)
@@ -339,6 +339,7 @@ function(voxeld_fuzz name)
   target_link_libraries(${target} PRIVATE ${ARG_LINK} voxeld_options voxeld_warnings absl::status absl::statusor absl::strings)
   target_compile_options(${target} PRIVATE -pthread)
   set_target_properties(${target} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin/fuzz)
+  add_dependencies(${target} fuzz_corpora)
   if(VOXELD_FUZZ)
     target_link_options(${target} PRIVATE -fsanitize=fuzzer)
     add_dependencies(fuzz_targets ${target})
@@ -355,7 +356,7 @@ function(voxeld_fuzz name)
     target_compile_options(${target} PRIVATE -O0)
   endif()
   if(VOXELD_UNIT_TESTS)
-    add_test(NAME fuzz.${name} COMMAND ${target} ${CMAKE_SOURCE_DIR}/tests/fuzz/corpus/${name})
+    add_test(NAME fuzz.${name} COMMAND ${target} ${CMAKE_BINARY_DIR}/fuzz/corpus/${name})
     set_tests_properties(fuzz.${name} PROPERTIES LABELS host TIMEOUT 300)
   else()
     set_target_properties(${target} PROPERTIES EXCLUDE_FROM_ALL ON)
