@@ -48,9 +48,8 @@ mkdir "$INSTALLED_WORK"/{upper,changes,root}
 root=$INSTALLED_WORK/root
 mount -t overlay overlay -o "lowerdir=${base:-/},upperdir=$INSTALLED_WORK/upper,workdir=$INSTALLED_WORK/changes" "$root" 2>/dev/null ||
   skip "this kernel has no overlayfs here"
-apt=()
 if [ -z "$base" ]; then
-  # Only what Debian's packages bring is left of this system, and nothing is downloaded for it.
+  # Only what Debian's packages bring is left of this system.
   for folder in "$root"/*; do
     case "${folder##*/}" in
       bin | dev | etc | lib* | proc | run | sbin | sys | tmp | usr | var) ;;
@@ -58,7 +57,6 @@ if [ -z "$base" ]; then
     esac
   done
   mount -t tmpfs tmpfs "$root/usr/local"
-  apt=(-o APT::Get::Download=false)
   echo "   this system's packages: $(in_root sh -c '. /etc/os-release; echo "$PRETTY_NAME"')"
 else
   cp /etc/resolv.conf "$root/etc/resolv.conf"
@@ -82,7 +80,7 @@ step "install"
 mkdir "$root/tmp/packages"
 cp "$packages"/*.deb "$wheel" "$root/tmp/packages/"
 names=$(cd "$packages" && ls ./*.deb)
-in_root apt-get "${apt[@]}" install -q -y --no-install-recommends $(cd "$packages" && printf '/tmp/packages/%s ' *.deb) \
+in_root apt-get install -q -y --no-install-recommends $(cd "$packages" && printf '/tmp/packages/%s ' *.deb) \
   $([ -z "$base" ] || echo "${needed[@]}") >"$INSTALLED_WORK/log" 2>&1 || fail "apt-get: $(tail -n 20 "$INSTALLED_WORK/log")"
 for name in $names; do
   name=${name#./}
@@ -119,8 +117,8 @@ import voxeld
 place = voxeld.__file__
 assert place.startswith(sys.argv[1]), f"the module is from {place}, not from the wheel"
 with voxeld.connect("unix:/run/voxeld/voxeld.sock", timeout=60, name="installed") as v:
-    v.sphere("ball", radius=0.5, color="orange", fill="solid")
-    outcomes = v.commit().wait_shown(timeout=60)
+    ball = v.sphere("ball", radius=0.5, color="orange", fill="solid")
+    outcomes = ball.frame.wait_shown(timeout=60)
     assert list(outcomes) == ["stack"] and outcomes["stack"].kind == "presented", outcomes
     volume = v.capture("stack", timeout=60)
     assert np.count_nonzero(volume.rgb.any(axis=-1)) > 10_000, volume
@@ -151,7 +149,7 @@ fi
 step "stop, remove"
 kill -TERM "$daemon"
 wait "$daemon" || fail "voxeld ended with $?: $(tail "$INSTALLED_WORK/daemon.log")"
-in_root apt-get "${apt[@]}" purge -q -y $(for name in $names; do name=${name#./}; echo "${name%%_*}"; done) >"$INSTALLED_WORK/log" 2>&1 ||
+in_root apt-get purge -q -y $(for name in $names; do name=${name#./}; echo "${name%%_*}"; done) >"$INSTALLED_WORK/log" 2>&1 ||
   fail "apt-get purge: $(tail -n 20 "$INSTALLED_WORK/log")"
 left=$(comm -13 "$INSTALLED_WORK/before" <(files))
 [ -z "$left" ] || fail "left behind: $left"
