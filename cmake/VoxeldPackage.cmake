@@ -79,6 +79,14 @@ else()
   message(STATUS "voxeld is built without a list of what it is made of: that takes dpkg and Ninja")
 endif()
 
+# All that tools/package packs: programs, manual, list of contents, client libraries. Tests and benchmarks are no part of it.
+add_custom_target(packaged DEPENDS voxeld voxelctl voxeld-engine voxeld-emulator voxeld_client_shared voxeld_manual python_client)
+foreach(part voxeld-engine-cuda voxeld-ros sbom)
+  if(TARGET ${part})
+    add_dependencies(packaged ${part})
+  endif()
+endforeach()
+
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME voxeld)
 set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
