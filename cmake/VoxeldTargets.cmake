@@ -122,39 +122,29 @@ function(voxeld_test_options name)
   endif()
 endfunction()
 
-# Headers that most sources include are compiled once for all of them (VOXELD_PRECOMPILE), for each set of compiler options:
-#   voxeld_common_headers        sources that are optimised
-#   voxeld_common_headers_plain  sources below voxeld_compile_quickly()
-#   voxeld_wide_headers          the same, with the wire messages, gRPC and JSON (proto/CMakeLists.txt), for daemon, client and tools
+# Headers that most sources include are compiled once for all of them (VOXELD_PRECOMPILE): with the options of sources that are
+# optimised, and with those of sources below voxeld_compile_quickly(). The wire messages and gRPC are not among them: loading what GCC makes
+# of those costs as much as compiling them.
 set(VOXELD_COMMON_HEADERS OFF)
 if(VOXELD_PRECOMPILE OR VOXELD_INSTRUMENTED OR VOXELD_HASTY)
   set(VOXELD_COMMON_HEADERS ON)
-endif()
-# voxeld_precompiled_headers(NAME [PLAIN] HEADERS … LINK …): a set of precompiled headers that others reuse.
-function(voxeld_precompiled_headers name)
-  cmake_parse_arguments(ARG "PLAIN" "" "HEADERS;LINK" ${ARGN})
-  file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/headers/${name}.cc CONTENT "int ${name};\n" @ONLY)
-  add_library(${name} OBJECT EXCLUDE_FROM_ALL ${CMAKE_BINARY_DIR}/headers/${name}.cc)
-  target_precompile_headers(${name} PRIVATE ${ARG_HEADERS})
-  target_link_libraries(${name} PRIVATE voxeld_options voxeld_warnings ${ARG_LINK})
-  target_compile_options(${name} PRIVATE -pthread)
-  if(ARG_PLAIN AND VOXELD_INSTRUMENTED)
-    target_compile_options(${name} PRIVATE -O0)
-  elseif(ARG_PLAIN AND VOXELD_HASTY)
-    target_compile_options(${name} PRIVATE -O1)
+  foreach(headers voxeld_common_headers voxeld_common_headers_plain)
+    file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/headers/${headers}.cc CONTENT "int ${headers};\n" @ONLY)
+    add_library(${headers} OBJECT EXCLUDE_FROM_ALL ${CMAKE_BINARY_DIR}/headers/${headers}.cc)
+    target_precompile_headers(${headers} PRIVATE
+      <absl/container/flat_hash_map.h> <absl/container/flat_hash_set.h> <absl/status/statusor.h> <absl/strings/str_cat.h>
+      <absl/strings/str_format.h> <absl/strings/str_join.h> <absl/strings/str_split.h>
+      <algorithm> <array> <atomic> <chrono> <cmath> <condition_variable> <deque> <functional> <map> <memory> <mutex> <optional> <span>
+      <string> <thread> <utility> <variant> <vector>)
+    target_link_libraries(${headers} PRIVATE voxeld_options voxeld_warnings absl::flat_hash_map absl::flat_hash_set absl::statusor
+                                             absl::strings absl::str_format)
+    target_compile_options(${headers} PRIVATE -pthread)
+  endforeach()
+  if(VOXELD_INSTRUMENTED)
+    target_compile_options(voxeld_common_headers_plain PRIVATE -O0)
+  elseif(VOXELD_HASTY)
+    target_compile_options(voxeld_common_headers_plain PRIVATE -O1)
   endif()
-endfunction()
-set(VOXELD_COMMON_HEADER_FILES
-  <absl/container/flat_hash_map.h> <absl/container/flat_hash_set.h> <absl/status/statusor.h> <absl/strings/str_cat.h>
-  <absl/strings/str_format.h> <absl/strings/str_join.h> <absl/strings/str_split.h>
-  <algorithm> <array> <atomic> <chrono> <cmath> <condition_variable> <deque> <functional> <map> <memory> <mutex> <optional> <span>
-  <string> <thread> <utility> <variant> <vector>)
-set(VOXELD_COMMON_HEADER_LIBRARIES absl::flat_hash_map absl::flat_hash_set absl::statusor absl::strings absl::str_format)
-if(VOXELD_COMMON_HEADERS)
-  voxeld_precompiled_headers(voxeld_common_headers
-    HEADERS ${VOXELD_COMMON_HEADER_FILES} LINK ${VOXELD_COMMON_HEADER_LIBRARIES})
-  voxeld_precompiled_headers(voxeld_common_headers_plain PLAIN
-    HEADERS ${VOXELD_COMMON_HEADER_FILES} LINK ${VOXELD_COMMON_HEADER_LIBRARIES})
 endif()
 
 # voxeld_compile_quickly(): sources of this directory and those below take little time when they run. They are optimised less
@@ -223,9 +213,7 @@ function(voxeld_library name)
     target_compile_options(voxeld_${name} PRIVATE -fno-sanitize=thread)
   elseif(VOXELD_COMMON_HEADERS AND NOT (ARG_KERNELS AND VOXELD_HARDENING AND NOT VOXELD_SANITIZE))  # whose flags are others
     target_compile_options(voxeld_${name} PRIVATE -pthread)
-    if(VOXELD_PLAIN AND TARGET voxeld_wide_headers)
-      target_precompile_headers(voxeld_${name} REUSE_FROM voxeld_wide_headers)
-    elseif(VOXELD_PLAIN)
+    if(VOXELD_PLAIN)
       target_precompile_headers(voxeld_${name} REUSE_FROM voxeld_common_headers_plain)
     else()
       target_precompile_headers(voxeld_${name} REUSE_FROM voxeld_common_headers)
