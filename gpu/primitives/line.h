@@ -16,8 +16,8 @@
 // the line crosses; EUCLIDEAN: steps of one voxel along the line.
 #pragma once
 
-#include "gpu/delta.h"
 #include "gpu/primitives/fixed.h"
+#include "gpu/records.h"
 
 namespace voxeld::gpu {
 

@@ -17,10 +17,10 @@
 // the triangle. A shift by whole voxels shifts the result.
 #pragma once
 
-#include "gpu/delta.h"
 #include "gpu/primitives/fixed.h"
 #include "gpu/primitives/line.h"
 #include "gpu/primitives/texture.h"
+#include "gpu/records.h"
 #include "gpu/word.h"
 
 namespace voxeld::gpu {
