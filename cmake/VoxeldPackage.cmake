@@ -1,6 +1,8 @@
-# What `cmake --install` installs, and the Debian package (cpack --preset release) that is made of it. The paths in
-# packaging/ are those of the prefix /usr.
+# What `cmake --install` installs, and the Debian packages that are made of it (tools/package, or cpack --preset release): a package a
+# component. `service` is the package voxeld, `cuda` is voxeld-cuda, and `client` (client/cpp/CMakeLists.txt) is libvoxeld-dev. The paths
+# in packaging/ are those of the prefix /usr.
 include(GNUInstallDirs)
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME service)
 set(VOXELD_MAINTAINER "voxeld maintainers <maintainers@voxeld.invalid>" CACHE STRING "Maintainer of the package")
 
 set(doc ${CMAKE_INSTALL_DATADIR}/doc/voxeld)
@@ -12,6 +14,12 @@ if(TARGET voxeld-ros)
 endif()
 # Where voxeld looks for it: gpu/worker/worker_engine.h.
 install(TARGETS voxeld-engine RUNTIME DESTINATION libexec/voxeld)
+if(TARGET voxeld-engine-cuda)
+  install(TARGETS voxeld-engine-cuda RUNTIME DESTINATION libexec/voxeld COMPONENT cuda)
+  install(FILES ${packaging}/cuda/voxeld-engine.conf DESTINATION lib/systemd/system/voxeld-engine@.service.d RENAME 50-voxeld-cuda.conf
+          COMPONENT cuda)
+  install(FILES ${CMAKE_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/voxeld-cuda RENAME copyright COMPONENT cuda)
+endif()
 install(FILES ${packaging}/voxeld.service ${packaging}/voxeld.socket ${packaging}/voxeld-playlist.service
               ${packaging}/voxeld-engine.socket ${packaging}/voxeld-engine@.service DESTINATION lib/systemd/system)
 install(FILES ${packaging}/user/voxeld.service ${packaging}/user/voxeld.socket DESTINATION lib/systemd/user)
@@ -47,8 +55,10 @@ if(VOXELD_DPKG_QUERY AND CMAKE_GENERATOR STREQUAL "Ninja")
     get_target_property(page voxeld_page PAGE_FOLDER)
     list(APPEND arguments --modules ${VOXELD_NODE_MODULES} --bundled ${page}/modules.json)
   endif()
-  if(VOXELD_HAVE_CUDA)
+  set(cuda_program "")
+  if(TARGET voxeld-engine-cuda)
     list(APPEND arguments --cuda ${CUDAToolkit_VERSION})
+    set(cuda_program --program $<TARGET_FILE:voxeld-engine-cuda>)
   endif()
   foreach(tool ${CMAKE_CXX_COMPILER} ${VOXELD_MOLD} ${CMAKE_COMMAND} ${CMAKE_MAKE_PROGRAM} ${VOXELD_NODE} ${VOXELD_GRPC_PYTHON_PLUGIN})
     list(APPEND arguments --tool ${tool})
@@ -57,7 +67,7 @@ if(VOXELD_DPKG_QUERY AND CMAKE_GENERATOR STREQUAL "Ninja")
   add_custom_command(
     OUTPUT ${sbom}/voxeld.spdx.json ${sbom}/NOTICES
     COMMAND ${VOXELD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tools/sbom/sbom.py --build ${CMAKE_BINARY_DIR} --version ${PROJECT_VERSION}
-            --epoch ${VOXELD_EPOCH} --program $<TARGET_FILE:voxeld> --program $<TARGET_FILE:voxelctl> --program $<TARGET_FILE:voxeld-engine>
+            --epoch ${VOXELD_EPOCH} --program $<TARGET_FILE:voxeld> --program $<TARGET_FILE:voxelctl> --program $<TARGET_FILE:voxeld-engine> ${cuda_program}
             --notice ${packaging}/notices/colormaps.txt --out ${sbom}/voxeld.spdx.json --out-notices ${sbom}/NOTICES ${arguments}
     DEPENDS voxeld voxelctl voxeld-engine ${scripts} ${packaging}/notices/colormaps.txt
     COMMENT "Listing what voxeld is made of"
@@ -69,26 +79,57 @@ else()
   message(STATUS "voxeld is built without a list of what it is made of: that takes dpkg and Ninja")
 endif()
 
+# All that tools/package packs: programs, manual, list of contents, client libraries. Tests and benchmarks are no part of it.
+add_custom_target(packaged DEPENDS voxeld voxelctl voxeld-engine voxeld-emulator voxeld_client_shared voxeld_manual python_client)
+foreach(part voxeld-engine-cuda voxeld-ros sbom)
+  if(TARGET ${part})
+    add_dependencies(packaged ${part})
+  endif()
+endforeach()
+
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME voxeld)
 set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
-set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "driver service for volumetric displays")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE
                                                 WORLD_READ WORLD_EXECUTE)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_COMPONENTS_GROUPING IGNORE)
+set(CPACK_COMPONENTS_ALL service client)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_MAINTAINER "${VOXELD_MAINTAINER}")
-set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_PACKAGE_PRIORITY optional)
-set(CPACK_DEBIAN_PACKAGE_DESCRIPTION
-    "Networked clients stream 3D primitives in over gRPC; voxeld assembles the voxel\nscene, slices it, and pushes whole volumes of light to the display. With the\nclient voxelctl, udev rules and a systemd service.")
-set(CPACK_DEBIAN_PACKAGE_DEPENDS "passwd, procps")  # for postinst and reload
-set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "fonts-dejavu-core, hershey-fonts-data")  # text
-set(CPACK_DEBIAN_PACKAGE_SUGGESTS "ffmpeg")  # voxelctl render to MP4
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
-set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${packaging}/deb/postinst ${packaging}/deb/prerm ${packaging}/deb/postrm)
+
+set(CPACK_DEBIAN_SERVICE_PACKAGE_NAME voxeld)
+set(CPACK_DEBIAN_SERVICE_PACKAGE_SECTION graphics)
+set(CPACK_DEBIAN_SERVICE_DESCRIPTION
+    "driver service for volumetric displays\nNetworked clients stream 3D primitives in over gRPC; voxeld assembles the voxel\nscene, slices it, and pushes whole volumes of light to the display. With the\nclient voxelctl, udev rules and a systemd service.")
+set(CPACK_DEBIAN_SERVICE_PACKAGE_DEPENDS "passwd, procps")  # for postinst and reload
+set(CPACK_DEBIAN_SERVICE_PACKAGE_RECOMMENDS "fonts-dejavu-core, hershey-fonts-data")  # text
+set(CPACK_DEBIAN_SERVICE_PACKAGE_SUGGESTS "voxeld-cuda, ffmpeg")  # voxelctl render to MP4
+set(CPACK_DEBIAN_SERVICE_PACKAGE_CONTROL_EXTRA ${packaging}/deb/postinst ${packaging}/deb/prerm ${packaging}/deb/postrm)
+
+if(TARGET voxeld-engine-cuda)
+  list(APPEND CPACK_COMPONENTS_ALL cuda)
+  set(CPACK_DEBIAN_CUDA_PACKAGE_NAME voxeld-cuda)
+  set(CPACK_DEBIAN_CUDA_PACKAGE_SECTION graphics)
+  set(CPACK_DEBIAN_CUDA_DESCRIPTION
+      "CUDA engine of voxeld, for NVIDIA GPUs\nThe daemon starts it where a GPU is found, in place of the engine on the CPU, and\ngoes back to that one when this package is removed. It needs the GPU's driver.")
+  # Both programs speak one version of the protocol between them.
+  set(CPACK_DEBIAN_CUDA_PACKAGE_DEPENDS "voxeld (= ${PROJECT_VERSION})")
+  set(CPACK_DEBIAN_CUDA_PACKAGE_SUGGESTS "libcuda1, libnccl2")  # loaded if they are there: the driver, and several GPUs for one display
+  set(CPACK_DEBIAN_CUDA_PACKAGE_CONTROL_EXTRA ${packaging}/cuda/postinst ${packaging}/cuda/postrm)
+endif()
+
+set(CPACK_DEBIAN_CLIENT_PACKAGE_NAME libvoxeld-dev)
+set(CPACK_DEBIAN_CLIENT_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_CLIENT_DESCRIPTION
+    "development files of voxeld, the driver service for volumetric displays\nThe C++ client library with its headers and CMake files, and the protocol as\n.proto files, for clients in other languages.")
+set(CPACK_DEBIAN_CLIENT_PACKAGE_DEPENDS "libabsl-dev")  # its headers include Abseil's
+set(CPACK_DEBIAN_CLIENT_PACKAGE_SUGGESTS "voxeld")
 # Archives carry the commit's time (cmake/VoxeldHardening.cmake), whenever they are made.
 file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/PackProject.cmake @ONLY CONTENT [[
 if(NOT DEFINED ENV{SOURCE_DATE_EPOCH})

@@ -122,34 +122,37 @@ function(voxeld_test_options name)
   endif()
 endfunction()
 
-# Under a sanitizer and in haste, where no header is compiled alone anyway, what most files include is compiled once for all of them:
-# for those that are optimised, and for the others (VOXELD_PLAIN).
+# Headers that most sources include are compiled once for all of them (VOXELD_PRECOMPILE): with the options of sources that are
+# optimised, and with those of sources below voxeld_compile_quickly(). The wire messages and gRPC are not among them: loading what GCC makes
+# of those costs as much as compiling them.
 set(VOXELD_COMMON_HEADERS OFF)
-if(VOXELD_INSTRUMENTED OR VOXELD_HASTY)
+if(VOXELD_PRECOMPILE OR VOXELD_INSTRUMENTED OR VOXELD_HASTY)
   set(VOXELD_COMMON_HEADERS ON)
   foreach(headers voxeld_common_headers voxeld_common_headers_plain)
     file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/headers/${headers}.cc CONTENT "int ${headers};\n" @ONLY)
     add_library(${headers} OBJECT EXCLUDE_FROM_ALL ${CMAKE_BINARY_DIR}/headers/${headers}.cc)
     target_precompile_headers(${headers} PRIVATE
       <absl/container/flat_hash_map.h> <absl/container/flat_hash_set.h> <absl/status/statusor.h> <absl/strings/str_cat.h>
-      <algorithm> <array> <chrono> <cmath> <functional> <map> <memory> <optional> <span> <string> <thread> <utility> <variant>
-      <vector>)
-    target_link_libraries(${headers} PRIVATE voxeld_options voxeld_warnings absl::flat_hash_map absl::statusor absl::strings)
+      <absl/strings/str_format.h> <absl/strings/str_join.h> <absl/strings/str_split.h>
+      <algorithm> <array> <atomic> <chrono> <cmath> <condition_variable> <deque> <functional> <map> <memory> <mutex> <optional> <span>
+      <string> <thread> <utility> <variant> <vector>)
+    target_link_libraries(${headers} PRIVATE voxeld_options voxeld_warnings absl::flat_hash_map absl::flat_hash_set absl::statusor
+                                             absl::strings absl::str_format)
     target_compile_options(${headers} PRIVATE -pthread)
   endforeach()
   if(VOXELD_INSTRUMENTED)
     target_compile_options(voxeld_common_headers_plain PRIVATE -O0)
-  else()
+  elseif(VOXELD_HASTY)
     target_compile_options(voxeld_common_headers_plain PRIVATE -O1)
   endif()
 endif()
 
-# voxeld_compile_quickly(): this directory and those below, from here on, have nothing that takes time when it runs: optimised less in
-# haste, and not at all under a sanitizer, where optimising takes longest.
+# voxeld_compile_quickly(): sources of this directory and those below take little time when they run. They are optimised less
+# where VOXELD_HASTY says so, and not at all under a sanitizer, where optimising takes longest.
 set(VOXELD_PLAIN OFF)
 macro(voxeld_compile_quickly)
   if(VOXELD_FUZZ)
-    # All of it runs as often as can be.
+    # Fuzz targets run all of it as often as possible.
   elseif(VOXELD_INSTRUMENTED)
     set(VOXELD_PLAIN ON)
     add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-O0>)
@@ -172,10 +175,11 @@ function(voxeld_apart)
   set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
 
-# voxeld_library(NAME [SINGLE_THREADED] [KERNELS] SOURCES … HEADERS … LINK …): a static library `voxeld_NAME`. SINGLE_THREADED: pure
-# functions and objects that no two threads share (voxeld_unwatched). KERNELS: it has the inner loops (VoxeldHardening.cmake). Each of HEADERS is also compiled with
-# nothing before it (but under a sanitizer or in haste, where tools/check looks at those that changed), so none leans on what its includer happened to include: by its own .cc, which
-# includes it first (tools/check_includes.py), or alone.
+# voxeld_library(NAME [SINGLE_THREADED] [KERNELS] SOURCES … HEADERS … LINK …): a static library `voxeld_NAME`.
+#   SINGLE_THREADED  pure functions, and objects that no two threads share (voxeld_unwatched)
+#   KERNELS          it has the inner loops (VoxeldHardening.cmake)
+# With VOXELD_HEADERS_ALONE, which tools/check sets, each of HEADERS that no source of the same name includes first is also compiled
+# with nothing before it, so that none depends on what its includer included.
 function(voxeld_library name)
   cmake_parse_arguments(ARG "SINGLE_THREADED;KERNELS" "" "SOURCES;HEADERS;LINK" ${ARGN})
   set(unwatched OFF)
@@ -183,7 +187,7 @@ function(voxeld_library name)
     set(unwatched ON)
   endif()
   set(alone "")
-  if(VOXELD_INSTRUMENTED OR VOXELD_HASTY)
+  if(NOT VOXELD_HEADERS_ALONE)
     set(ARG_HEADERS "")
   endif()
   foreach(header ${ARG_HEADERS})
@@ -245,16 +249,24 @@ function(voxeld_test_objects name)
   endif()
 endfunction()
 
-# voxeld_test(NAME [SINGLE_THREADED] [OPTIMISED] [HEAVY] LABELS … SOURCES … LINK … LONG … ONE_THREAD … SHARDS n TIMEOUT s): an executable `NAME` in
-# bin/tests. Each of its cases is a ctest test, or with VOXELD_WHOLE_TESTS all of them together are one, or SHARDS (1), which
-# may run at once. HEAVY: its own code computes much, and is optimised under a sanitizer as well. LABELS: host (default), gpu (needs one; named gpu.…), hil, e2e. What is run where:
+# voxeld_deep(TEST …): these tests run in the deep tier (tools/test --deep), not in the default one.
+function(voxeld_deep)
+  foreach(test ${ARGN})
+    set_property(TEST ${test} APPEND PROPERTY LABELS deep)
+  endforeach()
+endfunction()
+
+# voxeld_test(NAME [SINGLE_THREADED] [HEAVY] [DEEP] LABELS … SOURCES … LINK … LONG … ONE_THREAD … SHARDS n TIMEOUT s): an executable
+# `NAME` in bin/tests. Each of its cases is a ctest test; with VOXELD_WHOLE_TESTS all of them together are one, or SHARDS (1), which
+# may run at once.
+#   LABELS           host (default), gpu (needs one; named gpu.…), hil, e2e (not where VOXELD_E2E_TESTS is off)
+#   HEAVY            its own code computes much, and is optimised under a sanitizer as well
+#   DEEP             all of it runs in the deep tier
+#   LONG             patterns of cases that run in the deep tier (as the test NAME.long), and not where VOXELD_LONG_TESTS is off
 #   SINGLE_THREADED  neither it nor what it tests has threads: left out of ThreadSanitizer's build
 #   ONE_THREAD       patterns of cases that have no threads: left out under ThreadSanitizer
-#   LONG             patterns of cases that are left out where VOXELD_LONG_TESTS is off
-#   e2e              not where VOXELD_E2E_TESTS is off
-#   OPTIMISED        also where VOXELD_UNIT_TESTS is off; of the others with the label host their LONG cases alone run there
 function(voxeld_test name)
-  cmake_parse_arguments(ARG "SINGLE_THREADED;OPTIMISED;HEAVY" "TIMEOUT;SHARDS" "SOURCES;LINK;LABELS;LONG;ONE_THREAD" ${ARGN})
+  cmake_parse_arguments(ARG "SINGLE_THREADED;HEAVY;DEEP" "TIMEOUT;SHARDS" "SOURCES;LINK;LABELS;LONG;ONE_THREAD" ${ARGN})
   if(ARG_SINGLE_THREADED AND VOXELD_SANITIZE STREQUAL "thread")
     return()
   endif()
@@ -274,64 +286,72 @@ function(voxeld_test name)
     target_precompile_headers(${name} REUSE_FROM voxeld_test_headers)
   endif()
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin/tests)
+  if(NOT VOXELD_E2E_TESTS AND "e2e" IN_LIST ARG_LABELS)
+    set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
+    return()
+  endif()
   set(prefix "${name}.")
   if("gpu" IN_LIST ARG_LABELS)
     set(prefix "gpu.${name}.")
   endif()
-  set(filter "*")
-  list(JOIN ARG_LONG ":" long)
-  set(left_out OFF)
-  set(without "")
-  if(NOT VOXELD_LONG_TESTS)
-    list(APPEND without ${ARG_LONG})
-  endif()
+  set(one_thread "")
   if(VOXELD_SANITIZE STREQUAL "thread")
-    list(APPEND without ${ARG_ONE_THREAD})
-  endif()
-  if(without)
-    list(JOIN without ":" without)
-    set(filter "-${without}")
-  endif()
-  if(NOT VOXELD_UNIT_TESTS AND NOT ARG_OPTIMISED AND "host" IN_LIST ARG_LABELS)
-    if(ARG_LONG)
-      set(filter ${long})
-    else()
-      set(left_out ON)
-    endif()
-  endif()
-  if(NOT VOXELD_E2E_TESTS AND "e2e" IN_LIST ARG_LABELS)
-    set(left_out ON)
-  endif()
-  if(left_out)
-    set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
-    return()
+    set(one_thread ${ARG_ONE_THREAD})
   endif()
   if(VOXELD_WHOLE_TESTS)
     string(REGEX REPLACE "\\.$" "" whole ${prefix})
-    math(EXPR timeout "5 * ${ARG_TIMEOUT}")
-    math(EXPR last "${ARG_SHARDS} - 1")
-    foreach(shard RANGE ${last})
-      set(test ${whole})
-      if(last GREATER 0)
-        set(test ${whole}.${shard})
-      endif()
-      add_test(NAME ${test} COMMAND ${name} --gtest_filter=${filter} WORKING_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR})
-      set_tests_properties(${test} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${timeout}
-                           ENVIRONMENT "GTEST_TOTAL_SHARDS=${ARG_SHARDS};GTEST_SHARD_INDEX=${shard}")
-    endforeach()
+    voxeld_whole_test(${whole} ${name} "${ARG_LABELS}" "*" "${ARG_LONG};${one_thread}" ${ARG_TIMEOUT} ${ARG_SHARDS} ${ARG_DEEP})
+    if(ARG_LONG AND VOXELD_LONG_TESTS)
+      list(JOIN ARG_LONG ":" long)
+      voxeld_whole_test(${whole}.long ${name} "${ARG_LABELS}" "${long}" "${one_thread}" ${ARG_TIMEOUT} ${ARG_SHARDS} ON)
+    endif()
+    # The default tier's build does without programs that only the deep tier runs.
+    if(ARG_DEEP AND VOXELD_HASTY)
+      set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
+      add_dependencies(deep_tests ${name})
+    endif()
     return()
   endif()
+  set(without ${one_thread})
+  if(NOT VOXELD_LONG_TESTS)
+    list(APPEND without ${ARG_LONG})
+  endif()
   set(chosen "")
-  if(NOT filter STREQUAL "*")
-    set(chosen TEST_FILTER ${filter})
+  if(without)
+    list(JOIN without ":" without)
+    set(chosen TEST_FILTER "-${without}")
   endif()
   gtest_discover_tests(${name} ${chosen} TEST_PREFIX "${prefix}" DISCOVERY_TIMEOUT 60
                        PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT})
 endfunction()
 
+# Registers the cases of `program` that match `filter`, without those that match `without`, as one test for each shard.
+function(voxeld_whole_test test program labels filter without timeout shards deep)
+  list(JOIN without ":" without)
+  string(REGEX REPLACE "^:|:$" "" without "${without}")
+  if(without)
+    string(APPEND filter ":-${without}")
+    string(REGEX REPLACE "^\\*:-" "-" filter "${filter}")
+  endif()
+  if(deep)
+    list(APPEND labels deep)
+  endif()
+  math(EXPR timeout "5 * ${timeout}")
+  math(EXPR last "${shards} - 1")
+  foreach(shard RANGE ${last})
+    set(each ${test})
+    if(last GREATER 0)
+      set(each ${test}.${shard})
+    endif()
+    add_test(NAME ${each} COMMAND ${program} --gtest_filter=${filter} WORKING_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR})
+    set_tests_properties(${each} PROPERTIES LABELS "${labels}" TIMEOUT ${timeout}
+                         ENVIRONMENT "GTEST_TOTAL_SHARDS=${shards};GTEST_SHARD_INDEX=${shard}")
+  endforeach()
+endfunction()
+
 # voxeld_fuzz(NAME SOURCES … LINK …): a fuzz target `NAME_fuzz` in bin/fuzz, of NAME_fuzz.cc and SOURCES. With VOXELD_FUZZ libFuzzer
-# drives it (tools/fuzz runs it); elsewhere it is a test, fuzz.NAME, which replays the corpus in the tree, and where edges are counted
-# (VOXELD_FUZZ_TESTS) has libFuzzer look for more for VOXELD_FUZZ_SECONDS.
+# drives it (tools/fuzz runs it); elsewhere it is a test, fuzz.NAME, which replays its corpus as unpacked into fuzz/corpus/NAME of the build
+# (target fuzz_corpora), and where edges are counted (VOXELD_FUZZ_TESTS) has libFuzzer look for more for VOXELD_FUZZ_SECONDS.
 function(voxeld_fuzz name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
   set(target ${name}_fuzz)
@@ -339,6 +359,7 @@ function(voxeld_fuzz name)
   target_link_libraries(${target} PRIVATE ${ARG_LINK} voxeld_options voxeld_warnings absl::status absl::statusor absl::strings)
   target_compile_options(${target} PRIVATE -pthread)
   set_target_properties(${target} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin/fuzz)
+  add_dependencies(${target} fuzz_corpora)
   if(VOXELD_FUZZ)
     target_link_options(${target} PRIVATE -fsanitize=fuzzer)
     add_dependencies(fuzz_targets ${target})
@@ -354,8 +375,8 @@ function(voxeld_fuzz name)
   if(VOXELD_INSTRUMENTED OR VOXELD_HASTY)
     target_compile_options(${target} PRIVATE -O0)
   endif()
-  if(VOXELD_UNIT_TESTS)
-    add_test(NAME fuzz.${name} COMMAND ${target} ${CMAKE_SOURCE_DIR}/tests/fuzz/corpus/${name})
+  if(NOT VOXELD_HASTY)
+    add_test(NAME fuzz.${name} COMMAND ${target} ${CMAKE_BINARY_DIR}/fuzz/corpus/${name})
     set_tests_properties(fuzz.${name} PROPERTIES LABELS host TIMEOUT 300)
   else()
     set_target_properties(${target} PROPERTIES EXCLUDE_FROM_ALL ON)

@@ -162,7 +162,9 @@ void Welcome(Core& core, const http::Server* http, const viewer::Viewer& viewer,
     const std::string page = viewer::Viewer::PageAddress(http->address());
     const std::string control = viewer.ControlAddress(http->address());
     if (!viewer::Viewer::HasPage()) {
-      std::printf("see:    no page: built without it; tools/setup has what makes it\n");
+      std::printf(
+          "see:    no page: this voxeld was built without it; run tools/setup, configure with "
+          "-DVOXELD_PAGE=ON and build again\n");
     } else if (tells_control && !control.empty()) {
       std::printf("see:    %s   (to look; with control, once: %s)\n", page.c_str(),
                   control.c_str());

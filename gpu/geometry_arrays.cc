@@ -9,7 +9,7 @@
 namespace voxeld::gpu {
 namespace {
 
-constexpr size_t kAlign = 16;
+constexpr size_t kArrayAlign = 16;
 
 }  // namespace
 
@@ -25,8 +25,8 @@ absl::StatusOr<GeometryArrays> GeometryArrays::Allocate(const GeometryRecord& re
     at = fresh->bytes.data();
     arrays.block_ = std::move(fresh->block);
   } else {
-    at = static_cast<std::byte*>(
-        std::aligned_alloc(kAlign, (layout.size + kAlign - 1) / kAlign * kAlign));
+    at = static_cast<std::byte*>(std::aligned_alloc(
+        kArrayAlign, (layout.size + kArrayAlign - 1) / kArrayAlign * kArrayAlign));
     if (at == nullptr) {
       return absl::ResourceExhaustedError(
           absl::StrCat("the system has no ", layout.size, " bytes of memory left"));

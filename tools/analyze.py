@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Runs clang-16's analyses over translation units, as many at once as there are cores.
 
-usage: analyze.py thread-safety|tidy BUILD_DIR FILE...
-Exit 1 if any finding; each is printed once.
+usage: analyze.py syntax|thread-safety|tidy BUILD_DIR FILE...
+Exit 1 if any finding; each is printed once. `syntax` passes over files that the build does not compile.
 """
 
 import concurrent.futures
@@ -28,7 +28,8 @@ def analysis_command(mode, build_dir, path, entry):
     cut = arguments.index("-o")
     del arguments[cut : cut + 2]
     arguments.remove("-c")
-    return arguments + ["-fsyntax-only", "-w", "-Wthread-safety", "-Werror=thread-safety"]
+    warnings = ["-Wthread-safety", "-Werror=thread-safety"] if mode == "thread-safety" else []
+    return arguments + ["-fsyntax-only", "-w", *warnings]
 
 
 def run(mode, build_dir, path, commands):
@@ -37,7 +38,7 @@ def run(mode, build_dir, path, commands):
         return f"{path}: not part of the build\n" if mode == "tidy" and not optional(path) else ""
     done = subprocess.run(
         analysis_command(mode, build_dir, path, entry),
-        cwd=entry["directory"] if mode == "thread-safety" else None,
+        cwd=None if mode == "tidy" else entry["directory"],
         capture_output=True,
         text=True,
         check=False,
@@ -51,7 +52,7 @@ def optional(path):
 
 
 def main():
-    if len(sys.argv) < 3 or sys.argv[1] not in ("thread-safety", "tidy"):
+    if len(sys.argv) < 3 or sys.argv[1] not in ("syntax", "thread-safety", "tidy"):
         print(__doc__, file=sys.stderr)
         return 2
     mode, build_dir, paths = sys.argv[1], sys.argv[2], sys.argv[3:]

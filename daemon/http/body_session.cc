@@ -5,9 +5,7 @@
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <boost/asio/write.hpp>
 #include <boost/beast/http/read.hpp>
-#include <boost/beast/http/write.hpp>
 #include <chrono>
 #include <optional>
 #include <string>
@@ -55,11 +53,10 @@ class TakenBody final : public BodySession, public std::enable_shared_from_this<
       return ReadPiece();
     }
     stream_.expires_after(std::chrono::nanoseconds(options_.idle_limit_ns));
-    asio::async_write(stream_, asio::buffer(kContinue),
-                      [self = shared_from_this()](error_code error, size_t) {
-                        if (error) return self->Close();
-                        self->ReadPiece();
-                      });
+    WriteAll(stream_, kContinue, {}, [self = shared_from_this()](error_code error) {
+      if (error) return self->Close();
+      self->ReadPiece();
+    });
   }
 
   void Close() override {
@@ -159,12 +156,13 @@ class TakenBody final : public BodySession, public std::enable_shared_from_this<
     receiver_ = nullptr;
     response_.emplace(ToMessage(std::move(answer), true, false));
     stream_.expires_after(std::chrono::nanoseconds(options_.idle_limit_ns));
-    wire::async_write(stream_, *response_, [self = shared_from_this()](error_code error, size_t) {
-      if (error || self->parser_->is_done()) return self->Close();
-      self->stream_.socket().shutdown(ConnectionStream::socket_type::shutdown_send, error);
-      self->stream_.expires_after(std::chrono::nanoseconds(self->options_.idle_limit_ns));
-      self->Linger();
-    });
+    WriteAll(stream_, response_->head, response_->body,
+             [self = shared_from_this()](error_code error) {
+               if (error || self->parser_->is_done()) return self->Close();
+               self->stream_.socket().shutdown(ConnectionStream::socket_type::shutdown_send, error);
+               self->stream_.expires_after(std::chrono::nanoseconds(self->options_.idle_limit_ns));
+               self->Linger();
+             });
   }
 
   // Closing while something comes in would have the other end's system throw the answer away.

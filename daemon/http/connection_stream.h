@@ -6,6 +6,8 @@
 #include <boost/beast/core/basic_stream.hpp>
 #include <boost/beast/http/message.hpp>
 #include <boost/beast/http/string_body.hpp>
+#include <functional>
+#include <string_view>
 
 namespace voxeld::daemon::http {
 
@@ -13,5 +15,10 @@ using Protocol = boost::asio::generic::stream_protocol;
 using ConnectionStream =
     boost::beast::basic_stream<Protocol, boost::asio::io_context::executor_type>;
 using RequestMessage = boost::beast::http::request<boost::beast::http::string_body>;
+
+// Writes `head` and then `body`, and calls `done` with what came of it. Both must live until then. Every write of a connection goes
+// through here, since each completion handler that asio composes anew costs seconds of compiling.
+void WriteAll(ConnectionStream& stream, std::string_view head, std::string_view body,
+              std::function<void(boost::system::error_code)> done);
 
 }  // namespace voxeld::daemon::http

@@ -186,16 +186,11 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void Write(Response answer, bool close) {
     response_.emplace(ToMessage(std::move(answer), close, head_));
     stream_.expires_after(std::chrono::nanoseconds(options_.idle_limit_ns));
-    serializer_.emplace(*response_);
-    const auto written = [self = shared_from_this(), close](error_code error, size_t) {
-      if (error || close) return self->Close();
-      self->Read();
-    };
-    if (head_) {
-      wire::async_write_header(stream_, *serializer_, written);
-    } else {
-      wire::async_write(stream_, *serializer_, written);
-    }
+    WriteAll(stream_, response_->head, response_->body,
+             [self = shared_from_this(), close](error_code error) {
+               if (error || close) return self->Close();
+               self->Read();
+             });
   }
 
   const std::shared_ptr<asio::io_context> io_;
@@ -207,7 +202,6 @@ class Connection : public std::enable_shared_from_this<Connection> {
   beast::flat_buffer buffer_;
   std::unique_ptr<Parser> parser_;
   std::optional<ResponseMessage> response_;
-  std::optional<wire::response_serializer<wire::string_body>> serializer_;
   bool head_ = false;
   uint64_t number_ = 0;  // of the request that waits for its answer
 };

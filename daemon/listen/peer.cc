@@ -14,7 +14,7 @@
 namespace voxeld::daemon::listen {
 namespace {
 
-constexpr size_t kPrefixBytes = 8;  // what one subscriber usually has: a /64
+constexpr size_t kSubscriberPrefixBytes = 8;  // what one subscriber usually has: a /64
 constexpr size_t kMappedBytes = 12;
 
 std::string Number(int family, const void* bytes) {
@@ -33,7 +33,8 @@ Peer Ipv6(const sockaddr_in6& address) {
     return Ipv4(bytes + kMappedBytes, address.sin6_port);
   }
   in6_addr prefix = address.sin6_addr;
-  std::fill(prefix.s6_addr + kPrefixBytes, prefix.s6_addr + sizeof(prefix.s6_addr), uint8_t{0});
+  std::fill(prefix.s6_addr + kSubscriberPrefixBytes, prefix.s6_addr + sizeof(prefix.s6_addr),
+            uint8_t{0});
   const bool loopback = IN6_IS_ADDR_LOOPBACK(&address.sin6_addr);
   return {absl::StrCat("ipv6:[", Number(AF_INET6, bytes), "]:", ntohs(address.sin6_port)),
           loopback ? "::1" : absl::StrCat(Number(AF_INET6, &prefix), "/64"), false};

@@ -23,22 +23,22 @@ namespace {
 using std::chrono::steady_clock;
 
 // HTTP/2 (RFC 9113): a frame's head is 24 bits of length, type, flags, 31 bits of stream.
-constexpr size_t kHeadBytes = 9;
-constexpr char kData = 0, kHeaders = 1, kSettings = 4, kGoAway = 7;
-constexpr char kEndStream = 1, kEndHeaders = 4;
-constexpr std::string_view kPreface = "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
+constexpr size_t kFrameHeadBytes = 9;
+constexpr char kDataFrame = 0, kHeadersFrame = 1, kSettingsFrame = 4, kGoAwayFrame = 7;
+constexpr char kEndStreamFlag = 1, kEndHeadersFlag = 4;
+constexpr std::string_view kClientPreface = "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 
 void AddFrame(char type, char flags, char stream, std::string_view payload, std::string* out) {
   const size_t size = payload.size();
-  const char head[kHeadBytes] = {static_cast<char>(size >> 16),
-                                 static_cast<char>(size >> 8),
-                                 static_cast<char>(size),
-                                 type,
-                                 flags,
-                                 0,
-                                 0,
-                                 0,
-                                 stream};
+  const char head[kFrameHeadBytes] = {static_cast<char>(size >> 16),
+                                      static_cast<char>(size >> 8),
+                                      static_cast<char>(size),
+                                      type,
+                                      flags,
+                                      0,
+                                      0,
+                                      0,
+                                      stream};
   out->append(head, sizeof(head));
   out->append(payload);
 }
@@ -61,10 +61,10 @@ std::string HealthCheck() {
   AddField(":authority", "voxeld", &fields);
   AddField("content-type", "application/grpc", &fields);
   AddField("te", "trailers", &fields);
-  std::string out(kPreface);
-  AddFrame(kSettings, 0, 0, "", &out);
-  AddFrame(kHeaders, kEndHeaders, 1, fields, &out);
-  AddFrame(kData, kEndStream, 1, std::string_view("\0\0\0\0\0", 5), &out);
+  std::string out(kClientPreface);
+  AddFrame(kSettingsFrame, 0, 0, "", &out);
+  AddFrame(kHeadersFrame, kEndHeadersFlag, 1, fields, &out);
+  AddFrame(kDataFrame, kEndStreamFlag, 1, std::string_view("\0\0\0\0\0", 5), &out);
   return out;
 }
 
@@ -120,15 +120,15 @@ class Attempt {
     if (sent != static_cast<ssize_t>(request.size())) return absl::ErrnoToStatus(errno, "send");
     std::string got;
     for (;;) {
-      while (got.size() >= kHeadBytes) {
+      while (got.size() >= kFrameHeadBytes) {
         const auto byte = [&](size_t i) {
           return static_cast<size_t>(static_cast<uint8_t>(got[i]));
         };
         const size_t size = byte(0) << 16 | byte(1) << 8 | byte(2);
-        if (got[3] == kHeaders && got[8] == 1) return absl::OkStatus();
-        if (got[3] == kGoAway) return absl::UnavailableError("it was sent away");
-        if (got.size() < kHeadBytes + size) break;
-        got.erase(0, kHeadBytes + size);
+        if (got[3] == kHeadersFrame && got[8] == 1) return absl::OkStatus();
+        if (got[3] == kGoAwayFrame) return absl::UnavailableError("it was sent away");
+        if (got.size() < kFrameHeadBytes + size) break;
+        got.erase(0, kFrameHeadBytes + size);
       }
       if (absl::Status status = Await(POLLIN); !status.ok()) return status;
       char buffer[4096];

@@ -17,8 +17,8 @@
 namespace voxeld::daemon::listen {
 namespace {
 
-constexpr ConnectionId kWake = 0;  // epoll's word; no connection has it
-constexpr int kEvents = 64;
+constexpr ConnectionId kWakeConnection = 0;  // epoll's word; no connection has it
+constexpr int kWatcherEvents = 64;
 
 bool Control(int operation, int epoll, int descriptor, uint32_t events, ConnectionId word) {
   epoll_event event = {};
@@ -74,7 +74,7 @@ class WatchedWire final : public SocketWire {
 
   const int epoll_;
   const std::shared_ptr<Unwatched> unwatched_;
-  std::atomic<ConnectionId> word_ = kWake;
+  std::atomic<ConnectionId> word_ = kWakeConnection;
 };
 
 }  // namespace
@@ -98,7 +98,7 @@ class Watcher::Impl {
     Descriptor& wake = unwatched_->wake;
     wake.Reset(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
     if (!epoll_.ok() || !wake.ok() ||
-        !Control(EPOLL_CTL_ADD, epoll_.get(), wake.get(), EPOLLIN, kWake)) {
+        !Control(EPOLL_CTL_ADD, epoll_.get(), wake.get(), EPOLLIN, kWakeConnection)) {
       return absl::ErrnoToStatus(errno, "watching connections");
     }
     thread_ = std::thread([this] { Run(); });
@@ -137,17 +137,17 @@ class Watcher::Impl {
 
   void Run() {
     sync::TimeNs look = sync::kNever;
-    std::array<epoll_event, kEvents> events;
+    std::array<epoll_event, kWatcherEvents> events;
     for (;;) {
       {
         sync::MutexLock lock(mutex_);
         if (stop_) return;
       }
-      const int n = epoll_wait(epoll_.get(), events.data(), kEvents, Timeout(look));
+      const int n = epoll_wait(epoll_.get(), events.data(), kWatcherEvents, Timeout(look));
       bool woken = false;
       for (int i = 0; i < n; ++i) {
         const epoll_event& event = events[static_cast<size_t>(i)];
-        if (event.data.u64 == kWake) {
+        if (event.data.u64 == kWakeConnection) {
           woken = true;
           uint64_t count = 0;
           [[maybe_unused]] const ssize_t read_bytes =

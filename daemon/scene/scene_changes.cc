@@ -13,15 +13,15 @@ std::string Beyond(std::string key) {
 }
 OwnedName Beyond(const OwnedName& key) { return {key.owner, Beyond(key.name)}; }
 
-bool LooksSame(const WriterPtr& a, const WriterPtr& b) {
+bool ListsSame(const WriterPtr& a, const WriterPtr& b) {
   return a == b ||
          (a->client_name == b->client_name && a->ended == b->ended);  // what is kept is not told
 }
 
-bool LooksSame(const Layer& a, const Layer& b) {
+bool ListsSame(const Layer& a, const Layer& b) {
   return a.visible == b.visible && a.opacity == b.opacity && a.order == b.order &&
          a.blend == b.blend && a.transform == b.transform && a.clip == b.clip &&
-         a.region == b.region && a.mask == b.mask && LooksSame(a.writer, b.writer);
+         a.region == b.region && a.mask == b.mask && ListsSame(a.writer, b.writer);
 }
 
 // What was there under the same name, if it is the same layer still.
@@ -101,7 +101,7 @@ bool SceneChanges::TellLayer(const OwnedName& key, const Layer* was, const Layer
   bool room = true;
   if (was != nullptr && same == nullptr) room = visitor.OnRemovedLayer(key);
   // Told even without room: between the two the place would be in the middle of a layer.
-  if (same == nullptr || !LooksSame(*same, *is)) room = visitor.OnLayer(key, *is) && room;
+  if (same == nullptr || !ListsSame(*same, *is)) room = visitor.OnLayer(key, *is) && room;
   inside_ = key;
   entity_from_.clear();
   return room && TellEntities(same, *is, visitor);

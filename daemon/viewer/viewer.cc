@@ -126,9 +126,9 @@ class Viewer::Impl {
       done(TakeControl(request));
     } else if (file == files.end()) {
       done(Plain(404,
-                 "this voxeld was built without its page, since the page's tools were not there: "
-                 "run tools/setup and "
-                 "build again; /healthz and /metrics are here"));
+                 "this voxeld was built without its page: run tools/setup, which installs the "
+                 "page's tools, configure with -DVOXELD_PAGE=ON and build again; /healthz and "
+                 "/metrics are here"));
     } else {
       done(PageResponse(*file, request));
     }

@@ -20,6 +20,9 @@ class Vec3;
 
 namespace voxeld::daemon::wire {
 
+// Two directions are parallel if the sine of the angle between them is smaller.
+inline constexpr double kLeastSine = 1e-6;
+
 // Why one operation, entity or part cannot be taken.
 struct Fault {
   std::string field;

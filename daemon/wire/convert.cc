@@ -13,7 +13,7 @@
 namespace voxeld::daemon::wire {
 namespace {
 
-absl::Status Refused(const Fault& fault) {
+absl::Status StatusOf(const Fault& fault) {
   return absl::InvalidArgumentError(absl::StrCat(fault.field, " ", fault.message));
 }
 
@@ -102,17 +102,17 @@ absl::StatusOr<ViewOptions> FromWire(const v1::View& in) {
       out.mode = ViewOptions::Mode::kVoxels;
       break;
     default:
-      return Refused(UnknownEnum(FieldPath(path, "mode"), in.mode(), "FIT, MILLIMETRES, VOXELS"));
+      return StatusOf(UnknownEnum(FieldPath(path, "mode"), in.mode(), "FIT, MILLIMETRES, VOXELS"));
   }
   if (in.has_box()) {
     if (out.mode != ViewOptions::Mode::kFit) {
       return absl::InvalidArgumentError("view.box is set; it goes with mode FIT only");
     }
-    if (auto fault = CheckBox(FieldPath(path, "box"), in.box())) return Refused(*fault);
+    if (auto fault = CheckBox(FieldPath(path, "box"), in.box())) return StatusOf(*fault);
     out.box.emplace(FromWire(in.box().min()), FromWire(in.box().max()));
   }
   if (auto fault = ToAffine(FieldPath(path, "transform"), in.transform(), &out.transform)) {
-    return Refused(*fault);
+    return StatusOf(*fault);
   }
   return out;
 }

@@ -11,9 +11,9 @@ namespace voxeld::daemon::wire {
 namespace {
 
 template <typename Ours, typename Theirs, size_t n>
-using Table = std::array<std::pair<Ours, Theirs>, n>;
+using EnumTable = std::array<std::pair<Ours, Theirs>, n>;
 
-constexpr Table<Reason, v1::Reason, 16> kReasons = {{
+constexpr EnumTable<Reason, v1::Reason, 16> kReasons = {{
     {Reason::kUnspecified, v1::REASON_UNSPECIFIED},
     {Reason::kInvalidValue, v1::REASON_INVALID_VALUE},
     {Reason::kSizeMismatch, v1::REASON_SIZE_MISMATCH},
@@ -32,25 +32,25 @@ constexpr Table<Reason, v1::Reason, 16> kReasons = {{
     {Reason::kTimedOut, v1::REASON_TIMED_OUT},
 }};
 
-constexpr Table<gpu::BlendMode, v1::BlendMode, 3> kBlendModes = {{
+constexpr EnumTable<gpu::BlendMode, v1::BlendMode, 3> kBlendModes = {{
     {gpu::BlendMode::kOver, v1::BLEND_MODE_OVER},
     {gpu::BlendMode::kAdd, v1::BLEND_MODE_ADD},
     {gpu::BlendMode::kErase, v1::BLEND_MODE_ERASE},
 }};
 
-constexpr Table<display::Evidence, v1::Evidence, 2> kEvidence = {{
+constexpr EnumTable<display::Evidence, v1::Evidence, 2> kEvidence = {{
     {display::Evidence::kDevice, v1::EVIDENCE_DEVICE},
     {display::Evidence::kEstimated, v1::EVIDENCE_ESTIMATED},
 }};
 
-constexpr Table<CommitOutcome::NotShown, v1::NotShown::Why, 4> kWhys = {{
+constexpr EnumTable<CommitOutcome::NotShown, v1::NotShown::Why, 4> kWhys = {{
     {CommitOutcome::NotShown::kAbsent, v1::NotShown::ABSENT},
     {CommitOutcome::NotShown::kRemoved, v1::NotShown::REMOVED},
     {CommitOutcome::NotShown::kBlanked, v1::NotShown::BLANKED},
     {CommitOutcome::NotShown::kHidden, v1::NotShown::HIDDEN},
 }};
 
-constexpr Table<display::DisplayState, v1::DisplayState, 5> kStates = {{
+constexpr EnumTable<display::DisplayState, v1::DisplayState, 5> kStates = {{
     {display::DisplayState::kStopped, v1::DISPLAY_STATE_STOPPED},
     {display::DisplayState::kAttaching, v1::DISPLAY_STATE_ATTACHING},
     {display::DisplayState::kShowing, v1::DISPLAY_STATE_SHOWING},
@@ -58,7 +58,7 @@ constexpr Table<display::DisplayState, v1::DisplayState, 5> kStates = {{
     {display::DisplayState::kLost, v1::DISPLAY_STATE_LOST},
 }};
 
-constexpr Table<display::PixelFormat, v1::PixelFormat, 5> kFormats = {{
+constexpr EnumTable<display::PixelFormat, v1::PixelFormat, 5> kFormats = {{
     {display::PixelFormat::kRgb888, v1::PIXEL_FORMAT_RGB888},
     {display::PixelFormat::kRgb332, v1::PIXEL_FORMAT_RGB332},
     {display::PixelFormat::kBitPlanes, v1::PIXEL_FORMAT_BIT_PLANES},
@@ -66,13 +66,13 @@ constexpr Table<display::PixelFormat, v1::PixelFormat, 5> kFormats = {{
     {display::PixelFormat::kPlanes24, v1::PIXEL_FORMAT_PLANES24},
 }};
 
-constexpr Table<sync::SweepLock::State, v1::SweepLock, 3> kSweepLocks = {{
+constexpr EnumTable<sync::SweepLock::State, v1::SweepLock, 3> kSweepLocks = {{
     {sync::SweepLock::State::kUnknown, v1::SWEEP_LOCK_UNKNOWN},
     {sync::SweepLock::State::kLocking, v1::SWEEP_LOCK_LOCKING},
     {sync::SweepLock::State::kLocked, v1::SWEEP_LOCK_LOCKED},
 }};
 
-constexpr Table<TestPattern, v1::TestPattern, 11> kPatterns = {{
+constexpr EnumTable<TestPattern, v1::TestPattern, 11> kPatterns = {{
     {TestPattern::kNone, v1::TEST_PATTERN_NONE},
     {TestPattern::kAxes, v1::TEST_PATTERN_AXES},
     {TestPattern::kCorners, v1::TEST_PATTERN_CORNERS},
@@ -86,14 +86,14 @@ constexpr Table<TestPattern, v1::TestPattern, 11> kPatterns = {{
     {TestPattern::kFrames, v1::TEST_PATTERN_FRAMES},
 }};
 
-constexpr Table<display::DecodedVolume::Source, v1::VolumeHeader::Source, 2> kSources = {{
+constexpr EnumTable<display::DecodedVolume::Source, v1::VolumeHeader::Source, 2> kSources = {{
     {display::DecodedVolume::Source::kDecodedFromSent, v1::VolumeHeader::DECODED_FROM_SENT},
     {display::DecodedVolume::Source::kReportedByDevice, v1::VolumeHeader::REPORTED_BY_DEVICE},
 }};
 
 // Every value of ours stands in its table; what does not is the wire's "unspecified".
 template <typename Ours, typename Theirs, size_t n>
-Theirs Forth(const Table<Ours, Theirs, n>& table, Ours value) {
+Theirs Forth(const EnumTable<Ours, Theirs, n>& table, Ours value) {
   for (const auto& [ours, theirs] : table) {
     if (ours == value) return theirs;
   }
@@ -101,7 +101,7 @@ Theirs Forth(const Table<Ours, Theirs, n>& table, Ours value) {
 }
 
 template <typename Ours, typename Theirs, size_t n>
-absl::StatusOr<Ours> Back(const Table<Ours, Theirs, n>& table, Theirs value, const char* what) {
+absl::StatusOr<Ours> Back(const EnumTable<Ours, Theirs, n>& table, Theirs value, const char* what) {
   std::string known;
   for (const auto& [ours, theirs] : table) {
     if (theirs == value) return ours;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/wire/check.h"
 #include "daemon/wire/fields.h"
 #include "daemon/wire/vertices.h"
 #include "gpu/primitives/helix.h"
@@ -21,7 +22,6 @@ using gpu::implicit::Vector;
 
 constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kMostTurns = 1024;
-constexpr double kLeastSine = 1e-6;
 constexpr uint32_t kPatchPoints = 16;
 
 // Two directions across an axis; `message` has the field `toward`, which may be absent.

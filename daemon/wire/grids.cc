@@ -12,6 +12,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "daemon/scene/bounds.h"
+#include "daemon/wire/check.h"
 #include "daemon/wire/color_scale.h"
 #include "daemon/wire/colors.h"
 #include "daemon/wire/fields.h"
@@ -30,7 +31,6 @@ using gpu::SampleFormat;
 using gpu::SampleHead;
 using gpu::implicit::Vector;
 
-constexpr double kLeastSine = 1e-6;
 using Table = std::array<uint32_t, SampleHead::kTableEntries>;
 
 // A grid that has been checked.

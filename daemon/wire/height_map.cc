@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/wire/check.h"
 #include "daemon/wire/fields.h"
 #include "daemon/wire/texture.h"
 #include "gpu/implicit/field_shape.h"
@@ -18,7 +19,6 @@ namespace {
 
 using gpu::implicit::Vector;
 
-constexpr double kLeastSine = 1e-6;
 constexpr uint32_t kCornersPerCell = 6;
 
 // A grid of samples: counts and payloads that fit one another.

@@ -17,10 +17,10 @@ namespace voxeld::daemon::wire {
 namespace {
 
 // A row of SQLite's has at most 10⁹ bytes; this leaves room for the rest of the message.
-constexpr uint64_t kMostContentBytes = uint64_t{900} << 20;
+constexpr uint64_t kMostStoredBytes = uint64_t{900} << 20;
 
 template <typename Message>
-absl::Status Parse(std::string_view bytes, Message* out) {
+absl::Status ParseStored(std::string_view bytes, Message* out) {
   if (out->ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return absl::OkStatus();
   return absl::DataLossError(absl::StrCat(bytes.size(), " bytes are no ", out->GetTypeName()));
 }
@@ -67,9 +67,9 @@ std::string EncodeKept(const Object& object) {
 
 absl::StatusOr<std::string> EncodeKept(const Entity& entity, const TwoClocks& now) {
   const uint64_t bytes = EncodedBytes(entity.data.content);
-  if (bytes > kMostContentBytes) {
+  if (bytes > kMostStoredBytes) {
     return absl::ResourceExhaustedError(
-        absl::StrCat("its contents are ", bytes, " bytes; ", kMostContentBytes, " can be kept"));
+        absl::StrCat("its contents are ", bytes, " bytes; ", kMostStoredBytes, " can be kept"));
   }
   v1::KeptEntity out;
   v1::Entity* to = out.mutable_entity();
@@ -88,7 +88,7 @@ absl::StatusOr<std::string> EncodeKept(const Entity& entity, const TwoClocks& no
 
 absl::StatusOr<OwnerRecord> DecodeKeptOwner(std::string_view bytes) {
   v1::KeptOwner in;
-  if (absl::Status status = Parse(bytes, &in); !status.ok()) return status;
+  if (absl::Status status = ParseStored(bytes, &in); !status.ok()) return status;
   return OwnerRecord{.token = in.token(),
                      .principal = in.principal(),
                      .hidden = in.hidden(),
@@ -98,7 +98,7 @@ absl::StatusOr<OwnerRecord> DecodeKeptOwner(std::string_view bytes) {
 
 absl::StatusOr<KeptLayerRow> DecodeKeptLayer(std::string_view bytes, const Limits& limits) {
   v1::KeptLayer in;
-  if (absl::Status status = Parse(bytes, &in); !status.ok()) return status;
+  if (absl::Status status = ParseStored(bytes, &in); !status.ok()) return status;
   const v1::LayerInfo& info = in.info();
   v1::StreamRequest request;
   v1::LayerState* state = request.mutable_layer_state();
@@ -120,7 +120,7 @@ absl::StatusOr<KeptObjectRow> DecodeKeptObject(const std::string& name, std::str
                                                const Limits& limits, gpu::BulkPool* pool,
                                                text::Fonts* fonts) {
   v1::KeptObject in;
-  if (absl::Status status = Parse(bytes, &in); !status.ok()) return status;
+  if (absl::Status status = ParseStored(bytes, &in); !status.ok()) return status;
   KeptObjectRow row;
   for (const v1::Object::Part& part : in.definition().parts()) {
     if (part.primitive().has_instance())
@@ -139,7 +139,7 @@ absl::StatusOr<std::optional<Operation>> DecodeKeptEntity(
     const std::string& layer, const std::string& id, std::string_view bytes, const TwoClocks& now,
     const Limits& limits, gpu::BulkPool* pool, text::Fonts* fonts) {
   v1::KeptEntity in;
-  if (absl::Status status = Parse(bytes, &in); !status.ok()) return status;
+  if (absl::Status status = ParseStored(bytes, &in); !status.ok()) return status;
   if (in.expires_unix_ns() != 0) {
     if (in.expires_unix_ns() <= now.unix_ns) return std::optional<Operation>();
     in.mutable_entity()->set_lifetime_ns(in.expires_unix_ns() - now.unix_ns);

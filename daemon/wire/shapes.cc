@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "daemon/wire/boundary.h"
+#include "daemon/wire/check.h"
 #include "daemon/wire/color_scale.h"
 #include "daemon/wire/curves.h"
 #include "daemon/wire/fields.h"
@@ -27,15 +28,13 @@ namespace {
 using gpu::implicit::Graph;
 using gpu::implicit::Vector;
 
-constexpr double kLeastSine = 1e-6;  // of the angle between edges
-
 std::string Show(const Vector& v) {
   return absl::StrCat("(", wire::Show(v.x), ", ", wire::Show(v.y), ", ", wire::Show(v.z), ")");
 }
 
 template <typename Shape>
-MaybeFault Finish(const FieldPath& path, const ShapeContext& context, const Shape& shape,
-                  GeometryData* out) {
+MaybeFault FinishShape(const FieldPath& path, const ShapeContext& context, const Shape& shape,
+                       GeometryData* out) {
   Graph graph;
   return ToField(path, context, graph, shape.Make(graph), out);
 }
@@ -122,7 +121,7 @@ MaybeFault ToShape(const FieldPath& path, const v1::Arrow& in, const ShapeContex
   arrow.head_radius = in.head_radius() == 0 ? arrow.head_length * 2 / 5 : in.head_radius();
   bool done;
   if (auto fault = ToLookOrFrame(path, in, context, arrow, out, &done)) return fault;
-  return done ? MaybeFault() : Finish(path, context, arrow, out);
+  return done ? MaybeFault() : FinishShape(path, context, arrow, out);
 }
 
 MaybeFault ToShape(const FieldPath& path, const v1::Cone& in, const ShapeContext& context,
@@ -150,7 +149,7 @@ MaybeFault ToShape(const FieldPath& path, const v1::Cone& in, const ShapeContext
   }
   bool done;
   if (auto fault = ToLookOrFrame(path, in, context, cone, out, &done)) return fault;
-  return done ? MaybeFault() : Finish(path, context, cone, out);
+  return done ? MaybeFault() : FinishShape(path, context, cone, out);
 }
 
 MaybeFault ToShape(const FieldPath& path, const v1::Disc& in, const ShapeContext& context,
@@ -175,7 +174,7 @@ MaybeFault ToShape(const FieldPath& path, const v1::Disc& in, const ShapeContext
   }
   bool done;
   if (auto fault = ToLookOrFrame(path, in, context, disc, out, &done)) return fault;
-  return done ? MaybeFault() : Finish(path, context, disc, out);
+  return done ? MaybeFault() : FinishShape(path, context, disc, out);
 }
 
 MaybeFault ToShape(const FieldPath& path, const v1::Ellipsoid& in, const ShapeContext& context,
@@ -187,7 +186,7 @@ MaybeFault ToShape(const FieldPath& path, const v1::Ellipsoid& in, const ShapeCo
   ellipsoid.radii = {in.radii().x(), in.radii().y(), in.radii().z()};
   bool done;
   if (auto fault = ToLookOrFrame(path, in, context, ellipsoid, out, &done)) return fault;
-  return done ? MaybeFault() : Finish(path, context, ellipsoid, out);
+  return done ? MaybeFault() : FinishShape(path, context, ellipsoid, out);
 }
 
 MaybeFault ToShape(const FieldPath& path, const v1::Parallelepiped& in, const ShapeContext& context,
@@ -207,7 +206,7 @@ MaybeFault ToShape(const FieldPath& path, const v1::Parallelepiped& in, const Sh
   }
   bool done;
   if (auto fault = ToLookOrFrame(path, in, context, shape, out, &done)) return fault;
-  return done ? MaybeFault() : Finish(path, context, shape, out);
+  return done ? MaybeFault() : FinishShape(path, context, shape, out);
 }
 
 MaybeFault ToShape(const FieldPath& path, const v1::Patch& in, const ShapeContext& context,
@@ -224,7 +223,7 @@ MaybeFault ToShape(const FieldPath& path, const v1::Patch& in, const ShapeContex
   }
   bool done;
   if (auto fault = ToLookOrFrame(path, in, context, patch, out, &done)) return fault;
-  return done ? MaybeFault() : Finish(path, context, patch, out);
+  return done ? MaybeFault() : FinishShape(path, context, patch, out);
 }
 
 MaybeFault ToShape(const FieldPath& path, const v1::Polygon& in, const ShapeContext& context,
@@ -252,7 +251,7 @@ MaybeFault ToShape(const FieldPath& path, const v1::Polygon& in, const ShapeCont
   }
   bool done;
   if (auto fault = ToLookOrFrame(path, in, context, polygon, out, &done)) return fault;
-  return done ? MaybeFault() : Finish(path, context, polygon, out);
+  return done ? MaybeFault() : FinishShape(path, context, polygon, out);
 }
 
 MaybeFault ToShape(const FieldPath& path, const v1::Torus& in, const ShapeContext& context,
@@ -263,7 +262,7 @@ MaybeFault ToShape(const FieldPath& path, const v1::Torus& in, const ShapeContex
   if (auto fault = CheckPositive(FieldPath(path, "tube_radius"), in.tube_radius())) return fault;
   bool done;
   if (auto fault = ToLookOrFrame(path, in, context, torus, out, &done)) return fault;
-  return done ? MaybeFault() : Finish(path, context, torus, out);
+  return done ? MaybeFault() : FinishShape(path, context, torus, out);
 }
 
 }  // namespace voxeld::daemon::wire

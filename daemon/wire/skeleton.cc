@@ -19,37 +19,38 @@ constexpr uint64_t kLeastFactor = 4;
 constexpr int kMostVarint = 10, kMostTag = 5, kMostLength = 5;
 
 // A message on the way to payloads: its fields that lead there.
-struct Node {
+struct FieldNode {
   struct Step {
     int field = 0;
-    const Node* to = nullptr;  // null: a payload
+    const FieldNode* to = nullptr;  // null: a payload
   };
   Step steps[5];  // field 0: none
 };
 
-constexpr Node kVertices = {{{v1::Vertices::kIndicesFieldNumber},
-                             {v1::Vertices::kColorsFieldNumber},
-                             {v1::Vertices::kPositionsFieldNumber}}};
-constexpr Node kPoints = {{{v1::Points::kVerticesFieldNumber, &kVertices}}};
-constexpr Node kSegments = {{{v1::Segments::kVerticesFieldNumber, &kVertices}}};
-constexpr Node kMesh = {{{v1::Mesh::kVerticesFieldNumber, &kVertices}}};
-constexpr Node kCurve = {{{v1::Curve::kVerticesFieldNumber, &kVertices}}};
-constexpr Node kBezierSurface = {{{v1::BezierSurface::kVerticesFieldNumber, &kVertices}}};
-constexpr Node kPrimitive = {{{v1::Primitive::kPointsFieldNumber, &kPoints},
-                              {v1::Primitive::kSegmentsFieldNumber, &kSegments},
-                              {v1::Primitive::kMeshFieldNumber, &kMesh},
-                              {v1::Primitive::kCurveFieldNumber, &kCurve},
-                              {v1::Primitive::kBezierSurfaceFieldNumber, &kBezierSurface}}};
-constexpr Node kEntity = {{{v1::Entity::kPrimitiveFieldNumber, &kPrimitive}}};
-constexpr Node kUpsert = {{{v1::Upsert::kEntityFieldNumber, &kEntity}}};
-constexpr Node kBatch = {{{v1::Batch::kUpsertsFieldNumber, &kUpsert}}};
-constexpr Node kPart = {{{v1::Object::Part::kPrimitiveFieldNumber, &kPrimitive}}};
-constexpr Node kObject = {{{v1::Object::kPartsFieldNumber, &kPart}}};
-constexpr Node kDefineObject = {{{v1::DefineObject::kDefinitionFieldNumber, &kObject}}};
-constexpr Node kStreamRequest = {{{v1::StreamRequest::kBatchFieldNumber, &kBatch},
-                                  {v1::StreamRequest::kUpsertFieldNumber, &kUpsert},
-                                  {v1::StreamRequest::kDefineObjectFieldNumber, &kDefineObject}}};
-constexpr Node kApplyUpdateRequest = {
+constexpr FieldNode kVertices = {{{v1::Vertices::kIndicesFieldNumber},
+                                  {v1::Vertices::kColorsFieldNumber},
+                                  {v1::Vertices::kPositionsFieldNumber}}};
+constexpr FieldNode kPoints = {{{v1::Points::kVerticesFieldNumber, &kVertices}}};
+constexpr FieldNode kSegments = {{{v1::Segments::kVerticesFieldNumber, &kVertices}}};
+constexpr FieldNode kMesh = {{{v1::Mesh::kVerticesFieldNumber, &kVertices}}};
+constexpr FieldNode kCurve = {{{v1::Curve::kVerticesFieldNumber, &kVertices}}};
+constexpr FieldNode kBezierSurface = {{{v1::BezierSurface::kVerticesFieldNumber, &kVertices}}};
+constexpr FieldNode kPrimitive = {{{v1::Primitive::kPointsFieldNumber, &kPoints},
+                                   {v1::Primitive::kSegmentsFieldNumber, &kSegments},
+                                   {v1::Primitive::kMeshFieldNumber, &kMesh},
+                                   {v1::Primitive::kCurveFieldNumber, &kCurve},
+                                   {v1::Primitive::kBezierSurfaceFieldNumber, &kBezierSurface}}};
+constexpr FieldNode kEntity = {{{v1::Entity::kPrimitiveFieldNumber, &kPrimitive}}};
+constexpr FieldNode kUpsert = {{{v1::Upsert::kEntityFieldNumber, &kEntity}}};
+constexpr FieldNode kBatch = {{{v1::Batch::kUpsertsFieldNumber, &kUpsert}}};
+constexpr FieldNode kPart = {{{v1::Object::Part::kPrimitiveFieldNumber, &kPrimitive}}};
+constexpr FieldNode kObject = {{{v1::Object::kPartsFieldNumber, &kPart}}};
+constexpr FieldNode kDefineObject = {{{v1::DefineObject::kDefinitionFieldNumber, &kObject}}};
+constexpr FieldNode kStreamRequest = {
+    {{v1::StreamRequest::kBatchFieldNumber, &kBatch},
+     {v1::StreamRequest::kUpsertFieldNumber, &kUpsert},
+     {v1::StreamRequest::kDefineObjectFieldNumber, &kDefineObject}}};
+constexpr FieldNode kApplyUpdateRequest = {
     {{v1::ApplyUpdateRequest::kOperationsFieldNumber, &kStreamRequest}}};
 
 class Walker {
@@ -63,7 +64,7 @@ class Walker {
 
   // The next `size` bytes, which are there, are a message of that kind. Every function answers false
   // if what it finds is not plain.
-  bool Message(const Node& node, uint64_t size) {
+  bool Message(const FieldNode& node, uint64_t size) {
     const uint64_t end = left_ - size;  // what is left then
     while (left_ > end) {
       if (!Field(node, end)) return false;
@@ -72,7 +73,7 @@ class Walker {
   }
 
  private:
-  bool Field(const Node& node, uint64_t end) {
+  bool Field(const FieldNode& node, uint64_t end) {
     uint64_t tag = 0;
     if (!Varint(kMostTag, end, &tag) || tag > UINT32_MAX) return false;
     const int field = WireFormatLite::GetTagFieldNumber(static_cast<uint32_t>(tag));
@@ -92,11 +93,11 @@ class Walker {
     }
   }
 
-  bool Delimited(const Node& node, int field, uint64_t end) {
+  bool Delimited(const FieldNode& node, int field, uint64_t end) {
     uint64_t size = 0;
     if (!Varint(kMostLength, end, &size) || size > left_ - end) return false;
     const auto step = std::find_if(std::begin(node.steps), std::end(node.steps),
-                                   [&](const Node::Step& s) { return s.field == field; });
+                                   [&](const FieldNode::Step& s) { return s.field == field; });
     if (step == std::end(node.steps)) {
       PutVarint(size);
       return Copy(size, end);

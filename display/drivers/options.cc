@@ -20,7 +20,7 @@ namespace voxeld::display {
 namespace {
 
 constexpr int32_t kMostPixels = 16384;
-constexpr double kMostNumber = 1e6;
+constexpr double kMostLength = 1e6;
 constexpr uint64_t kMostVolumeBytes = uint64_t{1} << 30;
 constexpr size_t kMostCurve = 256;
 
@@ -62,7 +62,7 @@ double AlongCurve(const std::vector<double>& values, double at) {
 
 std::optional<Vec3> ReadVoxelPitch(OptionReader& reader) {
   if (!reader.has("voxel_mm")) return std::nullopt;
-  const std::array<double, 3> pitch = ReadThree(reader, "voxel_mm", 1, 1e-6, kMostNumber);
+  const std::array<double, 3> pitch = ReadThree(reader, "voxel_mm", 1, 1e-6, kMostLength);
   return Vec3{pitch[0], pitch[1], pitch[2]};
 }
 
@@ -162,7 +162,7 @@ std::vector<double> OptionReader::Numbers(const std::string& key) {
   if (text == nullptr) return values;
   for (const std::string& part : std::vector<std::string>(absl::StrSplit(*text, ';'))) {
     double value = 0;
-    if (!absl::SimpleAtod(part, &value) || !(std::abs(value) <= kMostNumber)) {
+    if (!absl::SimpleAtod(part, &value) || !(std::abs(value) <= kMostLength)) {
       Refuse(key, "numbers with ';' between them");
       return {};
     }
@@ -206,7 +206,7 @@ absl::StatusOr<DisplayInfo> ReadDisplayInfo(const DisplayOptions& options, Optio
   DisplayInfo info;
   info.name = options.name;
   info.driver = options.driver;
-  const double pitch = reader.Number("pitch_mm", 1, 1e-6, kMostNumber);
+  const double pitch = reader.Number("pitch_mm", 1, 1e-6, kMostLength);
   info.geometry = ReadGeometry(reader, pitch);
   FrameLayout& layout = info.layout;
   layout.format = static_cast<PixelFormat>(

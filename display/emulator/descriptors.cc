@@ -1,43 +1,21 @@
 #include "display/emulator/descriptors.h"
 
-#include <initializer_list>
 #include <string_view>
 
 #include "display/drivers/voxlink/protocol.h"
+#include "display/emulator/descriptor_bytes.h"
 
 namespace voxeld::display::emulator {
 namespace {
 
 using voxlink::kBulkOut;
 using voxlink::kInterruptIn;
-using Bytes = std::vector<std::byte>;
+using Bytes = DescriptorBytes;
 
 constexpr uint16_t kVendorId = 0x1209;  // pid.codes: for tests
 constexpr uint16_t kProductId = 0x0001;
 constexpr uint32_t kWindows81 = 0x06030000;
-constexpr std::string_view kInterfaceGuid = "{8F5C2C1B-6D1E-4B61-9E36-2B0D3C5A7E11}";
-
-void Put8(Bytes& out, std::initializer_list<int> values) {
-  for (const int value : values) out.push_back(static_cast<std::byte>(value));
-}
-
-void Put16(Bytes& out, uint16_t value) { Put8(out, {value & 0xFF, value >> 8}); }
-
-void Put32(Bytes& out, uint32_t value) {
-  Put16(out, static_cast<uint16_t>(value));
-  Put16(out, static_cast<uint16_t>(value >> 16));
-}
-
-void PutUtf16(Bytes& out, std::string_view ascii) {
-  for (const char c : ascii) Put8(out, {c, 0});
-}
-
-Bytes String(std::string_view ascii) {
-  Bytes out;
-  Put8(out, {static_cast<int>(2 + 2 * ascii.size()), 3});
-  PutUtf16(out, ascii);
-  return out;
-}
+constexpr std::string_view kVoxlinkInterfaceGuid = "{8F5C2C1B-6D1E-4B61-9E36-2B0D3C5A7E11}";
 
 Bytes Device(UsbSpeed speed) {
   Bytes out;
@@ -95,7 +73,7 @@ Bytes MsOs20() {
   PutUtf16(out, "DeviceInterfaceGUIDs");
   Put16(out, 0);
   Put16(out, 80);
-  PutUtf16(out, kInterfaceGuid);
+  PutUtf16(out, kVoxlinkInterfaceGuid);
   Put32(out, 0);
   return out;
 }
@@ -132,8 +110,9 @@ DescriptorSet MakeDescriptors(UsbSpeed speed, const std::string& serial) {
   set.bos = Bos(speed, set.ms_os_20.size());
   Bytes languages;
   Put8(languages, {4, 3, 0x09, 0x04});
-  set.strings = {languages, String("voxeld"), String("Simulated volumetric display"),
-                 String(std::string_view(serial).substr(0, 126))};
+  set.strings = {languages, StringDescriptor("voxeld"),
+                 StringDescriptor("Simulated volumetric display"),
+                 StringDescriptor(std::string_view(serial).substr(0, 126))};
   return set;
 }
 

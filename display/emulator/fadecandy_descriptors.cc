@@ -1,38 +1,16 @@
 #include "display/emulator/fadecandy_descriptors.h"
 
-#include <initializer_list>
 #include <string_view>
 
 #include "display/drivers/fadecandy/protocol.h"
+#include "display/emulator/descriptor_bytes.h"
 
 namespace voxeld::display::emulator {
 namespace {
 
-using Bytes = std::vector<std::byte>;
+using Bytes = DescriptorBytes;
 
-constexpr std::string_view kInterfaceGuid = "{2B4D1F36-53A0-4E0C-9C55-0C7A1D8E6B42}";
-
-void Put8(Bytes& out, std::initializer_list<int> values) {
-  for (const int value : values) out.push_back(static_cast<std::byte>(value));
-}
-
-void Put16(Bytes& out, int value) { Put8(out, {value & 0xFF, value >> 8}); }
-
-void Put32(Bytes& out, int value) {
-  Put16(out, value & 0xFFFF);
-  Put16(out, value >> 16);
-}
-
-void PutUtf16(Bytes& out, std::string_view ascii) {
-  for (const char c : ascii) Put8(out, {c, 0});
-}
-
-Bytes String(std::string_view ascii) {
-  Bytes out;
-  Put8(out, {static_cast<int>(2 + 2 * ascii.size()), 3});
-  PutUtf16(out, ascii);
-  return out;
-}
+constexpr std::string_view kFadecandyInterfaceGuid = "{2B4D1F36-53A0-4E0C-9C55-0C7A1D8E6B42}";
 
 Bytes Device() {
   Bytes out;
@@ -69,7 +47,7 @@ Bytes MsCompatibleId() {
 Bytes MsProperties() {
   constexpr std::string_view kName = "DeviceInterfaceGUID";
   const int name = static_cast<int>(2 * kName.size() + 2);
-  const int data = static_cast<int>(2 * kInterfaceGuid.size() + 2);
+  const int data = static_cast<int>(2 * kFadecandyInterfaceGuid.size() + 2);
   const int property = 14 + name + data;
   Bytes out;
   Put32(out, 10 + property);
@@ -82,7 +60,7 @@ Bytes MsProperties() {
   PutUtf16(out, kName);
   Put16(out, 0);
   Put32(out, data);
-  PutUtf16(out, kInterfaceGuid);
+  PutUtf16(out, kFadecandyInterfaceGuid);
   Put16(out, 0);
   return out;
 }
@@ -101,15 +79,15 @@ std::optional<Bytes> FadecandyDescriptor(uint16_t value, const std::string& seri
       return languages;
     }
     case 0x0301:
-      return String("scanlime");
+      return StringDescriptor("scanlime");
     case 0x0302:
-      return String("Fadecandy");
+      return StringDescriptor("Fadecandy");
     case 0x0303:
-      return String(std::string_view(serial).substr(0, 126));
+      return StringDescriptor(std::string_view(serial).substr(0, 126));
     case 0x0304:
-      return String("Fadecandy Bootloader");
+      return StringDescriptor("Fadecandy Bootloader");
     case 0x03EE: {
-      Bytes os = String("MSFT100");
+      Bytes os = StringDescriptor("MSFT100");
       Put8(os, {fadecandy::kMsVendorCode, 0});
       os[0] = static_cast<std::byte>(os.size());
       return os;

@@ -8,14 +8,13 @@
 namespace voxeld::display::emulator {
 namespace {
 
-using fadecandy::kBulkOut;
 using fadecandy::kPacketBytes;
 using Bytes = std::vector<std::byte>;
 
 // Of a clock that jumps, the refreshes between are not all done.
 constexpr sync::TimeNs kLongestCatchUp = sync::kSecond;
 
-Bytes BytesOf(std::initializer_list<uint32_t> values) {
+Bytes ListedBytes(std::initializer_list<uint32_t> values) {
   Bytes out;
   for (const uint32_t value : values) out.push_back(static_cast<std::byte>(value));
   return out;
@@ -54,7 +53,7 @@ void FadecandyDevice::Submit(const Urb& urb) {
   if (!plugged_) return complete_(urb.id, TransferStatus::kDisconnected, 0, {});
   Tick();
   if (urb.endpoint == 0) return Control(urb);
-  if (urb.endpoint != kBulkOut || halted_.contains(urb.endpoint)) {
+  if (urb.endpoint != fadecandy::kBulkOut || halted_.contains(urb.endpoint)) {
     return complete_(urb.id, TransferStatus::kStall, 0, {});
   }
   bulk_.push_back({urb.id, urb.out, 0});
@@ -119,13 +118,13 @@ std::optional<Bytes> FadecandyDevice::ReadRequest(const UsbSetup& setup) const {
       return FadecandyDescriptor(setup.value, config_.serial);
     case 0x8000:  // GET_STATUS: bus-powered
     case 0x8100:
-      return BytesOf({0, 0});
+      return ListedBytes({0, 0});
     case 0x8200:
-      return BytesOf({halted_.contains(setup.index & 0xFF) ? 1u : 0u, 0});
+      return ListedBytes({halted_.contains(setup.index & 0xFF) ? 1u : 0u, 0});
     case 0x8008:  // GET_CONFIGURATION
-      return BytesOf({configuration_});
+      return ListedBytes({configuration_});
     case 0x810A:  // GET_INTERFACE
-      return BytesOf({0});
+      return ListedBytes({0});
     case fadecandy::kRequestIn << 8 | fadecandy::kMsVendorCode:
     case 0xC100 | fadecandy::kMsVendorCode:  // properties are asked of the interface
       return FadecandyMsDescriptor(setup.index);
@@ -133,7 +132,7 @@ std::optional<Bytes> FadecandyDevice::ReadRequest(const UsbSetup& setup) const {
       if (setup.index > fadecandy::kFrameCounter) return std::nullopt;
       const uint32_t count =
           setup.index == fadecandy::kRefreshCounter ? light_.refreshes() : light_.frames();
-      return BytesOf({count & 0xFF, count >> 8 & 0xFF, count >> 16 & 0xFF, count >> 24});
+      return ListedBytes({count & 0xFF, count >> 8 & 0xFF, count >> 16 & 0xFF, count >> 24});
     }
     default:
       return std::nullopt;

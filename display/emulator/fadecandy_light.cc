@@ -9,24 +9,23 @@ using fadecandy::kFrameBytes;
 using fadecandy::kLutEntries;
 using fadecandy::kLutPerPacket;
 using fadecandy::kPacketBytes;
-using fadecandy::PacketType;
 
 bool FadecandyLight::Take(std::span<const std::byte, kPacketBytes> packet) {
   const bool final = fadecandy::IsFinal(packet[0]);
   switch (fadecandy::TypeOf(packet[0])) {
-    case PacketType::kVideo:
+    case fadecandy::PacketType::kVideo:
       if (frame_waits_) return false;
       StoreVideo(packet);
       frame_waits_ = final;
       break;
-    case PacketType::kLut:
+    case fadecandy::PacketType::kLut:
       StoreLut(packet);
       lut_waits_ |= final;
       break;
-    case PacketType::kConfig:
+    case fadecandy::PacketType::kConfig:
       flags_ = std::to_integer<uint8_t>(packet[1]);
       break;
-    case PacketType::kNothing:
+    case fadecandy::PacketType::kNothing:
       break;
   }
   traffic_ = true;

@@ -18,9 +18,9 @@ struct LightCells {
   int32_t own;    // that holds it; −1: it lies beside the grid
 };
 
-class GridAxis {
+class CellAxis {
  public:
-  GridAxis(int32_t cells, double pitch_mm, double origin_mm, double cell_mm)
+  CellAxis(int32_t cells, double pitch_mm, double origin_mm, double cell_mm)
       : cells_(cells),
         pitch_mm_(pitch_mm),
         origin_mm_(origin_mm),
@@ -64,9 +64,9 @@ LightBounds BoundsOf(const Lattice& lattice) {
 }
 
 FootprintTable BuildLatticeFootprints(const Lattice& lattice, const VoxelGrid& grid) {
-  const GridAxis axis_x(grid.nx, grid.pitch_mm.x, grid.origin_mm.x, lattice.cell_mm.x);
-  const GridAxis axis_y(grid.ny, grid.pitch_mm.y, grid.origin_mm.y, lattice.cell_mm.y);
-  const GridAxis axis_z(grid.nz, grid.pitch_mm.z, grid.origin_mm.z, lattice.cell_mm.z);
+  const CellAxis axis_x(grid.nx, grid.pitch_mm.x, grid.origin_mm.x, lattice.cell_mm.x);
+  const CellAxis axis_y(grid.ny, grid.pitch_mm.y, grid.origin_mm.y, lattice.cell_mm.y);
+  const CellAxis axis_z(grid.nz, grid.pitch_mm.z, grid.origin_mm.z, lattice.cell_mm.z);
   ListBuilder lists(lattice.points_mm.size());
   for (size_t pixel = 0; pixel < lattice.points_mm.size(); ++pixel) {
     const std::optional<Vec3>& point = lattice.points_mm[pixel];

@@ -15,7 +15,7 @@
 namespace voxeld::display {
 namespace {
 
-constexpr uint8_t kIn = 0x80;
+constexpr uint8_t kDirectionIn = 0x80;
 constexpr uint8_t kMostAddress = 127;
 constexpr uint8_t kNotData = 'E';  // flag_data of a refused submission
 
@@ -62,7 +62,7 @@ void RecordingTransport::Close() {
   inner_->Close();
   for (const auto& [id, recorded] : in_flight_) {
     UsbPacket packet = PacketOf(recorded, UsbmonHeader::kComplete);
-    if ((recorded.epnum & kIn) == 0) packet.header.flag_data = kUsbmonDataOut;
+    if ((recorded.epnum & kDirectionIn) == 0) packet.header.flag_data = kUsbmonDataOut;
     packet.header.status = UsbmonStatus(TransferStatus::kCancelled);
     packet.comment = "closed before its end was known";
     recorder_->Add(packet);
@@ -86,11 +86,11 @@ UsbPacket RecordingTransport::PacketOf(const Recorded& recorded, UsbmonHeader::T
 RecordingTransport::Recorded RecordingTransport::RecordSubmission(const Transfer& transfer,
                                                                   std::string comment) {
   const bool control = transfer.type == TransferType::kControl;
-  const bool in = ((control ? transfer.setup.request_type : transfer.endpoint) & kIn) != 0;
+  const bool in = ((control ? transfer.setup.request_type : transfer.endpoint) & kDirectionIn) != 0;
   Recorded recorded;
   recorded.id = next_id_++;
   recorded.xfer_type = UsbmonXferType(transfer.type);
-  recorded.epnum = control ? (in ? kIn : 0) : transfer.endpoint;
+  recorded.epnum = control ? (in ? kDirectionIn : 0) : transfer.endpoint;
   UsbPacket packet = PacketOf(recorded, UsbmonHeader::kSubmit);
   packet.header.status = kUsbmonInProgress;
   packet.header.xfer_flags =
@@ -162,7 +162,7 @@ void RecordingTransport::RecordCompletion(const TransferCompletion& completion) 
   UsbPacket packet = PacketOf(it->second, UsbmonHeader::kComplete);
   packet.header.status = UsbmonStatus(completion.status);
   packet.header.length = completion.actual_length;
-  if ((it->second.epnum & kIn) != 0) {
+  if ((it->second.epnum & kDirectionIn) != 0) {
     packet.data = completion.data;
   } else {
     packet.header.flag_data = kUsbmonDataOut;

@@ -14,7 +14,7 @@
 namespace voxeld::display {
 namespace {
 
-size_t SizeOf(const Transfer& transfer) {
+size_t BytesOf(const Transfer& transfer) {
   return std::max<size_t>(transfer.data.size(), transfer.length);
 }
 
@@ -181,8 +181,8 @@ absl::Status ReplayTransport::Unrecorded(const Transfer& transfer) {
         "the recording's session ", session_ + 1, " of ", sessions_.size(), " has no more ",
         TransferName(transfer.type, transfer.endpoint), " transfers"));
   }
-  if (SizeOf(transfer) > options_.max_bytes_in_flight - bytes_in_flight_) {
-    return absl::ResourceExhaustedError(absl::StrCat(SizeOf(transfer), " bytes more than the ",
+  if (BytesOf(transfer) > options_.max_bytes_in_flight - bytes_in_flight_) {
+    return absl::ResourceExhaustedError(absl::StrCat(BytesOf(transfer), " bytes more than the ",
                                                      bytes_in_flight_, " in flight; at most ",
                                                      options_.max_bytes_in_flight, " may be"));
   }
@@ -216,7 +216,7 @@ absl::StatusOr<TransferId> ReplayTransport::Submit(Transfer&& transfer) {
         .submitted = true, .ended = recorded.refused, .id = next_id_, .submitted_at = now};
     if (recorded.refused) return recorded.refusal;
   }
-  pending.size = SizeOf(transfer);
+  pending.size = BytesOf(transfer);
   if (transfer.timeout > 0) pending.deadline = now + transfer.timeout;
   pending.transfer = std::move(transfer);
   bytes_in_flight_ += pending.size;

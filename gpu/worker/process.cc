@@ -131,11 +131,14 @@ bool WorkerProcess::lost() const {
 std::string DefaultWorkerProgram(const std::filesystem::path& running) {
   const std::filesystem::path folder = running.parent_path();
   const std::filesystem::path above = folder.parent_path();
-  for (const std::filesystem::path& place : {folder, above}) {
-    std::error_code error;
-    if (std::filesystem::exists(place / "voxeld-engine", error)) return place / "voxeld-engine";
+  const std::filesystem::path installed = above / "libexec/voxeld";
+  for (const std::filesystem::path& place : {folder, above, installed}) {
+    for (const char* name : {"voxeld-engine-cuda", "voxeld-engine"}) {
+      std::error_code error;
+      if (std::filesystem::exists(place / name, error)) return place / name;
+    }
   }
-  return above / "libexec/voxeld/voxeld-engine";
+  return installed / "voxeld-engine";
 }
 
 std::filesystem::path RunningProgram() {

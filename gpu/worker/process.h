@@ -45,9 +45,10 @@ class WorkerProcess {
 
 inline constexpr int kWorkerSocket = 3;
 
-// The program that is started unless the options name another: voxeld-engine, in the folder of the
-// program `running`, in the one above (a build's tests), or in ../libexec/voxeld (installed); the
-// first that is there, the last if none is.
+// Returns the program that is started unless the options name another. Looks in the folder of the
+// program `running`, in the one above (a build's tests) and in ../libexec/voxeld (installed), in each
+// for voxeld-engine-cuda, which has both engines, and then for voxeld-engine, which has the CPU's
+// alone. Returns the first that exists, and ../libexec/voxeld/voxeld-engine if none does.
 std::string DefaultWorkerProgram(const std::filesystem::path& running);
 // This process's own.
 std::filesystem::path RunningProgram();

@@ -24,4 +24,18 @@ for package in libgrpc29 libstdc++6 libfribidi0; do
   [ -s "$work/bundle/lib/copyright/$package" ] || { echo "bundle_test: nothing is said of $package, which is in it" >&2; exit 1; }
 done
 env -i LD_LIBRARY_PATH= "$work/bundle/bin/voxeld" --version
-env -i LD_LIBRARY_PATH= "$work/bundle/bin/tests/gpu_conformance_test" --gtest_brief=1 --gtest_filter='*RandomScenes*cpu_worker'
+server=unix:$work/voxeld.sock
+env -i LD_LIBRARY_PATH= "$work/bundle/bin/voxeld" --listen "$server" --http off --display cube=simulated,size=32x32x32 &
+daemon=$!
+trap 'kill -TERM "$daemon" 2>/dev/null || true; rm -rf "$work"' EXIT
+for _ in $(seq 100); do
+  if env -i LD_LIBRARY_PATH= "$work/bundle/bin/voxelctl" --server "$server" displays >/dev/null 2>&1; then break; fi
+  kill -0 "$daemon" 2>/dev/null || { echo "bundle_test: the bundle's voxeld did not start" >&2; exit 1; }
+  sleep 0.1
+done
+env -i LD_LIBRARY_PATH= "$work/bundle/bin/voxelctl" --server "$server" draw "sphere radius=0.5"
+env -i LD_LIBRARY_PATH= "$work/bundle/bin/voxelctl" --server "$server" --json snapshot "$work/picture.png" |
+  python3 -c 'import json, sys; sys.exit(0 if int(json.load(sys.stdin)["lit_pixels"]) else "bundle_test: nothing is lit")'
+if [ -x "$work/bundle/bin/tests/gpu_conformance_test" ]; then
+  env -i LD_LIBRARY_PATH= "$work/bundle/bin/tests/gpu_conformance_test" --gtest_brief=1 --gtest_filter='*RandomScenes*cpu_worker'
+fi

@@ -41,7 +41,7 @@ in_root dpkg -s voxeld | grep -E '^(Package|Status|Version|Depends)'
 {
   echo 'sudo() { "$@"; }'
   echo 'systemctl() { case "$*" in "enable --now "*) shift 2; command systemctl enable "$@";; *) command systemctl "$@";; esac; }'
-  block Install 1 | grep -vE '^(cmake|sudo apt install)' | grep -v '^voxelctl doctor'
+  block Install 1 | grep -vE '^(tools/package|sudo apt install)' | grep -v '^voxelctl doctor'
 } >"$root/tmp/install.sh"
 in_root bash -euxc '. /tmp/install.sh' 2>&1 | sed 's/^/   /'
 

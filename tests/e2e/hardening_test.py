@@ -64,7 +64,9 @@ class Installed(unittest.TestCase):
     def test_programs_have_every_defence(self) -> None:
         with tempfile.TemporaryDirectory() as folder:
             subprocess.run([os.environ["CMAKE"], "--install", BUILD, "--prefix", folder], check=True, stdout=subprocess.DEVNULL)
-            programs = [Path(folder, "bin/voxeld"), Path(folder, "bin/voxelctl"), Path(folder, "libexec/voxeld/voxeld-engine")]
+            engines = sorted(Path(folder, "libexec/voxeld").iterdir())
+            self.assertEqual(engines[0].name, "voxeld-engine")
+            programs = [Path(folder, "bin/voxeld"), Path(folder, "bin/voxelctl"), *engines]
             for program in programs:
                 with self.subTest(program.name):
                     lacking = set(ALL) - defences(program)

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes the Debian package of the build and looks at it as dpkg, udev and systemd would; runs what it holds from an
-# empty folder. Nothing is installed.
+# Makes the Debian packages of the build (voxeld, libvoxeld-dev, and voxeld-cuda if the build has CUDA) and looks at them as dpkg, udev and
+# systemd would; runs what they hold from an empty folder. Nothing is installed.
 # usage: package_test.sh CPACK BUILD VERSION
 set -euo pipefail
 cpack=$1
@@ -16,22 +16,39 @@ fail() {
 }
 
 "$cpack" -G DEB -B "$work/made" --config "$build/CPackConfig.cmake" >"$work/said" || { cat "$work/said"; fail "no package"; }
-deb=$(ls "$work"/made/*.deb)
-root=$work/root
-mkdir "$root"
-dpkg-deb -x "$deb" "$root"
-dpkg-deb -e "$deb" "$work/control"
+architecture=$(dpkg --print-architecture)
+packages=(voxeld libvoxeld-dev)
+[ ! -x "$build/bin/voxeld-engine-cuda" ] || packages+=(voxeld-cuda)
+diff <(printf "%s_${version}_$architecture.deb\n" "${packages[@]}" | LC_ALL=C sort) <(cd "$work/made" && ls *.deb | LC_ALL=C sort) ||
+  fail "other packages were made (>)"
+root=$work/root  # of voxeld, which the others are looked at beside
+for package in "${packages[@]}"; do
+  mkdir -p "$work/$package"
+  dpkg-deb -x "$work/made/${package}_${version}_$architecture.deb" "$work/$package"
+  dpkg-deb -e "$work/made/${package}_${version}_$architecture.deb" "$work/$package.control"
+done
+cp -a "$work/voxeld" "$root"
 
 # ---- control fields, contents
-field() { dpkg-deb -f "$deb" "$1"; }
-[ "$(basename "$deb")" = "voxeld_${version}_$(dpkg --print-architecture).deb" ] || fail "its name is $deb"
-[ "$(field Package) $(field Version) $(field Section)" = "voxeld $version graphics" ] || fail "control: $(field Package Version Section)"
-[ "$(field Architecture)" = "$(dpkg --print-architecture)" ] || fail "architecture $(field Architecture)"
-[[ $(field Maintainer) =~ ^[^\<]+\ \<[^@]+@[^@]+\>$ ]] || fail "maintainer: $(field Maintainer)"
-[ "$(field Description | wc -l)" -ge 2 ] || fail "description: $(field Description)"
+field() { dpkg-deb -f "$work/made/${1}_${version}_$architecture.deb" "$2"; }  # PACKAGE FIELD
+declare -A section=([voxeld]=graphics [voxeld-cuda]=graphics [libvoxeld-dev]=libdevel)
+for package in "${packages[@]}"; do
+  [ "$(field "$package" Package) $(field "$package" Version)" = "$package $version" ] || fail "control of $package: $(field "$package" Version)"
+  [ "$(field "$package" Section)" = "${section[$package]}" ] || fail "section of $package: $(field "$package" Section)"
+  [ "$(field "$package" Architecture)" = "$architecture" ] || fail "architecture of $package: $(field "$package" Architecture)"
+  [[ $(field "$package" Maintainer) =~ ^[^\<]+\ \<[^@]+@[^@]+\>$ ]] || fail "maintainer of $package: $(field "$package" Maintainer)"
+  [ "$(field "$package" Description | wc -l)" -ge 2 ] || fail "description of $package: $(field "$package" Description)"
+  grep -q 'Apache License' "$work/$package/usr/share/doc/$package/copyright" || fail "$package has no licence in copyright"
+done
+[ "$(for package in "${packages[@]}"; do field "$package" Description | head -n 1; done | sort -u | wc -l)" = ${#packages[@]} ] ||
+  fail "two packages have one description"
 
-dpkg-deb -c "$deb" | awk '$1 !~ /^d/ { print $1, $2, $6 }' >"$work/contents"
-cat >"$work/expected" <<'EOT'
+# contents PACKAGE: compares its files, owners and permissions with the list on the standard input.
+contents() {
+  dpkg-deb -c "$work/made/${1}_${version}_$architecture.deb" | awk '$1 !~ /^d/ { print $1, $2, $6 }' >"$work/contents"
+  diff <(sort -k3) <(sort -k3 "$work/contents") || fail "the contents of $1 differ (>)"
+}
+contents voxeld <<'EOT'
 -rwxr-xr-x root/root ./usr/bin/voxelctl
 -rwxr-xr-x root/root ./usr/bin/voxeld
 -rw-r--r-- root/root ./usr/lib/systemd/system/voxeld-engine.socket
@@ -99,8 +116,43 @@ cat >"$work/expected" <<'EOT'
 -rw-r--r-- root/root ./usr/share/voxeld/profiles/vx2-xl.toml
 -rw-r--r-- root/root ./usr/share/zsh/vendor-completions/_voxelctl
 EOT
-diff <(sort -k3 "$work/expected") <(sort -k3 "$work/contents") || fail "its contents differ (>)"
-grep -q 'Apache License' "$root/usr/share/doc/voxeld/copyright" || fail "no licence in copyright"
+contents libvoxeld-dev <<EOT
+-rw-r--r-- root/root ./usr/include/voxeld/address.h
+-rw-r--r-- root/root ./usr/include/voxeld/assets.h
+-rw-r--r-- root/root ./usr/include/voxeld/basics.h
+-rw-r--r-- root/root ./usr/include/voxeld/channel.h
+-rw-r--r-- root/root ./usr/include/voxeld/client.h
+-rw-r--r-- root/root ./usr/include/voxeld/credentials.h
+-rw-r--r-- root/root ./usr/include/voxeld/drawing.h
+-rw-r--r-- root/root ./usr/include/voxeld/expression.h
+-rw-r--r-- root/root ./usr/include/voxeld/receipt.h
+-rw-r--r-- root/root ./usr/include/voxeld/shapes.h
+-rw-r--r-- root/root ./usr/lib/cmake/voxeld_client/voxeld_client-config-version.cmake
+-rw-r--r-- root/root ./usr/lib/cmake/voxeld_client/voxeld_client-config.cmake
+-rw-r--r-- root/root ./usr/lib/cmake/voxeld_client/voxeld_client-targets-release.cmake
+-rw-r--r-- root/root ./usr/lib/cmake/voxeld_client/voxeld_client-targets.cmake
+-rw-r--r-- root/root ./usr/lib/libvoxeld_client.so
+-rw-r--r-- root/root ./usr/share/doc/libvoxeld-dev/copyright
+-rw-r--r-- root/root ./usr/share/voxeld/proto/voxeld/v1/colormaps.txt
+-rw-r--r-- root/root ./usr/share/voxeld/proto/voxeld/v1/display.proto
+-rw-r--r-- root/root ./usr/share/voxeld/proto/voxeld/v1/local.proto
+-rw-r--r-- root/root ./usr/share/voxeld/proto/voxeld/v1/primitives.proto
+-rw-r--r-- root/root ./usr/share/voxeld/proto/voxeld/v1/scene.proto
+-rw-r--r-- root/root ./usr/share/voxeld/proto/voxeld/v1/types.proto
+EOT
+if [ -d "$work/voxeld-cuda" ]; then
+  contents voxeld-cuda <<'EOT'
+-rw-r--r-- root/root ./usr/lib/systemd/system/voxeld-engine@.service.d/50-voxeld-cuda.conf
+-rwxr-xr-x root/root ./usr/libexec/voxeld/voxeld-engine-cuda
+-rw-r--r-- root/root ./usr/share/doc/voxeld-cuda/copyright
+EOT
+fi
+both=$(for package in "${packages[@]}"; do (cd "$work/$package" && find . ! -type d); done | sort | uniq -d)
+[ -z "$both" ] || fail "in two packages: $both"
+for control in "$work"/*.control; do
+  (cd "$control" && for script in postinst prerm postrm; do [ ! -e $script ] || { [ -x $script ] && sh -n $script; } || exit 1; done) ||
+    fail "a maintainer script in $control cannot be run"
+done
 
 # ---- manual pages and completions are this version's
 zcat "$root/usr/share/man/man8/voxeld.8.gz" | head -n 1 | grep -qF "\"voxeld $version\"" || fail "the manual page is another version's"
@@ -110,9 +162,15 @@ for page in "$root"/usr/share/man/man?/*.gz; do
 done
 
 # ---- programs: the system's libraries, each from a package that is depended on
-programs=("$root/usr/bin/voxeld" "$root/usr/bin/voxelctl" "$root/usr/libexec/voxeld/voxeld-engine")
-depends=$(field Depends | tr ',' '\n' | awk '{ print $1 }')
+programs=("$work"/voxeld/usr/{bin/voxeld,bin/voxelctl,libexec/voxeld/voxeld-engine} "$work/libvoxeld-dev/usr/lib/libvoxeld_client.so")
+[ ! -d "$work/voxeld-cuda" ] || programs+=("$work/voxeld-cuda/usr/libexec/voxeld/voxeld-engine-cuda")
 for program in "${programs[@]}"; do
+  package=${program#"$work"/}
+  package=${package%%/*}
+  depends=$(field "$package" Depends | tr ',' '\n' | awk '{ print $1 }')
+  # e2e.hardening looks at the programs as they are built; these are what stripping must leave.
+  readelf -lW "$program" | grep -q GNU_RELRO && readelf -dW "$program" | grep -q BIND_NOW || fail "$program has lost RELRO or BIND_NOW"
+  if readelf -lW "$program" | grep GNU_STACK | grep -q RWE; then fail "$program has an executable stack"; fi
   if readelf -d "$program" | grep -E 'RPATH|RUNPATH'; then fail "$program has a path of its own to libraries"; fi
   if readelf -S "$program" | grep -q '\.symtab'; then fail "$program is not stripped"; fi
   for name in $(readelf -d "$program" | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p'); do
@@ -126,7 +184,15 @@ for program in "${programs[@]}"; do
     grep -qxF "$names" <<<"$depends" || fail "$program needs $name of $owner, which is not among:" $depends
   done
 done
-if grep -e '-dev$' <<<"$depends"; then fail "what only building needs is depended on"; fi
+for package in "${packages[@]}"; do
+  depends=$(field "$package" Depends | tr ',' '\n' | awk '{ print $1 }')
+  if [ "$package" != libvoxeld-dev ] && grep -e '-dev$' <<<"$depends"; then fail "$package depends on what only building needs"; fi
+  # The GPU's driver comes from elsewhere, and ROS is not part of any package.
+  if grep -iE 'cuda|nvidia|nccl|^libros|^ros-' <<<"$depends"; then fail "$package depends on CUDA or ROS"; fi
+done
+grep -qx libabsl-dev <<<"$(field libvoxeld-dev Depends | tr ',' '\n' | awk '{ print $1 }')" || fail "libvoxeld-dev: $(field libvoxeld-dev Depends)"
+[ ! -d "$work/voxeld-cuda" ] || field voxeld-cuda Depends | tr ',' '\n' | sed 's/^ *//' | grep -qxF "voxeld (= $version)" ||
+  fail "voxeld-cuda does not depend on this version of voxeld: $(field voxeld-cuda Depends)"
 
 # ---- voxeld and its engine's program, from where they lie
 unset LD_LIBRARY_PATH VOXELD_SERVER XDG_CONFIG_HOME
@@ -160,6 +226,16 @@ mv "$root/usr/libexec/voxeld/voxeld-engine" "$work/engine"
 if "$voxeld" --engine cuda --listen "$VOXELD_SERVER" --http off 2>"$work/log"; then fail "an engine without its program"; fi
 grep -qF "$root/usr/libexec/voxeld/voxeld-engine cannot be started" "$work/log" || fail "looked elsewhere: $(cat "$work/log")"
 mv "$work/engine" "$root/usr/libexec/voxeld/voxeld-engine"
+# The CUDA engine is preferred, once its package is there: the daemon starts with it where there is a GPU, and says what it lacks elsewhere.
+if [ -d "$work/voxeld-cuda" ]; then
+  cp -a "$work/voxeld-cuda/." "$root/"
+  mv "$root/usr/libexec/voxeld/voxeld-engine-cuda" "$work/engine"
+  printf '#!/bin/sh\ntouch "%s"\n' "$work/preferred" >"$root/usr/libexec/voxeld/voxeld-engine-cuda"
+  chmod +x "$root/usr/libexec/voxeld/voxeld-engine-cuda"
+  if "$voxeld" --engine cuda --listen "$VOXELD_SERVER" --http off 2>"$work/log"; then fail "an engine that is none"; fi
+  [ -e "$work/preferred" ] || fail "voxeld does not start the CUDA engine: $(cat "$work/log")"
+  mv "$work/engine" "$root/usr/libexec/voxeld/voxeld-engine-cuda"
+fi
 
 # ---- udev
 rules=$root/usr/lib/udev/rules.d/70-voxeld.rules
@@ -252,7 +328,8 @@ tail -n 1 "$work/security"
 
 # ---- maintainer scripts: on a machine with everything, where commands fail, and with nothing
 commands=$work/commands
-run() { env -i PATH="$commands" CALLS="$work/calls" /bin/sh -e "$work/control/$1" "${@:2}" >"$work/said" 2>&1; }
+control=$work/voxeld.control
+run() { env -i PATH="$commands" CALLS="$work/calls" /bin/sh -e "$control/$1" "${@:2}" >"$work/said" 2>&1; }
 calls() {
   rm -rf "$commands" "$work/calls"
   mkdir "$commands"
@@ -298,4 +375,19 @@ useradd --system --gid voxeld --groups video --no-create-home --home-dir / --she
 EOT
 calls 1 systemd-sysusers
 if run postinst configure; then fail "no user, and not a word"; fi
-echo "packed, looked at, run: $(basename "$deb"), $(stat -c %s "$deb") bytes"
+
+# ---- those of voxeld-cuda, from the tree: they are the same in every build
+control=$(dirname "$0")/../../packaging/cuda
+calls 0 systemctl
+run postinst configure && run postinst abort-upgrade 9 && run postrm upgrade 9 && run postrm remove || fail "voxeld-cuda: $(cat "$work/said")"
+called <<'EOT'
+systemctl daemon-reload
+systemctl try-restart voxeld.service
+systemctl daemon-reload
+systemctl try-restart voxeld.service
+EOT
+calls 1 systemctl
+run postinst configure && run postrm remove || fail "voxeld-cuda where nothing runs: $(cat "$work/said")"
+calls 0
+run postinst configure && run postrm remove || fail "voxeld-cuda where nothing is: $(cat "$work/said")"
+echo "packed, looked at, run: $(cd "$work/made" && stat -c '%n, %s bytes;' *.deb | tr '\n' ' ')"

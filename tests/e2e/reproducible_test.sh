@@ -20,7 +20,7 @@ git add -A
 git -c user.name=test -c user.email=test@voxeld.invalid commit -q --allow-empty -m "as it is"
 if [ -d "$source/build/data" ]; then mkdir -p build && ln -s "$(realpath "$source/build/data")" build/data; fi
 
-tools/reproduce --preset host --jobs 1 --work "$work/built" python_client voxeld_usage $([ ! -d build/data ] || echo voxeld_page) | tee "$work/said"
+tools/reproduce --preset test --jobs 1 --work "$work/built" python_client voxeld_usage $([ ! -d build/data ] || echo voxeld_page) | tee "$work/said"
 for file in python/voxeld-*.whl daemon/usage/libvoxeld_usage.a; do
   ls "$work"/built/a/out/$file >/dev/null || fail "nothing like $file was compared"
 done
@@ -28,6 +28,6 @@ done
 # What differs is found: a module that has the folder's name in it.
 echo 'file(WRITE ${stage}/voxeld/where.py "WHERE = \"${CMAKE_BINARY_DIR}\"\n")' >>client/python/CMakeLists.txt
 git -c user.name=test -c user.email=test@voxeld.invalid commit -q -a -m "a name"
-if tools/reproduce --preset host --jobs 1 --work "$work/built" python_client >"$work/said"; then fail "a name in the wheel was not seen: $(cat "$work/said")"; fi
+if tools/reproduce --preset test --jobs 1 --work "$work/built" python_client >"$work/said"; then fail "a name in the wheel was not seen: $(cat "$work/said")"; fi
 grep -q '^differs: ./python/voxeld-.*\.whl$' "$work/said" || fail "it says: $(cat "$work/said")"
 echo "and a difference is found"

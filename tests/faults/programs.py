@@ -12,7 +12,7 @@ ENDS_WITH_US = ("setpriv", "--pdeathsig", "KILL")
 def program(variable: str, what: str) -> str:
     """The path in `variable`; without one that can be run (or loaded, a library) the process ends with 2 and a line that says so."""
     path = os.environ.get(variable, "")
-    example = f"{variable}=build/host/bin/{LIBRARIES.get(variable, 'voxeld')}"
+    example = f"{variable}=build/test/bin/{LIBRARIES.get(variable, 'voxeld')}"
     wrong = ""
     if not path:
         wrong = f"{variable} is not set; it is to name {what}"

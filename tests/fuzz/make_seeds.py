@@ -4,7 +4,7 @@ example of every shape; what passes between them, what is kept and what is recor
 and documents, and the protocols' own examples. They go to build/fuzz/seeds/TARGET, and from there to where tools/fuzz works
 (build/fuzz/corpus); `tools/fuzz --merge` takes into the tree what reaches something.
 
-  tests/fuzz/make_seeds.py [--bin build/host/bin]
+  tests/fuzz/make_seeds.py [--bin build/test/bin]
 """
 import argparse
 import hashlib
@@ -458,7 +458,7 @@ def sockets():
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--bin", type=pathlib.Path, default=ROOT / "build/host/bin", help="where voxeld and voxelctl are")
+    parser.add_argument("--bin", type=pathlib.Path, default=ROOT / "build/test/bin", help="where voxeld and voxelctl are")
     args = parser.parse_args()
     texts()
     request_seeds.requests(put, text)

@@ -5,7 +5,7 @@
     tests/simulation/mutants.py --check     only whether each still fits the tree, and builds nothing
 
 NAME: those whose file names hold it; none: all. A copy of the tree is built in DIR (build/mutants), by the
-preset "host" without CUDA. Prints a table: the defect, the first seed that finds it, what was found wrong. Ends with 0 if all were
+preset "test". Prints a table: the defect, the first seed that finds it, what was found wrong. Ends with 0 if all were
 found.
 """
 import argparse
@@ -49,7 +49,7 @@ def copy_tree(source):
 def configure(source, build):
     if (build / "build.ninja").exists():
         return
-    run(["cmake", "--preset", "host", "-B", build, "-DVOXELD_CUDA=OFF", "-DVOXELD_UNIT_TESTS=ON"], cwd=source,
+    run(["cmake", "--preset", "test", "-B", build], cwd=source,
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
@@ -80,7 +80,7 @@ def main():
     parser.add_argument("--check", action="store_true")
     parser.add_argument("names", nargs="*")
     options = parser.parse_args()
-    source, build = options.scratch.resolve(), options.scratch.resolve() / "build" / "host"
+    source, build = options.scratch.resolve(), options.scratch.resolve() / "build" / "test"
     patches = [patch for patch in sorted((HERE / "mutants").glob("*.patch"))
                if not options.names or any(name in patch.stem for name in options.names)]
     if not patches:

@@ -11,7 +11,6 @@ namespace {
 constexpr int kEventReads = 8;  // interrupt transfers that wait at any time
 constexpr int kMostEventFailures = 16;
 constexpr uint16_t kMostConfiguration = 1024;
-constexpr size_t kTransferBytes = size_t{256} << 10;
 constexpr sync::TimeNs kTryAgain = 10 * sync::kMillisecond;  // where there was no room
 constexpr size_t kKeptFree = 8192;  // of the transport's limit, for requests and events
 

@@ -22,6 +22,9 @@
 
 namespace voxeld::display::voxlink {
 
+// The largest bulk transfer that is submitted.
+inline constexpr size_t kTransferBytes = size_t{256} << 10;
+
 class VoxlinkLink {
  public:
   // Called from Poll only. Any of them may call the link, Close included.

@@ -10,7 +10,6 @@
 namespace voxeld::display::voxlink {
 namespace {
 
-constexpr size_t kTransferBytes = size_t{256} << 10;
 constexpr sync::TimeNs kAnswerLimit = 500 * sync::kMillisecond;
 constexpr int kMostQueries = 4;
 

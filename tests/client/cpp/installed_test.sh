@@ -28,6 +28,13 @@ cat >"$work/expected" <<'EOT'
 ./lib/cmake/voxeld_client/voxeld_client-targets-TYPE.cmake
 ./lib/cmake/voxeld_client/voxeld_client-targets.cmake
 ./lib/libvoxeld_client.so
+./share/doc/libvoxeld-dev/copyright
+./share/voxeld/proto/voxeld/v1/colormaps.txt
+./share/voxeld/proto/voxeld/v1/display.proto
+./share/voxeld/proto/voxeld/v1/local.proto
+./share/voxeld/proto/voxeld/v1/primitives.proto
+./share/voxeld/proto/voxeld/v1/scene.proto
+./share/voxeld/proto/voxeld/v1/types.proto
 EOT
 diff "$work/expected" "$work/files" || fail "what is installed differs (>)"
 if grep -rnE '#include.*(grpc|protobuf|\.pb\.h|client/cpp|daemon/|display/)' "$work/prefix/include"; then

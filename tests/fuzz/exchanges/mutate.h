@@ -1,4 +1,4 @@
-// Inputs of targets from those that are known (tests/fuzz/corpus): put together and damaged, as a seed says.
+// Inputs of targets from those that are known (fuzz/corpus of the build, unpacked from tests/fuzz/corpus): put together and damaged, as a seed says.
 #pragma once
 
 #include <cstddef>

@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "tests/fuzz/import/check_model.h"
-#include "tools/voxelctl/import/importer.h"
+#include "tools/voxelctl/import/mesh_checks.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static constexpr const char* kExtensions[] = {"obj", "stl", "gltf", "glb",

@@ -218,7 +218,7 @@ TEST(WorkerEngine, APromisedProgramMustBeThereAndBeAWorker) {
   EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
 }
 
-TEST(DefaultWorkerProgram, IsTheNearestThatIsThere) {
+TEST(DefaultWorkerProgram, IsTheNearestThatExistsAndWithCudaIfBothDo) {
   namespace fs = std::filesystem;
   const fs::path root =
       fs::path(::testing::TempDir()) / ("voxeld_worker_program_" + std::to_string(getpid()));
@@ -226,11 +226,15 @@ TEST(DefaultWorkerProgram, IsTheNearestThatIsThere) {
   const fs::path installed = root / "usr/libexec/voxeld/voxeld-engine";
   EXPECT_EQ(DefaultWorkerProgram(running), installed) << "what a message names if none is there";
   for (const fs::path& nearer :
-       {installed, root / "usr/voxeld-engine", root / "usr/bin/voxeld-engine"}) {
+       {installed, root / "usr/libexec/voxeld/voxeld-engine-cuda", root / "usr/voxeld-engine",
+        root / "usr/voxeld-engine-cuda", root / "usr/bin/voxeld-engine",
+        root / "usr/bin/voxeld-engine-cuda"}) {
     fs::create_directories(nearer.parent_path());
     std::ofstream(nearer) << "a program";
     EXPECT_EQ(DefaultWorkerProgram(running), nearer);
   }
+  fs::remove(root / "usr/bin/voxeld-engine");
+  EXPECT_EQ(DefaultWorkerProgram(running), root / "usr/bin/voxeld-engine-cuda");
   fs::remove_all(root);
 }
 

@@ -343,6 +343,18 @@ INSTANTIATE_TEST_SUITE_P(
             {"a.ply"}}),
     [](const auto& info) { return info.param.name; });
 
+TEST(ImportFile, AFolderWithoutSlicesIsRefused) {
+  TempFolder folder;
+  EXPECT_THAT(ImportFile(folder.Path("."), {}), Fails(Words{"is a folder"}));
+}
+
+TEST(ImportFile, NamesTheFormatsThatItReads) {
+  TempFolder folder;
+  EXPECT_THAT(ImportFile(folder.Write("a.docx", "PK\x03\x04"), {}),
+              Fails(Words{".docx", ".obj", ".geojson"}));
+  EXPECT_THAT(ImportFile(folder.Write("noname", "x"), {}), Fails(Words{"no extension", ".ply"}));
+}
+
 TEST(BadMeshes, ACutGlbIsSaidToEndEarlyWithBothSizes) {
   TempFolder folder;
   const std::string whole =

@@ -10,8 +10,8 @@
 namespace voxeld::voxelctl {
 namespace {
 
-using lights::Protocol;
 namespace network = display::network;
+using network::Protocol;
 
 constexpr int kMostAlong = 4096;  // lights of a box along an axis
 

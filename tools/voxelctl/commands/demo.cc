@@ -44,14 +44,15 @@ absl::Status ListScenes(const DemoOptions& options, Console& console) {
   Table table({{"SCENE"}, {"WHAT IS SEEN"}, {"FROM"}, {"DATA"}});
   for (const SceneAbout& scene : Scenes()) {
     if (!IsChosen(options, scene)) continue;
-    const absl::StatusOr<std::vector<std::string>> files = FindSceneFiles(scene.needs, roots);
+    const absl::StatusOr<std::vector<std::string>> files = FindWhatSceneNeeds(scene, roots);
     const std::string missing = files.ok() ? "" : std::string(files.status().message());
     const auto first = absl::c_find_if(
         scene.needs, [&](const SceneFile& file) { return !FindSceneFile(file, roots).ok(); });
     table.Add({scene.name, scene.seen, scene.source,
-               first != scene.needs.end() ? absl::StrCat("missing: ", first->brought_by)
-               : scene.needs.empty()      ? "none needed"
-                                          : "there"});
+               absl::IsUnimplemented(files.status()) ? "not built"
+               : first != scene.needs.end()          ? absl::StrCat("missing: ", first->brought_by)
+               : scene.needs.empty()                 ? "none needed"
+                                                     : "there"});
     list.push_back({{"scene", scene.name},
                     {"seen", scene.seen},
                     {"source", scene.source},
@@ -79,10 +80,14 @@ void PassOver(const SceneAbout& about, const absl::Status& why, Console& console
   }
 }
 
-// Its data are not on this machine, which is no fault.
+// Its data are not on this machine, or this build cannot read them, which is no fault.
 void LeaveOut(const SceneAbout& about, const std::vector<std::string>& roots,
               const absl::Status& why, Console& console) {
   if (console.json()) return PassOver(about, why, console);
+  if (absl::IsUnimplemented(why)) {
+    console.Say(absl::StrCat(why.message(), "; the scene is left out"));
+    return;
+  }
   const auto missing = absl::c_find_if(
       about.needs, [&](const SceneFile& file) { return !FindSceneFile(file, roots).ok(); });
   const std::string by = missing == about.needs.end() ? "" : missing->brought_by;
@@ -265,7 +270,7 @@ absl::Status Demo(const DemoOptions& options, const Connector& connect, Interrup
   std::vector<Playable> scenes;
   for (const SceneAbout& scene : Scenes()) {
     if (!IsChosen(options, scene)) continue;
-    absl::StatusOr<std::vector<std::string>> files = FindSceneFiles(scene.needs, roots);
+    absl::StatusOr<std::vector<std::string>> files = FindWhatSceneNeeds(scene, roots);
     if (files.ok()) {
       scenes.push_back({&scene, *std::move(files)});
     } else {

@@ -55,6 +55,16 @@ absl::Status Dispatch(const Options& options, const Environment& environment,
     return WriteManual(*manual);
   if (const auto* playlist = std::get_if<PlaylistOptions>(&options.command))
     return PlayList(*playlist, connect, LocalWeekMinute, interrupt, console);
+  if (const auto* record = std::get_if<RecordOptions>(&options.command))
+    return Record(*record, connect, interrupt, console);
+  if (const auto* replay = std::get_if<ReplayOptions>(&options.command))
+    return Replay(*replay, connect, interrupt, std::cin, console);
+  if (const auto* input = std::get_if<InputOptions>(&options.command))
+    return Input(*input, connect, interrupt, console);
+  if (const auto* pipe = std::get_if<PipeOptions>(&options.command))
+    return Pipe(*pipe, connect, interrupt, STDIN_FILENO, console);
+  if (const auto* markers = std::get_if<MarkersOptions>(&options.command))
+    return FollowMarkers(*markers, connect, interrupt, console);
   absl::StatusOr<std::unique_ptr<Connection>> connected = connect();
   if (!connected.ok()) return connected.status();
   Connection& connection = **connected;
@@ -87,16 +97,6 @@ absl::Status Dispatch(const Options& options, const Environment& environment,
         if constexpr (std::is_same_v<Command, PatternOptions>)
           return Pattern(command, connection, console);
         if constexpr (std::is_same_v<Command, SetOptions>) return Set(command, connection, console);
-        if constexpr (std::is_same_v<Command, RecordOptions>)
-          return Record(command, connection, interrupt, console);
-        if constexpr (std::is_same_v<Command, ReplayOptions>)
-          return Replay(command, connection, interrupt, std::cin, console);
-        if constexpr (std::is_same_v<Command, InputOptions>)
-          return Input(command, connection, interrupt, console);
-        if constexpr (std::is_same_v<Command, PipeOptions>)
-          return Pipe(command, connection, interrupt, STDIN_FILENO, console);
-        if constexpr (std::is_same_v<Command, MarkersOptions>)
-          return FollowMarkers(command, connection, interrupt, console);
         return absl::OkStatus();
       },
       options.command);

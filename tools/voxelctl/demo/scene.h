@@ -36,11 +36,17 @@ struct SceneAbout {
   const char* seen;    // what is seen
   const char* source;  // where its data are from
   std::vector<SceneFile> needs;
+  bool needs_importers;  // reads a format that VOXELD_IMPORTERS adds
   // Reads and computes all that takes time; for any thread. An error is of the files.
   absl::StatusOr<std::unique_ptr<Scene>> (*make)(const SceneSettings& settings);
 };
 
 // In the order of kSceneNames, by these names.
 std::span<const SceneAbout> Scenes();
+
+// Returns: the files of SceneAbout::needs; Unimplemented with the option that adds what the scene needs, where this build lacks it;
+// NotFound with what brings the first missing file.
+absl::StatusOr<std::vector<std::string>> FindWhatSceneNeeds(const SceneAbout& scene,
+                                                            const std::vector<std::string>& roots);
 
 }  // namespace voxeld::voxelctl

@@ -12,7 +12,7 @@
 #include "tools/voxelctl/import/animation.h"
 #include "tools/voxelctl/import/assimp_scene.h"
 #include "tools/voxelctl/import/contained.h"
-#include "tools/voxelctl/import/importer.h"
+#include "tools/voxelctl/import/mesh_checks.h"
 #include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {

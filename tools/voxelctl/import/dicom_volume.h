@@ -9,7 +9,7 @@
 
 namespace voxeld::voxelctl {
 
-// All frames of one file as a volume. Without VOXELD_IMPORTERS both say what they would take.
+// All frames of one file as a volume.
 absl::StatusOr<Model> ReadDicomVolume(const SourceFile& file);
 
 // The slices in a folder, in the order in which they lie along their normal; of several series the one with the most, and said,

@@ -5,29 +5,16 @@
 #include <optional>
 #include <system_error>
 
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
-#include "tools/voxelctl/import/contained.h"
-#include "tools/voxelctl/import/dicom_check.h"
-#include "tools/voxelctl/import/dicom_volume.h"
 #include "tools/voxelctl/import/geojson.h"
 #include "tools/voxelctl/import/importer.h"
 #include "tools/voxelctl/import/json_text.h"
-#include "tools/voxelctl/import/las_points.h"
-#include "tools/voxelctl/import/mesh_beginning.h"
-#include "tools/voxelctl/import/mesh_checks.h"
-#include "tools/voxelctl/import/nifti_volume.h"
-#include "tools/voxelctl/import/nrrd_volume.h"
-#include "tools/voxelctl/import/pcd_points.h"
-#include "tools/voxelctl/import/pdb_molecule.h"
+#include "tools/voxelctl/import/more_formats.h"
 #include "tools/voxelctl/import/ply_header.h"
 #include "tools/voxelctl/import/ply_points.h"
 #include "tools/voxelctl/import/ply_realign.h"
-#include "tools/voxelctl/import/raw_volume.h"
-#include "tools/voxelctl/import/svg_drawing.h"
 #include "tools/voxelctl/import/text_points.h"
 #include "tools/voxelctl/import/vox_model.h"
-#include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -43,12 +30,7 @@ absl::StatusOr<Model> ReadMap(const SourceFile& file, bool globe) {
                              : ReadGeoJson(file, *document, globe);
 }
 
-absl::StatusOr<Model> ReadMesh(const SourceFile& file) {
-  if (absl::Status status = CheckMeshFile(file); !status.ok()) return status;
-  return NewMeshImporter()->Import(file);
-}
-
-absl::StatusOr<Model> ReadPly(const SourceFile& file) {
+absl::StatusOr<Model> ReadPly(const SourceFile& file, const ImportOptions& options) {
   const absl::StatusOr<PlyHeader> header = ParsePlyHeader(file);
   if (!header.ok()) {
     const absl::StatusOr<PlyHeader> unchecked = ParsePlyHeader(file, PlyCounts::kUnchecked);
@@ -64,44 +46,20 @@ absl::StatusOr<Model> ReadPly(const SourceFile& file) {
     return model;
   }
   const bool surfaces = header->Find("face") != nullptr || header->Find("tristrips") != nullptr;
-  return surfaces ? ReadMesh(file) : ReadPlyPoints(file, *header);
+  return surfaces ? ReadMoreFormats(file, options) : ReadPlyPoints(file, *header);
 }
 
 absl::StatusOr<Model> Read(const SourceFile& file, const ImportOptions& options) {
   const std::string& extension = file.extension;
-  if (extension == "obj" || extension == "stl" || extension == "gltf" || extension == "glb")
-    return ReadMesh(file);
-  if (extension == "ply") return ReadPly(file);
+  if (extension == "ply") return ReadPly(file, options);
   if (extension == "xyz" || extension == "txt" || extension == "asc" || extension == "pts" ||
       extension == "csv") {
     return ReadTextPoints(file);
   }
-  if (extension == "pcd") return ReadPcdPoints(file);
-  if (extension == "las" || extension == "laz") return ReadLasPoints(file);
   if (extension == "vox") return ReadVoxModel(file);
   if (extension == "json" || extension == "geojson" || extension == "topojson")
     return ReadMap(file, options.globe);
-  if (extension == "nii" || (extension == "gz" && absl::EndsWithIgnoreCase(file.path, ".nii.gz")))
-    return ReadNiftiVolume(file);
-  if (extension == "hdr" || extension == "img") return ReadNiftiVolume(file);
-  if (extension == "nrrd" || extension == "nhdr") return ReadNrrdVolume(file);
-  if (extension == "raw") return ReadRawVolume(file, options.raw);
-  if (extension == "pdb" || extension == "ent") return ReadPdbMolecule(file, options.style);
-  if (extension == "svg") return ReadSvgDrawing(file);
-  // Slices often have no extension, or what looks like one.
-  if (extension == "dcm" || LooksLikeDicom(file)) return ReadDicomVolume(file);
-  if (NewMeshImporter()->Reads(extension))
-    return ReadContained(file, [&file] { return ReadMesh(file); });
-  return FileError(
-      file,
-      extension.empty()
-          ? "its name has no extension"
-          : absl::StrCat("files of type .", EscapeForTerminal(extension), " are not read"),
-      "play reads meshes (.obj, .stl, .ply, .gltf, .glb, .off, .fbx, .3mf, .dae, "
-      ".blend, .ifc, .bvh and more), voxels (.vox), points (.ply, .pcd, "
-      ".las, .xyz, .txt, .asc, .pts, .csv), maps (.geojson, .topojson, .json), volumes (.nii, "
-      ".nii.gz, .hdr with .img, .nrrd, .nhdr, .raw, .dcm), molecules (.pdb, .ent) and drawings "
-      "(.svg)");
+  return ReadMoreFormats(file, options);
 }
 
 // What every reader promises, held to: a slip in a library must not reach the server.
@@ -145,21 +103,13 @@ absl::Status CheckModel(const SourceFile& file, const Model& model) {
 
 }  // namespace
 
-absl::Status CheckMeshFile(const SourceFile& file) {
-  const std::string& extension = file.extension;
-  if (extension == "obj") return CheckObj(file);
-  if (extension == "stl") return CheckStl(file);
-  if (extension == "gltf" || extension == "glb") return CheckGltf(file);
-  return CheckMeshBeginning(file);
-}
-
 absl::StatusOr<Model> ImportFile(const std::string& path, const ImportOptions& options) {
   std::error_code ignored;
   const bool folder = std::filesystem::is_directory(path, ignored);
   const absl::StatusOr<SourceFile> file =
       folder ? SourceFile{.path = path, .extension = {}, .bytes = {}} : ReadSourceFile(path);
   if (!file.ok()) return file.status();
-  absl::StatusOr<Model> model = folder ? ReadDicomFolder(path) : Read(*file, options);
+  absl::StatusOr<Model> model = folder ? ReadFolder(path) : Read(*file, options);
   if (!model.ok()) return model;
   const absl::Status status = CheckModel(*file, *model);
   if (!status.ok()) return status;

@@ -7,6 +7,9 @@
 
 namespace voxeld::voxelctl {
 
+// The check that a file has to pass before assimp sees it, by its extension.
+absl::Status CheckMeshFile(const SourceFile& file);
+
 // Wavefront OBJ: is text, has vertices, and no face, line or point
 // refers to a vertex that is not there.
 absl::Status CheckObj(const SourceFile& file);

@@ -88,8 +88,11 @@ std::string TallyText(const lights::Intake& intake) {
 
 }  // namespace
 
-absl::Status Input(const InputOptions& options, Connection& connection, Interrupt& interrupt,
+absl::Status Input(const InputOptions& options, const Connector& connect, Interrupt& interrupt,
                    Console& console) {
+  const absl::StatusOr<std::unique_ptr<Connection>> connected = connect();
+  if (!connected.ok()) return connected.status();
+  Connection& connection = **connected;
   const absl::StatusOr<LightMap> map = ChooseLights(options.lights, connection);
   if (!map.ok()) return map.status();
   sync::SystemClock clock;

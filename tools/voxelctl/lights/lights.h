@@ -12,12 +12,12 @@ namespace voxeld::voxelctl {
 // Takes in what comes over the network until an interrupt, which is no error, and puts up the newest picture whenever
 // the server has room. A lost connection is opened again. With --json a line when it listens, and one a second with
 // what became of every message and picture; the last at its end.
-absl::Status Input(const InputOptions& options, Connection& connection, Interrupt& interrupt,
+absl::Status Input(const InputOptions& options, const Connector& connect, Interrupt& interrupt,
                    Console& console);
 
 // Puts up picture after picture of `descriptor`, none left out, at the pace at which the server takes them or at the
 // options', until its end. InvalidArgument if that is within a picture. With --json one object at the end.
-absl::Status Pipe(const PipeOptions& options, Connection& connection, Interrupt& interrupt,
+absl::Status Pipe(const PipeOptions& options, const Connector& connect, Interrupt& interrupt,
                   int descriptor, Console& console);
 
 }  // namespace voxeld::voxelctl

@@ -42,8 +42,11 @@ absl::StatusOr<size_t> ReadWhole(int descriptor, std::vector<uint8_t>& bytes,
 
 }  // namespace
 
-absl::Status Pipe(const PipeOptions& options, Connection& connection, Interrupt& interrupt,
+absl::Status Pipe(const PipeOptions& options, const Connector& connect, Interrupt& interrupt,
                   int descriptor, Console& console) {
+  const absl::StatusOr<std::unique_ptr<Connection>> connected = connect();
+  if (!connected.ok()) return connected.status();
+  Connection& connection = **connected;
   const absl::StatusOr<LightMap> map = ChooseLights(options.lights, connection);
   if (!map.ok()) return map.status();
   client::Options asked;

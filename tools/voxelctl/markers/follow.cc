@@ -38,8 +38,11 @@ class FoxgloveFeed final : public markers::MarkerFeed {
 
 }  // namespace
 
-absl::Status FollowMarkers(const MarkersOptions& options, Connection& connection,
+absl::Status FollowMarkers(const MarkersOptions& options, const Connector& connect,
                            Interrupt& interrupt, Console& console) {
+  const absl::StatusOr<std::unique_ptr<Connection>> connected = connect();
+  if (!connected.ok()) return connected.status();
+  Connection& connection = **connected;
   const absl::StatusOr<markers::FoxgloveUrl> url = markers::ParseFoxgloveUrl(options.url);
   if (!url.ok()) return Escaped(url.status());
   absl::StatusOr<std::unique_ptr<markers::FoxgloveClient>> source =

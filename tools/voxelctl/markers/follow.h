@@ -11,7 +11,7 @@ namespace voxeld::voxelctl {
 
 // Until an interrupt, which is no error; Unavailable when either server goes. Each update is one commit. What cannot be read is
 // counted and told, and the rest goes on. With --json a line when it is connected, a line of counts at most each second while messages come, and one at the end.
-absl::Status FollowMarkers(const MarkersOptions& options, Connection& connection,
+absl::Status FollowMarkers(const MarkersOptions& options, const Connector& connect,
                            Interrupt& interrupt, Console& console);
 
 }  // namespace voxeld::voxelctl

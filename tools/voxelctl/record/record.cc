@@ -90,8 +90,11 @@ class Taping {
 
 }  // namespace
 
-absl::Status Record(const RecordOptions& options, Connection& connection, Interrupt& interrupt,
+absl::Status Record(const RecordOptions& options, const Connector& connect, Interrupt& interrupt,
                     Console& console) {
+  const absl::StatusOr<std::unique_ptr<Connection>> connected = connect();
+  if (!connected.ok()) return connected.status();
+  Connection& connection = **connected;
   auto recorder = recording::SceneRecorder::Create(options.file, VOXELD_VERSION);
   if (!recorder.ok()) {
     return {recorder.status().code(), EscapeForTerminal(recorder.status().message())};

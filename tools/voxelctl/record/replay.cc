@@ -161,8 +161,11 @@ class Run {
 
 }  // namespace
 
-absl::Status Replay(const ReplayOptions& options, Connection& connection, Interrupt& interrupt,
+absl::Status Replay(const ReplayOptions& options, const Connector& connect, Interrupt& interrupt,
                     std::istream& in, Console& console) {
+  const absl::StatusOr<std::unique_ptr<Connection>> connected = connect();
+  if (!connected.ok()) return connected.status();
+  Connection& connection = **connected;
   auto opened = recording::McapReader::Open(options.file);
   if (!opened.ok()) return Escaped(opened.status());
   recording::McapReader& reader = **opened;

@@ -8,7 +8,6 @@ namespace {
 
 using sync::kSecond;
 
-constexpr sync::TimeNs kAnswerLimit = kSecond;
 constexpr size_t kMostInMessage = 8;
 
 bool IsAnswerToEnd(const Event& event, uint64_t volume) {
@@ -104,7 +103,7 @@ std::string Session::Recent() const {
 }
 
 Event Session::AnswerToEnd(uint64_t volume, EventType type, const std::string& expected) {
-  Event answer = Await(expected, kAnswerLimit,
+  Event answer = Await(expected, kEventLimit,
                        [volume](const Event& event) { return IsAnswerToEnd(event, volume); });
   if (ok() && answer.type() != type) check().Fail(expected, Describe(answer));
   return answer;
@@ -128,7 +127,7 @@ void Session::ExpectAborted(uint64_t volume, Reason reason) {
 
 void Session::ExpectDropped(uint64_t volume, Reason reason) {
   const std::string expected = absl::StrCat("DROPPED of volume ", volume, ", reason ", reason);
-  const Event answer = Await(expected, kAnswerLimit, [&](const Event& event) {
+  const Event answer = Await(expected, kEventLimit, [&](const Event& event) {
     return event.type() == EventType::kDropped && VolumeOf(event) == volume;
   });
   if (ok() && answer.As<VolumeEvent>().reason != static_cast<uint32_t>(reason)) {
@@ -138,7 +137,7 @@ void Session::ExpectDropped(uint64_t volume, Reason reason) {
 
 Event Session::ExpectShown(uint64_t volume) {
   const std::string expected = absl::StrCat("SHOWN of volume ", volume);
-  Event answer = Await(expected, 2 * period_ + kAnswerLimit,
+  Event answer = Await(expected, 2 * period_ + kEventLimit,
                        [](const Event& event) { return event.type() == EventType::kShown; });
   if (ok() && VolumeOf(answer) != volume) check().Fail(expected, Describe(answer));
   return answer;
@@ -176,7 +175,7 @@ std::vector<PictureRun> Session::ExpectMissing(uint64_t volume) {
 ErrorEvent Session::ExpectError(ErrorCode code) {
   const auto number = static_cast<uint32_t>(code);
   const Event event =
-      Await(absl::StrCat("ERROR ", number, " (", ErrorCodeName(code), ")"), kAnswerLimit,
+      Await(absl::StrCat("ERROR ", number, " (", ErrorCodeName(code), ")"), kEventLimit,
             [number](const Event& e) {
               return e.type() == EventType::kError && e.As<ErrorEvent>().code == number;
             });

@@ -11,13 +11,12 @@ using sync::kSecond;
 namespace {
 
 constexpr size_t kReads = 16;  // interrupt transfers that wait at any time
-constexpr size_t kTransferBytes = size_t{64} << 10;
+constexpr size_t kVerifyTransferBytes = size_t{64} << 10;
 constexpr size_t kGatherBytes = size_t{256} << 10;
-constexpr sync::TimeNs kKeepaliveAfter = 70 * kMillisecond;
+constexpr sync::TimeNs kVerifyKeepaliveAfter = 70 * kMillisecond;
 // Without any progress of the device.
 constexpr sync::TimeNs kStuck = 3 * kSecond;
 constexpr sync::TimeNs kStatusInterval = 20 * kMillisecond;
-constexpr sync::TimeNs kAnswerLimit = kSecond;
 constexpr sync::TimeNs kLongestPeriod = 5 * kSecond;
 constexpr size_t kLargestVolume = size_t{256} << 20;
 constexpr size_t kMostEvents = 200'000;  // of one case
@@ -66,7 +65,7 @@ void Session::Restart() {
     return;
   }
   const auto any = [](const Event&) { return true; };
-  const Event first = Await("an event, READY, after START", kAnswerLimit, any);
+  const Event first = Await("an event, READY, after START", kEventLimit, any);
   if (ok() && first.type() != EventType::kReady) {
     check().Fail("the first event after START is READY", Describe(first), "4.5");
   }
@@ -143,7 +142,7 @@ void Session::Flush() {
 
 void Session::SendNow(std::span<const std::byte> bytes) {
   while (ok() && !bytes.empty()) {
-    size_t size = std::min(bytes.size(), kTransferBytes);
+    size_t size = std::min(bytes.size(), kVerifyTransferBytes);
     if (split_) size = std::min(split_(), size);
     if (size > 0) size = std::min(size, WaitForCredit());
     if (!ok()) return;
@@ -166,7 +165,7 @@ void Session::SendTransfer(std::span<const std::byte> bytes) {
 
 size_t Session::WaitForCredit() {
   const sync::TimeNs begin = probe_.Now();
-  if (!running_) return kTransferBytes;  // thrown away: outside a session there is no credit
+  if (!running_) return kVerifyTransferBytes;  // thrown away: outside a session there is no credit
   while (ok() && sent_ >= credit_limit_) {
     if (probe_.Now() - begin > kStuck) {
       check().Fail("credit for the bytes that were consumed",
@@ -183,7 +182,7 @@ size_t Session::WaitForCredit() {
 
 void Session::KeepAlive() {
   if (!running_ || !keepalive_ || !ok()) return;
-  if (probe_.Now() - last_sent_ < kKeepaliveAfter) return;
+  if (probe_.Now() - last_sent_ < kVerifyKeepaliveAfter) return;
   std::vector<std::byte> packet;
   if (credit_limit_ < sent_ + sizeof(PacketHeader)) return;
   writer_.Plain(packet, PacketType::kKeepalive, 0);
@@ -304,7 +303,7 @@ void Session::TakeEvent(std::span<const std::byte> bytes) {
                  "7");
   }
   // What is on its way may be consumed before its transfer is told to have ended.
-  const uint64_t most = sent_ + kTransferBytes + capabilities().fixed.receive_buffer;
+  const uint64_t most = sent_ + kVerifyTransferBytes + capabilities().fixed.receive_buffer;
   if (header.credit_limit > most) {
     check().Fail(absl::StrCat("credit_limit is at most the bytes sent and the receive buffer, ",
                               sent_ + capabilities().fixed.receive_buffer),
@@ -323,7 +322,7 @@ void Session::Step(sync::TimeNs until) {
   TakeEvents();
   KeepAlive();
   if (!ok()) return;
-  if (running_ && keepalive_) until = std::min(until, last_sent_ + kKeepaliveAfter);
+  if (running_ && keepalive_) until = std::min(until, last_sent_ + kVerifyKeepaliveAfter);
   // Without credit a keep-alive is not due, however late it is.
   if (until <= probe_.Now()) until = probe_.Now() + kMillisecond;
   probe_.Step(until);

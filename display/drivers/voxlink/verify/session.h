@@ -18,6 +18,9 @@
 
 namespace voxeld::display::voxlink {
 
+// How long a device may take to send an event that is due.
+inline constexpr sync::TimeNs kEventLimit = sync::kSecond;
+
 struct Event {
   EventHeader header{};
   std::vector<std::byte> body;

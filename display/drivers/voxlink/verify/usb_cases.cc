@@ -18,7 +18,7 @@ constexpr uint8_t kInterfaceDescriptor = 4;
 constexpr uint8_t kEndpointDescriptor = 5;
 constexpr uint8_t kBosDescriptor = 15;
 constexpr uint8_t kCompanionDescriptor = 48;
-constexpr uint16_t kMostConfiguration = 1024;
+constexpr uint16_t kMostDescriptorBytes = 1024;
 
 uint8_t U8(std::span<const std::byte> bytes, size_t at) {
   return at < bytes.size() ? std::to_integer<uint8_t>(bytes[at]) : 0;
@@ -49,7 +49,7 @@ using Parts = std::vector<std::vector<std::byte>>;
 // The descriptors of the configuration, one by one.
 Parts Configuration(Probe& probe) {
   const std::vector<std::byte> whole =
-      Descriptor(probe, kConfigurationDescriptor, kMostConfiguration, "a configuration", 9);
+      Descriptor(probe, kConfigurationDescriptor, kMostDescriptorBytes, "a configuration", 9);
   if (!probe.check().ok()) return {};
   if (U16(whole, 2) != whole.size()) {
     probe.check().Fail(absl::StrCat("wTotalLength ", whole.size(), ", as many bytes as come"),
@@ -131,7 +131,7 @@ void PacketSizes(Probe& probe) {
 
 void DescriptorLengths(Probe& probe) {
   const auto whole =
-      Descriptor(probe, kConfigurationDescriptor, kMostConfiguration, "a configuration", 9);
+      Descriptor(probe, kConfigurationDescriptor, kMostDescriptorBytes, "a configuration", 9);
   const auto head = Descriptor(probe, kConfigurationDescriptor, 9, "a configuration", 9);
   probe.check().Equal("bytes of a configuration descriptor of which 9 are asked for", size_t{9},
                       head.size());
@@ -146,7 +146,7 @@ void Bos(Probe& probe) {
   if (!probe.check().ok()) return;
   probe.check().Expect(usb == 0x0210 || usb >= 0x0300, "bcdUSB 0x0210, or 0x0300 and up",
                        absl::StrCat("0x", absl::Hex(usb, absl::kZeroPad4)));
-  const auto bos = Descriptor(probe, kBosDescriptor, kMostConfiguration, "a BOS", 5);
+  const auto bos = Descriptor(probe, kBosDescriptor, kMostDescriptorBytes, "a BOS", 5);
   if (!probe.check().ok()) return;
   static constexpr std::array<uint8_t, 28> kWant = {
       28,   0x10, 0x05, 0,    0xDF, 0x60, 0xDD, 0xD8, 0x89, 0x45, 0xC7, 0x4C, 0x9C, 0xD2,
@@ -168,7 +168,7 @@ void MsDescriptors(Probe& probe) {
                                   .request = kMsVendorCode,
                                   .value = 0,
                                   .index = kMsDescriptorIndex,
-                                  .length = kMostConfiguration});
+                                  .length = kMostDescriptorBytes});
   const std::vector<std::byte>& set = answer.data;
   if (!answer.ok() || set.size() != 162) {
     return probe.check().Fail("a descriptor set of 162 bytes", Describe(answer));

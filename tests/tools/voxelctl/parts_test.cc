@@ -1,0 +1,42 @@
+// Commands whose part this build leaves out.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+#include "tests/tools/voxelctl/commands_fixture.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+using testing::HasSubstr;
+
+class PartsTest : public CommandsTest {};
+
+TEST_F(PartsTest, ACommandThatIsNotBuiltNamesItsOptionInOneLine) {
+  for (const absl::string_view line : absl::StrSplit(VOXELD_NOT_BUILT, '|', absl::SkipEmpty())) {
+    const std::vector<std::string> words = absl::StrSplit(line, ' ');
+    // No server is needed for the answer.
+    std::vector<std::string> arguments = {"--server", "127.0.0.1:1"};
+    arguments.insert(arguments.end(), words.begin() + 1, words.end());
+    const Result result = RunAnywhere(arguments);
+    EXPECT_EQ(result.code, 1) << line;
+    EXPECT_THAT(result.err, HasSubstr("this build ")) << line;
+    EXPECT_THAT(result.err, HasSubstr(absl::StrCat("; configure with -D", words[0], "=ON")));
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_EQ(result.out, "") << line;
+  }
+}
+
+TEST_F(PartsTest, HelpListsEveryCommandInEveryBuild) {
+  const Result help = RunAnywhere({"--help"});
+  EXPECT_EQ(help.code, 0);
+  for (const char* command : {"record", "replay", "playlist", "input", "pipe", "markers", "play"})
+    EXPECT_THAT(help.out, HasSubstr(command));
+}
+
+}  // namespace
+}  // namespace voxeld::voxelctl

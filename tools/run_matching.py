@@ -1,0 +1,111 @@
+#!/usr/bin/env python3
+"""Builds and runs the tests whose names match a pattern.
+
+usage: run_matching.py BUILD PATTERN [--jobs N]
+PATTERN is a regular expression. It is compared with the names of ctest's tests (core_test, e2e.draw); where none matches, with the
+names of GoogleTest's cases (CoreEngine.EngineTimeout). Exit status 1 if a test fails or nothing matches.
+"""
+
+import argparse
+import json
+import os
+import re
+import subprocess
+import sys
+
+CASE = re.compile(r"^\s*(?:TYPED_)?TEST(?:_F|_P)?\(\s*(\w+)\s*,\s*(\w+)\s*\)", re.MULTILINE)
+
+
+def tests_of(build):
+    listed = subprocess.run(["ctest", "--test-dir", build, "--show-only=json-v1"], capture_output=True, text=True, check=True)
+    return json.loads(listed.stdout)["tests"]
+
+
+def targets_of(build, tests):
+    """The targets to build: the programs that the tests run, or what scripts use."""
+    programs = os.path.realpath(os.path.join(build, "bin"))
+    targets = set()
+    for test in tests:
+        words = test.get("command", [])
+        properties = {entry["name"]: entry["value"] for entry in test.get("properties", [])}
+        words = words + [word for setting in properties.get("ENVIRONMENT", []) for word in re.split(r"[=:]", setting)]
+        found = {os.path.basename(word) for word in words if os.path.realpath(word).startswith(programs + os.sep)}
+        targets |= found
+        if not any(word.startswith(programs + "/tests/") for word in test.get("command", [])[:1]):
+            targets |= {"python_client"} if any("voxeld-" in word and word.endswith(".whl") for word in words) else set()
+    return sorted(targets)
+
+
+def programs_with(build, case_pattern):
+    """Test programs by the names of the cases in their sources, with the cases that match."""
+    with open(os.path.join(build, "compile_commands.json"), encoding="utf-8") as file:
+        entries = json.load(file)
+    programs = {}
+    for entry in entries:
+        target = re.search(r"CMakeFiles/(\w+)\.dir/", entry["output"])
+        if target is None or "/tests/" not in "/" + entry["output"]:
+            continue
+        paths = [entry["file"]]
+        if "/Unity/" in entry["file"] and os.path.exists(entry["file"]):
+            with open(entry["file"], encoding="utf-8") as file:
+                paths = re.findall(r'#include "([^"]+)"', file.read())
+        for path in paths:
+            if not os.path.exists(path) or not path.endswith(".cc"):
+                continue
+            with open(path, encoding="utf-8") as file:
+                names = [".".join(found) for found in CASE.findall(file.read())]
+            matching = [name for name in names if case_pattern.search(name)]
+            if matching:
+                programs.setdefault(target.group(1), set()).update(matching)
+    return programs
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("build")
+    parser.add_argument("pattern")
+    parser.add_argument("--jobs", default=str(os.cpu_count()))
+    arguments = parser.parse_args()
+    try:
+        pattern = re.compile(arguments.pattern)
+    except re.error as error:
+        print(f"tools/test: '{arguments.pattern}' is not a valid regular expression: {error}", file=sys.stderr)
+        return 2
+
+    def make(targets):
+        return subprocess.run(["cmake", "--build", arguments.build, "-j", arguments.jobs, "--target", *targets], check=False).returncode
+
+    tests = [test for test in tests_of(arguments.build) if pattern.search(test["name"])]
+    if tests:
+        targets = targets_of(arguments.build, tests)
+        if targets and make(targets) != 0:
+            return 1
+        command = ["ctest", "--test-dir", arguments.build, "-j", arguments.jobs, "-R", arguments.pattern, "--output-on-failure", "--no-tests=error"]
+        return 1 if subprocess.run(command, check=False).returncode else 0
+
+    programs = programs_with(arguments.build, pattern)
+    if not programs:
+        print(f"tools/test: no test and no case matches '{arguments.pattern}'; tools/test --list prints the tests", file=sys.stderr)
+        return 1
+    # Cases of a library that several programs link are in none of its own.
+    runnable = {test["command"][0] for test in tests_of(arguments.build) if test.get("command")}
+    runnable = {os.path.basename(path): path for path in runnable}
+    named = {name: cases for name, cases in programs.items() if name in runnable}
+    if not named:
+        print(f"tools/test: '{arguments.pattern}' matches cases of {', '.join(sorted(programs))}, which several programs run;"
+              " name one of these: tools/test conformance", file=sys.stderr)
+        return 1
+    if make(sorted(named)) != 0:
+        return 1
+    status = 0
+    for name, cases in sorted(named.items()):
+        # Instances of value-parameterised and typed cases have something before or after these names.
+        wanted = ":".join(f"{case}:*/{case}/*:{case.split('.')[0]}/*.{case.split('.')[1]}:*/{case.split('.')[0]}/*.{case.split('.')[1]}"
+                          for case in sorted(cases))
+        folder = os.path.dirname(runnable[name])
+        status |= subprocess.run([runnable[name], f"--gtest_filter={wanted}"], cwd=folder, check=False).returncode
+    return 1 if status else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

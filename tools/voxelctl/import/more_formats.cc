@@ -1,0 +1,74 @@
+#include "tools/voxelctl/import/more_formats.h"
+
+#include <assimp/Importer.hpp>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "tools/voxelctl/import/assimp_scene.h"
+#include "tools/voxelctl/import/contained.h"
+#include "tools/voxelctl/import/dicom_check.h"
+#include "tools/voxelctl/import/dicom_volume.h"
+#include "tools/voxelctl/import/las_points.h"
+#include "tools/voxelctl/import/mesh_beginning.h"
+#include "tools/voxelctl/import/mesh_checks.h"
+#include "tools/voxelctl/import/nifti_volume.h"
+#include "tools/voxelctl/import/nrrd_volume.h"
+#include "tools/voxelctl/import/pcd_points.h"
+#include "tools/voxelctl/import/svg_drawing.h"
+#include "tools/voxelctl/text/escape.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+absl::StatusOr<Model> ReadMesh(const SourceFile& file) {
+  if (absl::Status status = CheckMeshFile(file); !status.ok()) return status;
+  Assimp::Importer importer;
+  const absl::StatusOr<const aiScene*> scene = LoadScene(file, false, &importer);
+  if (!scene.ok()) return scene.status();
+  return ModelOf(file, **scene, nullptr);
+}
+
+}  // namespace
+
+absl::Status CheckImporters(absl::string_view) { return absl::OkStatus(); }
+
+absl::Status CheckMeshFile(const SourceFile& file) {
+  const std::string& extension = file.extension;
+  if (extension == "obj") return CheckObj(file);
+  if (extension == "stl") return CheckStl(file);
+  if (extension == "gltf" || extension == "glb") return CheckGltf(file);
+  return CheckMeshBeginning(file);
+}
+
+absl::StatusOr<Model> ReadMoreFormats(const SourceFile& file, const ImportOptions& options) {
+  const std::string& extension = file.extension;
+  if (extension == "obj" || extension == "stl" || extension == "ply" || extension == "gltf" ||
+      extension == "glb")
+    return ReadMesh(file);
+  if (extension == "pcd") return ReadPcdPoints(file);
+  if (extension == "las" || extension == "laz") return ReadLasPoints(file);
+  if (extension == "nii" || (extension == "gz" && absl::EndsWithIgnoreCase(file.path, ".nii.gz")))
+    return ReadNiftiVolume(file);
+  if (extension == "hdr" || extension == "img") return ReadNiftiVolume(file);
+  if (extension == "nrrd" || extension == "nhdr") return ReadNrrdVolume(file);
+  if (extension == "raw") return ReadRawVolume(file, options.raw);
+  if (extension == "pdb" || extension == "ent") return ReadPdbMolecule(file, options.style);
+  if (extension == "svg") return ReadSvgDrawing(file);
+  // Slices often have no extension, or what looks like one.
+  if (extension == "dcm" || LooksLikeDicom(file)) return ReadDicomVolume(file);
+  if (AssimpReads(extension)) return ReadContained(file, [&file] { return ReadMesh(file); });
+  return FileError(
+      file,
+      extension.empty()
+          ? "its name has no extension"
+          : absl::StrCat("files of type .", EscapeForTerminal(extension), " are not read"),
+      "play reads meshes (.obj, .stl, .ply, .gltf, .glb, .off, .fbx, .3mf, .dae, "
+      ".blend, .ifc, .bvh and more), voxels (.vox), points (.ply, .pcd, "
+      ".las, .xyz, .txt, .asc, .pts, .csv), maps (.geojson, .topojson, .json), volumes (.nii, "
+      ".nii.gz, .hdr with .img, .nrrd, .nhdr, .raw, .dcm), molecules (.pdb, .ent) and drawings "
+      "(.svg)");
+}
+
+absl::StatusOr<Model> ReadFolder(const std::string& path) { return ReadDicomFolder(path); }
+
+}  // namespace voxeld::voxelctl
