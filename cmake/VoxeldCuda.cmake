@@ -1,8 +1,9 @@
 # Finds CUDA by itself, also where nvcc is not on the PATH. Sets VOXELD_HAVE_CUDA.
 #
-# VOXELD_CUDA: AUTO takes it if it is there, ON asks for it, OFF leaves it out.
-# VOXELD_HASTY: kernels are compiled in a tenth of the time and run several times slower: for machines without a GPU,
-# where all that can be seen of them is that they compile and link.
+# VOXELD_CUDA: AUTO builds the CUDA engine where there are nvcc and a GPU, ON wherever nvcc is, OFF leaves it out.
+# VOXELD_CUDA_ARCHITECTURES: what its kernels are compiled for. Devices other than Hopper compile the PTX of the lowest
+# compute capability that the engine accepts (Ampere): blocks of threads of those before it lack the shared memory.
+set(VOXELD_CUDA_ARCHITECTURES "80-virtual;90-real" CACHE STRING "CUDA architectures, as CMAKE_CUDA_ARCHITECTURES names them")
 set(VOXELD_HAVE_CUDA OFF)
 if(VOXELD_CUDA STREQUAL "OFF")
   message(STATUS "CUDA engine: left out (VOXELD_CUDA=OFF)")
@@ -15,19 +16,27 @@ if(NOT CMAKE_CUDA_COMPILER)
     set(CMAKE_CUDA_COMPILER ${VOXELD_NVCC})
   endif()
 endif()
-if(NOT CMAKE_CUDA_COMPILER)
-  if(VOXELD_CUDA STREQUAL "AUTO")
-    message(STATUS "CUDA engine: no nvcc found; this build has the CPU engine alone")
+if(VOXELD_CUDA STREQUAL "AUTO")
+  # What NVIDIA's kernel driver makes for each GPU; a container may have the device alone.
+  file(GLOB gpus /proc/driver/nvidia/gpus/* /dev/nvidia[0-9]*)
+  if(NOT gpus)
+    if(CMAKE_CUDA_COMPILER)
+      message(STATUS "CUDA engine: not built, because no GPU is visible here; -DVOXELD_CUDA=ON or the preset 'cuda' builds it")
+    else()
+      message(STATUS "CUDA engine: not built, because there are no GPU and no nvcc here")
+    endif()
     return()
   endif()
-  message(FATAL_ERROR "VOXELD_CUDA=ON, but there is no nvcc on the PATH, in CUDA_PATH or under /usr/local/cuda")
+  if(NOT CMAKE_CUDA_COMPILER)
+    message(STATUS "CUDA engine: not built, because there is a GPU but no nvcc; install the CUDA Toolkit (12 or later) and configure again")
+    return()
+  endif()
 endif()
-# Hopper natively, others by way of PTX: the generator from Turing on, the engine from Ampere on, whose blocks of threads
-# have the shared memory that it draws in.
-set(CMAKE_CUDA_ARCHITECTURES 75-virtual 90-real)
-if(VOXELD_HASTY)
-  set(CMAKE_CUDA_ARCHITECTURES 90-real)
+if(NOT CMAKE_CUDA_COMPILER)
+  message(FATAL_ERROR "VOXELD_CUDA=ON, but there is no nvcc on the PATH, in CUDA_PATH or under /usr/local/cuda; "
+                      "install the CUDA Toolkit (12 or later), or configure with -DVOXELD_CUDA=OFF")
 endif()
+set(CMAKE_CUDA_ARCHITECTURES ${VOXELD_CUDA_ARCHITECTURES})
 set(CMAKE_CUDA_RUNTIME_LIBRARY Static)
 if(VOXELD_CCACHE)
   set(CMAKE_CUDA_COMPILER_LAUNCHER ${VOXELD_CCACHE})
@@ -37,14 +46,6 @@ enable_language(CUDA)
 if(NOT CMAKE_CUDA20_STANDARD_COMPILE_OPTION)
   set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION "-std=c++20")
   set(CMAKE_CUDA20_EXTENSION_COMPILE_OPTION "-std=c++20")
-endif()
-set(VOXELD_CUDA_HASTE)
-if(VOXELD_HASTY)
-  if(CMAKE_CUDA_COMPILER_VERSION VERSION_GREATER_EQUAL 13.0)
-    set(VOXELD_CUDA_HASTE --Ofast-compile=max)
-  else()
-    set(VOXELD_CUDA_HASTE -Xptxas=-O0)
-  endif()
 endif()
 find_package(CUDAToolkit REQUIRED)
 set(VOXELD_HAVE_CUDA ON)

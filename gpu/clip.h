@@ -28,8 +28,8 @@
 
 #include <cstdint>
 
-#include "gpu/delta.h"
 #include "gpu/primitives/fixed.h"
+#include "gpu/records.h"
 
 namespace voxeld::gpu {
 

@@ -28,8 +28,8 @@ namespace {
 using gpu::implicit::Graph;
 using gpu::implicit::Vector;
 
-std::string Show(const Vector& v) {
-  return absl::StrCat("(", wire::Show(v.x), ", ", wire::Show(v.y), ", ", wire::Show(v.z), ")");
+std::string ShowVector(const Vector& v) {
+  return absl::StrCat("(", Show(v.x), ", ", Show(v.y), ", ", Show(v.z), ")");
 }
 
 template <typename Shape>
@@ -76,7 +76,7 @@ MaybeFault ToField(const FieldPath& path, const ShapeContext& context, Graph& gr
     for (const double reach : {made.min[a] - shell, made.max[a] + shell}) {
       if (CheckFloat(path, reach).has_value()) {
         return Fault{path.ToString(), Reason::kOutOfRange,
-                     absl::StrCat("reaches to ", wire::Show(reach),
+                     absl::StrCat("reaches to ", Show(reach),
                                   ", beyond what single precision holds; give it a transform")};
       }
     }
@@ -104,7 +104,7 @@ MaybeFault ToShape(const FieldPath& path, const v1::Arrow& in, const ShapeContex
   const double length = gpu::implicit::Length(arrow.end - arrow.start);
   if (!(length > 0)) {
     return Fault{FieldPath(path, "end").ToString(), Reason::kInvalidValue,
-                 absl::StrCat("is ", Show(arrow.end), " as start is; give another point")};
+                 absl::StrCat("is ", ShowVector(arrow.end), " as start is; give another point")};
   }
   const FieldPath head_length(path, "head_length");
   if (auto fault = CheckNotNegative(FieldPath(path, "shaft_radius"), in.shaft_radius()))
@@ -113,8 +113,8 @@ MaybeFault ToShape(const FieldPath& path, const v1::Arrow& in, const ShapeContex
   if (auto fault = CheckNotNegative(FieldPath(path, "head_radius"), in.head_radius())) return fault;
   if (in.head_length() > length * (1 + 1e-6)) {
     return Fault{head_length.ToString(), Reason::kInvalidValue,
-                 absl::StrCat("is ", wire::Show(in.head_length()), "; the arrow is ",
-                              wire::Show(length), " long: give no more")};
+                 absl::StrCat("is ", Show(in.head_length()), "; the arrow is ", Show(length),
+                              " long: give no more")};
   }
   arrow.shaft_radius = in.shaft_radius();
   arrow.head_length = in.head_length() == 0 ? length / 4 : in.head_length();
@@ -139,13 +139,12 @@ MaybeFault ToShape(const FieldPath& path, const v1::Cone& in, const ShapeContext
   }
   if (!(gpu::implicit::Length(cone.end - cone.start) > 0)) {
     return Fault{FieldPath(path, "end").ToString(), Reason::kInvalidValue,
-                 absl::StrCat("is ", Show(cone.end), " as start is; give another point")};
+                 absl::StrCat("is ", ShowVector(cone.end), " as start is; give another point")};
   }
   if (cone.OneHoldsTheOther()) {
-    return Fault{
-        end_radius.ToString(), Reason::kInvalidValue,
-        absl::StrCat("is ", wire::Show(in.end_radius()), " beside ", wire::Show(in.start_radius()),
-                     ", so that one end's sphere holds the other's; give a sphere")};
+    return Fault{end_radius.ToString(), Reason::kInvalidValue,
+                 absl::StrCat("is ", Show(in.end_radius()), " beside ", Show(in.start_radius()),
+                              ", so that one end's sphere holds the other's; give a sphere")};
   }
   bool done;
   if (auto fault = ToLookOrFrame(path, in, context, cone, out, &done)) return fault;
@@ -161,7 +160,7 @@ MaybeFault ToShape(const FieldPath& path, const v1::Disc& in, const ShapeContext
     if (auto fault = ToVector(normal, in.normal(), &disc.normal)) return fault;
     if (!(gpu::implicit::Length(disc.normal) > 0)) {
       return Fault{normal.ToString(), Reason::kInvalidValue,
-                   absl::StrCat("is ", Show(disc.normal), "; give a direction")};
+                   absl::StrCat("is ", ShowVector(disc.normal), "; give a direction")};
     }
   }
   if (auto fault = CheckPositive(FieldPath(path, "radius"), in.radius())) return fault;
@@ -169,8 +168,8 @@ MaybeFault ToShape(const FieldPath& path, const v1::Disc& in, const ShapeContext
   if (auto fault = CheckNotNegative(inner, in.inner_radius())) return fault;
   if (in.inner_radius() >= in.radius()) {
     return Fault{inner.ToString(), Reason::kInvalidValue,
-                 absl::StrCat("is ", wire::Show(in.inner_radius()), "; give less than radius, ",
-                              wire::Show(in.radius()))};
+                 absl::StrCat("is ", Show(in.inner_radius()), "; give less than radius, ",
+                              Show(in.radius()))};
   }
   bool done;
   if (auto fault = ToLookOrFrame(path, in, context, disc, out, &done)) return fault;
@@ -201,8 +200,8 @@ MaybeFault ToShape(const FieldPath& path, const v1::Parallelepiped& in, const Sh
   if (!(shape.volume() > kLeastSine * product)) {
     return Fault{
         FieldPath(path, "edge_c").ToString(), Reason::kInvalidValue,
-        absl::StrCat("is ", Show(shape.edges[2]), " beside ", Show(shape.edges[0]), " and ",
-                     Show(shape.edges[1]), "; the three edges must span a volume")};
+        absl::StrCat("is ", ShowVector(shape.edges[2]), " beside ", ShowVector(shape.edges[0]),
+                     " and ", ShowVector(shape.edges[1]), "; the three edges must span a volume")};
   }
   bool done;
   if (auto fault = ToLookOrFrame(path, in, context, shape, out, &done)) return fault;
@@ -218,7 +217,7 @@ MaybeFault ToShape(const FieldPath& path, const v1::Patch& in, const ShapeContex
   const double product = gpu::implicit::Length(patch.u) * gpu::implicit::Length(patch.v);
   if (!(gpu::implicit::Length(gpu::implicit::Cross(patch.u, patch.v)) > kLeastSine * product)) {
     return Fault{FieldPath(path, "edge_b").ToString(), Reason::kInvalidValue,
-                 absl::StrCat("is ", Show(patch.v), " beside ", Show(patch.u),
+                 absl::StrCat("is ", ShowVector(patch.v), " beside ", ShowVector(patch.u),
                               "; the two edges must span an area")};
   }
   bool done;
@@ -246,8 +245,8 @@ MaybeFault ToShape(const FieldPath& path, const v1::Polygon& in, const ShapeCont
   constexpr double kMostUneven = 1e-3;
   if (const double uneven = polygon.Unevenness(normal); uneven > kMostUneven * extent) {
     return Fault{at.ToString(), Reason::kInvalidValue,
-                 absl::StrCat("are ", wire::Show(uneven), " away from a plane; give points within ",
-                              wire::Show(kMostUneven * extent), ", or a mesh")};
+                 absl::StrCat("are ", Show(uneven), " away from a plane; give points within ",
+                              Show(kMostUneven * extent), ", or a mesh")};
   }
   bool done;
   if (auto fault = ToLookOrFrame(path, in, context, polygon, out, &done)) return fault;

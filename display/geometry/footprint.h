@@ -43,19 +43,11 @@
 #include "absl/status/status.h"
 #include "display/api/geometry.h"
 #include "display/api/slice_frame.h"
+#include "display/geometry/footprint_entry.h"
 
 namespace voxeld::display {
 
 class Corrector;  // display/geometry/corrector.h
-
-inline constexpr uint16_t kFullWeight = 255;
-inline constexpr uint16_t kOwnWeight = 128;  // at least, of the voxel that holds a pixel's centre
-
-struct FootprintEntry {
-  uint16_t x = 0, y = 0, z = 0;
-  uint16_t weight = kFullWeight;  // 1 to 255
-  bool operator==(const FootprintEntry&) const = default;
-};
 
 // Compressed rows: list r is entries[begin[r] .. begin[r+1]),
 // ascending by (z, y, x), each voxel once.

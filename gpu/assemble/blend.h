@@ -1,7 +1,7 @@
 // How layers combine into what is shown. Host and device.
 #pragma once
 
-#include "gpu/delta.h"
+#include "gpu/records.h"
 #include "gpu/word.h"
 
 namespace voxeld::gpu {

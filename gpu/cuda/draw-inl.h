@@ -41,11 +41,23 @@ static_assert(offsetof(DrawScratch<DrawWhat::kAll>, pairs) == sizeof(RegionScrat
 // So that a multiprocessor has kDrawBlocks of them; the system keeps 1 KB of each.
 static_assert(sizeof(DrawScratch<DrawWhat::kAll>) <= (228 / kDrawBlocks - 1) * 1024);
 
+// Where a kernel writes to. The kernels for thin lines, points and small triangles are compiled for each destination.
+// The one for anything is many times larger than what writes a region out: it is compiled once and asks for each region.
 template <DrawTo kTo>
-__device__ void Flush(const DrawView& view, const RegionPlace& place, RegionScratch& scratch) {
-  if constexpr (kTo == DrawTo::kTiles) FlushToTiles(view, place, scratch);
-  if constexpr (kTo == DrawTo::kPictures) FlushToPictures(view, place, scratch);
-  if constexpr (kTo == DrawTo::kReader) FlushToReader(view, place, scratch);
+struct FixedOutput {
+  __device__ constexpr DrawTo to() const { return kTo; }
+};
+struct AnyOutput {
+  DrawTo value;
+  __device__ DrawTo to() const { return value; }
+};
+
+template <class Output>
+__device__ void Flush(const DrawView& view, const Output& output, const RegionPlace& place,
+                      RegionScratch& scratch) {
+  if (output.to() == DrawTo::kTiles) return FlushToTiles(view, place, scratch);
+  if (output.to() == DrawTo::kPictures) return FlushToPictures(view, place, scratch);
+  FlushToReader(view, place, scratch);
 }
 
 // What is to be done with the layer that was found, and which is wanted next. One with a mask is found three times: it has
@@ -173,12 +185,12 @@ __device__ void RaiseLayer(const DrawView& view, DrawScratch<kWhat>& all) {
     PairScratch& pairs = all.pairs;
     if (threadIdx.x == 0) pairs.heavy_count = pairs.small_count = pairs.small_taken = 0;
     __syncthreads();
-    DrawPairs(view, all.rows, scratch, pairs);
+    DrawPairs(view, all.rows, pairs);
     for (uint32_t t = 0; t < kRegionTiles && view.unlisted.items != 0; ++t) {
       const uint32_t tile = all.rows.tile[t];
       if (tile != kAllLanes) DrawUnlisted(view, tile, all.rows.owned, scratch, pairs);
     }
-    if (pairs.listed() != 0) DrawHeavy(view.table, view.volume.grid, scratch.words, pairs);
+    if (pairs.listed() != 0) DrawHeavy(view.table, view.volume.grid);
   }
 }
 
@@ -235,9 +247,9 @@ __device__ void DrawLayers(const DrawView& view, const RegionPlace& place,
   }
 }
 
-template <DrawWhat kWhat, DrawTo kTo>
+template <DrawWhat kWhat, class Output>
 __global__ void __launch_bounds__(kDrawThreads, kDrawBlocks)
-    DrawRegionsKernel(const __grid_constant__ DrawView view) {
+    DrawRegionsKernel(const __grid_constant__ DrawView view, const Output output) {
   DrawScratch<kWhat>& all = *reinterpret_cast<DrawScratch<kWhat>*>(SharedMemory());
   RegionScratch& scratch = all.region;
   Counters& counters = *view.volume.counters;
@@ -245,7 +257,7 @@ __global__ void __launch_bounds__(kDrawThreads, kDrawBlocks)
   for (uint32_t i = threadIdx.x; i < kRegionVoxels; i += kDrawThreads) {
     scratch.words[i] = 0;
   }
-  if constexpr (kTo == DrawTo::kPictures) {
+  if (output.to() == DrawTo::kPictures) {
     if (threadIdx.x < 64 && view.packed.slices.finish.format == display::PixelFormat::kBitPlanes) {
       scratch.least[threadIdx.x] = view.packed.least[threadIdx.x];
     }
@@ -281,7 +293,7 @@ __global__ void __launch_bounds__(kDrawThreads, kDrawBlocks)
       DrawLayers<kWhat>(view, RegionPlace(view, scratch), all);
     }
     ask_ahead();
-    Flush<kTo>(view, RegionPlace(view, scratch), scratch);
+    Flush(view, output, RegionPlace(view, scratch), scratch);
     if (threadIdx.x == 0) {
       scratch.region = region_after;
       scratch.place = place_after;
@@ -292,14 +304,15 @@ __global__ void __launch_bounds__(kDrawThreads, kDrawBlocks)
   }
 }
 
-template <DrawWhat kWhat, DrawTo kTo>
-cudaError_t DrawRegionsTo(const DrawView& view, uint32_t multiprocessors, cudaStream_t stream) {
+template <DrawWhat kWhat, class Output>
+cudaError_t DrawRegionsTo(const DrawView& view, const Output& output, uint32_t multiprocessors,
+                          cudaStream_t stream) {
   constexpr int kShared = sizeof(DrawScratch<kWhat>);
   const cudaError_t error = cudaFuncSetAttribute(
-      DrawRegionsKernel<kWhat, kTo>, cudaFuncAttributeMaxDynamicSharedMemorySize, kShared);
+      DrawRegionsKernel<kWhat, Output>, cudaFuncAttributeMaxDynamicSharedMemorySize, kShared);
   if (error != cudaSuccess) return error;
   const uint32_t blocks = Min(view.regions.count(), kDrawBlocks * multiprocessors);
-  DrawRegionsKernel<kWhat, kTo><<<blocks, kDrawThreads, kShared, stream>>>(view);
+  DrawRegionsKernel<kWhat, Output><<<blocks, kDrawThreads, kShared, stream>>>(view, output);
   return cudaGetLastError();
 }
 
@@ -308,11 +321,11 @@ cudaError_t DrawRegionsOf(const DrawView& view, DrawTo to, uint32_t multiprocess
                           cudaStream_t stream) {
   switch (to) {
     case DrawTo::kTiles:
-      return DrawRegionsTo<kWhat, DrawTo::kTiles>(view, multiprocessors, stream);
+      return DrawRegionsTo<kWhat>(view, FixedOutput<DrawTo::kTiles>(), multiprocessors, stream);
     case DrawTo::kPictures:
-      return DrawRegionsTo<kWhat, DrawTo::kPictures>(view, multiprocessors, stream);
+      return DrawRegionsTo<kWhat>(view, FixedOutput<DrawTo::kPictures>(), multiprocessors, stream);
     case DrawTo::kReader:
-      return DrawRegionsTo<kWhat, DrawTo::kReader>(view, multiprocessors, stream);
+      return DrawRegionsTo<kWhat>(view, FixedOutput<DrawTo::kReader>(), multiprocessors, stream);
   }
   return cudaErrorInvalidValue;
 }

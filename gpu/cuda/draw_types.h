@@ -66,7 +66,6 @@ struct DrawView {
   // Where several layers are drawn: for each block of threads, colours of a region's voxels. Null: of one.
   uint32_t* below = nullptr;
 };
-// Of devices of compute capability 7.0 and later, since CUDA 12.1.
 static_assert(sizeof(DrawView) <= 32764, "arguments have 32 KB");
 
 // Regions that were picked from a list: how many, and the box of their blocks.

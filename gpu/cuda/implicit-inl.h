@@ -152,22 +152,24 @@ static __device__ __noinline__ implicit::BoxState ImplicitState(const ImplicitTi
   if (tile.is_shell()) state.none = state.none && implicit::Abs(p).lo > tile.reach;
   return state;
 }
-// If it is bounded, the word of a voxel of the volume; else 0.
-static __device__ __noinline__ uint32_t ImplicitWord(const implicit::Field& field,
-                                                     uint32_t priority, bool erase, int32_t x,
-                                                     int32_t y, int32_t z) {
-  float q[3] = {};
-  if (!field.is_plain()) field.CoordinatesOf(x, y, z, q);
-  if (!field.IsBounded(q)) return 0;
-  return MakeWord(priority, erase, field.ColorAt(q));
-}
-
+// The word of a voxel of the volume.
 static __device__ __noinline__ uint32_t ImplicitColor(const implicit::Field& field,
                                                       uint32_t priority, bool erase, int32_t x,
                                                       int32_t y, int32_t z) {
-  float q[3];
-  field.CoordinatesOf(x, y, z, q);
+  float q[3] = {};
+  if (!field.is_uniform()) field.CoordinatesOf(x, y, z, q);
   return MakeWord(priority, erase, field.ColorAt(q));
+}
+// The same if the shape's bound holds the voxel; else 0.
+static __device__ __noinline__ uint32_t ImplicitWord(const implicit::Field& field,
+                                                     uint32_t priority, bool erase, int32_t x,
+                                                     int32_t y, int32_t z) {
+  if (field.is_bounded()) {
+    float q[3];
+    field.CoordinatesOf(x, y, z, q);
+    if (!field.IsBounded(q)) return 0;
+  }
+  return ImplicitColor(field, priority, erase, x, y, z);
 }
 
 // Finds out which parts have anything; false if none has. By the whole block.

@@ -1,18 +1,12 @@
 // Regions with anything in them; which regions are dirty; voxels for who asks.
+
+// Here intervals serve implicit shapes for whose voxels there is no room (implicit-inl.h).
+#define VOXELD_INTERVALS_OUT_OF_LINE
 #include "gpu/cuda/draw-inl.h"
 #include "gpu/cuda/draw_kernels.h"
 #include "gpu/cuda/items-inl.h"
 
 namespace voxeld::gpu::cuda {
-
-// Each is compiled by itself (kernels_draw_pictures.cu and its like): they take long.
-extern template cudaError_t DrawRegionsTo<DrawWhat::kAll, DrawTo::kTiles>(const DrawView&, uint32_t,
-                                                                          cudaStream_t);
-extern template cudaError_t DrawRegionsTo<DrawWhat::kAll, DrawTo::kPictures>(const DrawView&,
-                                                                             uint32_t,
-                                                                             cudaStream_t);
-extern template cudaError_t DrawRegionsTo<DrawWhat::kAll, DrawTo::kReader>(const DrawView&,
-                                                                           uint32_t, cudaStream_t);
 
 namespace {
 
@@ -96,7 +90,7 @@ cudaError_t PickRegions(const DrawView& view, const RegionGrid& within, uint32_t
 
 cudaError_t DrawAll(const DrawView& view, DrawTo to, uint32_t multiprocessors,
                     cudaStream_t stream) {
-  return DrawRegionsOf<DrawWhat::kAll>(view, to, multiprocessors, stream);
+  return DrawRegionsTo<DrawWhat::kAll>(view, AnyOutput{to}, multiprocessors, stream);
 }
 
 size_t DrawShared() { return sizeof(DrawScratch<DrawWhat::kAll>); }

@@ -37,31 +37,38 @@ __device__ inline Box3 RegionAround(const TileGrid& grid, uint32_t tile) {
   return box;
 }
 
-// A pair's voxels in `box`, raised into the region's words.
+// Raises an item's voxels into the region's words. One type for all primitives, so that they share what they have in
+// common, as lines; and it holds its state itself, so that this stays in registers where a function has a copy.
+class RaiseVoxel {
+ public:
+  __device__ explicit RaiseVoxel(const TableEntry& entry)
+      : priority_(entry.priority),
+        erase_(entry.erase != 0),
+        word_(MakeWord(priority_, erase_, 0)) {}
+  __device__ void operator()(int32_t x, int32_t y, int32_t z, uint32_t rgb) {
+    if (rgb != rgb_) {
+      rgb_ = rgb;
+      word_ = MakeWord(priority_, erase_, rgb);
+    }
+    atomicMax(&SharedRegion().words[IndexInRegion(x, y, z)], word_);
+  }
+
+ private:
+  uint32_t priority_;
+  bool erase_;
+  uint32_t rgb_ = 0, word_;  // of the voxel before
+};
+
+// Raises a pair's voxels in `box`.
 template <class Primitive>
-__device__ void DrawItem(const TableEntry& entry, uint32_t item, const Box3& box, uint32_t* words) {
-  const uint32_t priority = entry.priority;
-  const bool erase = entry.erase != 0;
-  uint32_t rgb_before = 0;
-  uint32_t word = MakeWord(priority, erase, rgb_before);
-  Primitive::EmitVoxels(entry.source, item, box,
-                        [&](int32_t x, int32_t y, int32_t z, uint32_t rgb) {
-                          if (rgb != rgb_before) {
-                            rgb_before = rgb;
-                            word = MakeWord(priority, erase, rgb);
-                          }
-                          atomicMax(&words[IndexInRegion(x, y, z)], word);
-                        });
+static __device__ __noinline__ void DrawItem(const TableEntry& entry, uint32_t item,
+                                             const Box3& box) {
+  Primitive::EmitVoxels(entry.source, item, box, RaiseVoxel(entry));
 }
 
-// Triangles without a thickness.
-struct ThinTriangles {
-  template <class Emit>
-  __device__ static void EmitVoxels(const Source& source, uint32_t i, const Box3& box,
-                                    Emit&& emit) {
-    EmitTriangle(Triangles::ItemOf(source, i), box, emit);
-  }
-};
+static __device__ __noinline__ Box3 BoundsOfTriangle(const TableEntry& entry, uint32_t item) {
+  return BoundsOf(Triangles::ItemOf(entry.source, item), entry.source.radius);
+}
 
 // Whether an item is better drawn by many threads: thick ones, solids, large triangles.
 __device__ inline bool IsHeavy(const TableEntry& entry, uint32_t item, const Box3& box) {
@@ -71,7 +78,7 @@ __device__ inline bool IsHeavy(const TableEntry& entry, uint32_t item, const Box
       return entry.source.radius > 0;
     case PrimitiveKind::kTriangles: {
       if (entry.source.radius > 0) return true;
-      const Box3 part = Intersect(box, BoundsOf(Triangles::ItemOf(entry.source, item)));
+      const Box3 part = Intersect(box, BoundsOfTriangle(entry, item));
       constexpr int32_t kSmall = 128;  // voxels
       return (part.hi[0] - part.lo[0]) * (part.hi[1] - part.lo[1]) * (part.hi[2] - part.lo[2]) >
              kSmall;
@@ -120,13 +127,13 @@ __device__ inline void DrawByWarp(const TableEntry& entry, uint32_t item, const 
     if (IsEmpty(part)) continue;
     switch (entry.record.kind) {
       case PrimitiveKind::kPoints:
-        DrawItem<Points>(entry, item, part, words);
+        DrawItem<Points>(entry, item, part);
         break;
       case PrimitiveKind::kSegments:
-        DrawItem<Segments>(entry, item, part, words);
+        DrawItem<Segments>(entry, item, part);
         break;
       default:
-        DrawItem<Triangles>(entry, item, part, words);
+        DrawItem<Triangles>(entry, item, part);
         break;
     }
   }
@@ -166,9 +173,11 @@ __device__ inline bool IsListedBefore(const PairScratch& scratch, uint32_t i) {
                           scratch.heavy[threadIdx.x] >> 32 == scratch.heavy[i] >> 32) != 0;
 }
 
-// All that are listed, which are none then; by the whole block, which has come to a barrier.
-__device__ inline void DrawHeavy(const TableEntry* table, const TileGrid& grid, uint32_t* words,
-                                 PairScratch& scratch) {
+// Draws all that are listed, which are none then; by the whole block, which has come to a barrier. A function of its
+// own: it holds the code of all solids, and is called from four places.
+static __device__ __noinline__ void DrawHeavy(const TableEntry* table, const TileGrid& grid) {
+  PairScratch& scratch = SharedBehind<PairScratch>();
+  uint32_t* const words = SharedRegion().words;
   const uint32_t count = scratch.heavy_count;
   if (scratch.small_count != 0) DrawSmallSolids(table, grid);
   // Several solids are drawn at once, one alone by all threads.
@@ -243,7 +252,7 @@ __device__ inline bool MayTouch(const TableEntry& entry, uint32_t item, uint32_t
       bounds = BoundsOf(Segments::ItemOf(entry.source, item), entry.source.radius);
       break;
     case PrimitiveKind::kTriangles:
-      bounds = BoundsOf(Triangles::ItemOf(entry.source, item), entry.source.radius);
+      bounds = BoundsOfTriangle(entry, item);
       break;
     case PrimitiveKind::kImplicit:
     case PrimitiveKind::kSamples:
@@ -272,7 +281,7 @@ __device__ inline bool FindUnlisted(const DrawView& view, uint64_t i, uint32_t l
 
 // A pair's voxels; true if it is listed to be drawn by many threads. owned: PairRows::owned.
 __device__ inline bool DrawLight(const DrawView& view, uint64_t value, uint32_t tile,
-                                 uint32_t owned, RegionScratch& region, PairScratch& scratch) {
+                                 uint32_t owned, PairScratch& scratch) {
   const Box3 box = view.volume.grid.VoxelsOf(tile);
   const TableEntry& entry = view.table[value >> 32];
   const uint32_t item = static_cast<uint32_t>(value);
@@ -290,19 +299,18 @@ __device__ inline bool DrawLight(const DrawView& view, uint64_t value, uint32_t 
     scratch.heavy[at] = value;
     scratch.tiles[at] = tile;
   } else if (entry.record.kind == PrimitiveKind::kPoints) {
-    DrawItem<Points>(entry, item, box, region.words);
+    DrawItem<Points>(entry, item, box);
   } else if (entry.record.kind == PrimitiveKind::kSegments) {
-    DrawItem<Segments>(entry, item, box, region.words);
+    DrawItem<Segments>(entry, item, box);
   } else {
-    DrawItem<ThinTriangles>(entry, item, box, region.words);
+    DrawItem<Triangles>(entry, item, box);
   }
   return heavy;
 }
 
 // The layer's pairs of all tiles, by the whole block. What is heavy is listed: it is drawn
 // together, at the end, or when there is no more room for what may come.
-__device__ inline void DrawPairs(const DrawView& view, const PairRows& rows, RegionScratch& region,
-                                 PairScratch& scratch) {
+__device__ inline void DrawPairs(const DrawView& view, const PairRows& rows, PairScratch& scratch) {
   const TileGrid& grid = view.volume.grid;
   for (uint32_t b = 0; b < view.pairs.count; ++b) {
     uint32_t until[kRegionTiles];  // pairs of the tiles up to each
@@ -310,22 +318,20 @@ __device__ inline void DrawPairs(const DrawView& view, const PairRows& rows, Reg
       until[t] = sum += rows.end[t][b] - rows.begin[t][b];
     }
     const uint32_t end = until[kRegionTiles - 1];
-    for (uint32_t round = 0; round < end; round += kDrawThreads) {
-      // The same for every thread: a barrier lies between this and whatever is listed before or after it.
-      if (scratch.listed() + Min(end - round, kDrawThreads) > kDrawThreads) {
-        DrawHeavy(view.table, grid, region.words, scratch);
-      }
+    // All threads find the same; they vote because they call functions (DrawRegionsKernel). The votes are barriers as
+    // well: between what is listed and whoever counts it.
+    for (uint32_t round = 0; __syncthreads_or(round < end) != 0; round += kDrawThreads) {
+      const bool full = scratch.listed() + Min(end - round, kDrawThreads) > kDrawThreads;
+      if (__syncthreads_or(full) != 0) DrawHeavy(view.table, grid);
       const uint32_t p = round + threadIdx.x;
-      __syncthreads();
       if (p < end) {
         uint32_t t = 0, before = 0;
         for (uint32_t u = 0; u + 1 < kRegionTiles; ++u) {
           if (p >= until[u]) t = u + 1, before = until[u];
         }
         const uint64_t value = view.pairs.batches[b].values[rows.begin[t][b] + (p - before)];
-        DrawLight(view, value, rows.tile[t], rows.owned, region, scratch);
+        DrawLight(view, value, rows.tile[t], rows.owned, scratch);
       }
-      __syncthreads();
     }
   }
 }
@@ -337,16 +343,16 @@ static __device__ __noinline__ void DrawUnlisted(const DrawView& view, uint32_t 
                                                  PairScratch& scratch) {
   const TileGrid& grid = view.volume.grid;
   const Box3 box = grid.VoxelsOf(tile);
-  if (scratch.listed() != 0) DrawHeavy(view.table, grid, region.words, scratch);
+  if (scratch.listed() != 0) DrawHeavy(view.table, grid);
   for (uint64_t i = threadIdx.x; __syncthreads_or(i < view.unlisted.items) != 0;
        i += kDrawThreads) {
     bool heavy = false;
     uint64_t value;
     if (i < view.unlisted.items && FindUnlisted(view, i, region.layer, tile, box, value)) {
-      heavy = DrawLight(view, value, tile, owned, region, scratch);
+      heavy = DrawLight(view, value, tile, owned, scratch);
     }
     if (__syncthreads_or(heavy ? 1 : 0) != 0) {
-      DrawHeavy(view.table, grid, region.words, scratch);
+      DrawHeavy(view.table, grid);
     }
   }
 }

@@ -173,11 +173,13 @@ inline constexpr uint32_t kSampleColumns = kTileSize * kTileSize,
                           kSampleStep = kDrawThreads / kSampleColumns;
 static_assert(kDrawThreads % kSampleColumns == 0);
 
-// Numbers through the table, by samples in shared memory. kPlain: all voxels lie within the grid,
-// and all numbers are some.
+// Draws numbers through the table, by samples in shared memory. kPlain: all voxels lie within the grid,
+// and all numbers are some. A function of its own, as what follows: one copy for all kinds of numbers.
 template <bool kPlain>
-__device__ inline void DrawNear(const Solid& s, const SampleHead& head, const Box3& part,
-                                uint32_t* words, const NearSamples& near) {
+static __device__ __noinline__ void DrawNear(const Solid& s, const SampleHead& head,
+                                             const Box3& part) {
+  uint32_t* const words = SharedRegion().words;
+  const NearSamples& near = SharedBehind<SampleScratch>().near;
   const int32_t x = part.lo[0] + static_cast<int32_t>(threadIdx.x % kTileSize),
                 y = part.lo[1] + static_cast<int32_t>(threadIdx.x / kTileSize % kTileSize);
   if (x >= part.hi[0] || y >= part.hi[1]) return;
@@ -224,13 +226,11 @@ __device__ inline void DrawNear(const Solid& s, const SampleHead& head, const Bo
   }
 }
 
-// Numbers through the table.
-template <class Number, bool kNearest>
-__device__ void DrawNumbers(const TableEntry& entry, const SampleView& view, const Box3& part,
-                            uint32_t* words, SampleScratch& scratch) {
+// The table's words, and of LINEAR numbers which samples the tile's voxels look at. By the whole block.
+static __device__ __noinline__ void PrepareNumbers(const TableEntry& entry, const Box3& part) {
+  NearSamples& near = SharedBehind<SampleScratch>().near;
   const Source& source = entry.source;
-  const SampleReader<Number> reader(view);
-  NearSamples& near = scratch.near;
+  const SampleView view{source.indices};
   for (uint32_t i = threadIdx.x; i < SampleHead::kTableEntries; i += kDrawThreads) {
     const uint32_t color = view.table()[i];
     near.table[i] =
@@ -238,18 +238,28 @@ __device__ void DrawNumbers(const TableEntry& entry, const SampleView& view, con
             ? MakeWord(entry.priority, entry.erase != 0, Tinted(color & 0x00FFFFFF, source.tint))
             : 0;
   }
-  if (!kNearest && threadIdx.x >= kDrawThreads - 32) {
+  if (view.head().filter != SampleFilter::kNearest && threadIdx.x >= kDrawThreads - 32) {
     FindNear(source.solid, view.head(), part, near);
   }
   __syncthreads();
+}
+
+// Numbers through the table.
+template <class Number, bool kNearest>
+__device__ void DrawNumbers(const TableEntry& entry, const SampleView& view, const Box3& part,
+                            uint32_t* words, SampleScratch& scratch) {
+  const Source& source = entry.source;
+  const SampleReader<Number> reader(view);
+  NearSamples& near = scratch.near;
+  PrepareNumbers(entry, part);
   if constexpr (!kNearest) {
     if (near.fit) {
       LoadNear(reader, near);
       __syncthreads();
       if (near.within && !std::is_same_v<Number, float>) {
-        DrawNear<true>(source.solid, view.head(), part, words, near);
+        DrawNear<true>(source.solid, view.head(), part);
       } else {
-        DrawNear<false>(source.solid, view.head(), part, words, near);
+        DrawNear<false>(source.solid, view.head(), part);
       }
       __syncthreads();
       return;
@@ -288,10 +298,10 @@ __device__ void DrawNumbers(const TableEntry& entry, const SampleView& view, con
   __syncthreads();
 }
 
-// As Samples::IsAtLevel.
+// Depths of the tile's voxels and those around it. By the whole block.
 template <class Number, bool kNearest>
-__device__ void DrawLevel(const TableEntry& entry, const SampleView& view, const Box3& part,
-                          uint32_t* words, SampleScratch& scratch) {
+__device__ void FindDepths(const TableEntry& entry, const SampleView& view, const Box3& part,
+                           SampleScratch& scratch) {
   constexpr int32_t kRows = SampleScratch::kRows;
   const Source& source = entry.source;
   const SampleReader<Number> reader(view);
@@ -322,6 +332,15 @@ __device__ void DrawLevel(const TableEntry& entry, const SampleView& view, const
     }
   }
   __syncthreads();
+}
+
+// Raises the voxels that depths say to be covered, as Samples::IsAtLevel. By the whole block.
+static __device__ __noinline__ void RaiseLevel(const TableEntry& entry, const Box3& part) {
+  constexpr int32_t kRows = SampleScratch::kRows;
+  uint32_t* const words = SharedRegion().words;
+  const SampleScratch& scratch = SharedBehind<SampleScratch>();
+  const Source& source = entry.source;
+  const SampleView view{source.indices};
   const bool solid = source.record->fill == Fill::kSolid,
              cover = source.record->rule == SurfaceRule::kCover, shell = source.implicit.half > 0,
              colored = view.head().by_level == 2;
@@ -381,8 +400,9 @@ __device__ void DrawSamplesOf(const TableEntry& entry, const SampleView& view, c
                               uint32_t* words, SampleScratch& scratch) {
   const bool nearest = view.head().filter == SampleFilter::kNearest;
   if (view.head().by_level != 0) {
-    return nearest ? DrawLevel<Number, true>(entry, view, part, words, scratch)
-                   : DrawLevel<Number, false>(entry, view, part, words, scratch);
+    nearest ? FindDepths<Number, true>(entry, view, part, scratch)
+            : FindDepths<Number, false>(entry, view, part, scratch);
+    return RaiseLevel(entry, part);
   }
   return nearest ? DrawNumbers<Number, true>(entry, view, part, words, scratch)
                  : DrawNumbers<Number, false>(entry, view, part, words, scratch);

@@ -1,6 +1,6 @@
 # The engine on CUDA: what nvcc compiles, headers that these alone include, and the host's part.
 set(VOXELD_CUDA_KERNELS
-  kernels_draw_all.cu kernels_draw_lines.cu kernels_draw_pictures.cu kernels_draw_reader.cu kernels_draw_tiles.cu
+  kernels_draw_all.cu kernels_draw_lines.cu
   kernels_few_lines.cu kernels_filled.cu kernels_generate.cu kernels_implicit.cu kernels_index.cu kernels_line_regions.cu
   kernels_lines.cu kernels_points.cu kernels_slice.cu kernels_triangles.cu)
 set(VOXELD_CUDA_KERNEL_PARTS

@@ -3,8 +3,7 @@
 
 #include <cstdint>
 
-#include "display/api/slice_frame.h"
-#include "display/geometry/footprint.h"
+#include "display/geometry/footprint_entry.h"
 #include "gpu/primitives/grid.h"
 #include "gpu/primitives/source.h"
 #include "gpu/slice/finish.h"

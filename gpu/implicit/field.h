@@ -170,20 +170,22 @@ class Field {
   VOXELD_HD int32_t rim() const { return solid() ? 0 : 1; }
 
   // What is known of the voxels in a box, of which each axis has at least one.
-  VOXELD_HD BoxState StateOf(const Box3& box) const {
+  VOXELD_HD VOXELD_DEVICE_NOINLINE BoxState StateOf(const Box3& box) const {
     Interval q[3];
     if (program_.bound() != 0) {
       CoordinatesOf(box, 0, q);
-      if (Bound(q).lo > 0) return {Side::kMixed, true, false};
+      if (IntervalOf(program_.bound_code(), program_.bound(), program_.bound_slot(), q).lo > 0)
+        return {Side::kMixed, true, false};
     }
     CoordinatesOf(box, rim(), q);
-    const Interval p = Surface(q);
+    const Interval p =
+        IntervalOf(program_.surface_code(), program_.surface(), program_.surface_slot(), q);
     BoxState state = StateOf(p);
     if (state.none && !solid() && place_.half != 0) state.none = Abs(p).lo > ReachIn(box);
     return state;
   }
   // No voxel in the box of a greater |P| is covered by |P| ≤ h·|∇P|; 0 < h.
-  VOXELD_HD float ReachIn(const Box3& box) const {
+  VOXELD_HD VOXELD_DEVICE_NOINLINE float ReachIn(const Box3& box) const {
     Interval q[3];
     CoordinatesOf(box, 0, q);
     Dual<Interval> dual[3];
@@ -209,6 +211,13 @@ class Field {
               solid_.Distance(a, int64_t{box.hi[a]} - 1 + rim), false};
     }
     Coordinates(d[0], d[1], d[2], q);
+  }
+
+  VOXELD_HD VOXELD_DEVICE_NOINLINE Interval IntervalOf(const uint32_t* code, uint32_t count,
+                                                       uint32_t slot, const Interval q[3]) const {
+    Interval slots[kMostSlots];
+    Run(code, count, q, place_.voxel, slots);
+    return slots[slot];
   }
 
   VOXELD_HD bool IsInRings(const float q[3]) const {

@@ -12,6 +12,14 @@
 
 #include "gpu/implicit/number.h"
 
+// The operations that are long. A source whose kernels need them only where speed does not matter defines
+// VOXELD_INTERVALS_OUT_OF_LINE: nvcc then compiles each once, not wherever an expression may call for it.
+#if defined(VOXELD_INTERVALS_OUT_OF_LINE)
+#define VOXELD_INTERVAL VOXELD_HD VOXELD_DEVICE_NOINLINE inline Interval
+#else
+#define VOXELD_INTERVAL VOXELD_HD inline Interval
+#endif
+
 namespace voxeld::gpu::implicit {
 
 struct Interval {
@@ -60,13 +68,13 @@ VOXELD_HD inline Interval OfCorners(float a, float b, float c, float d, bool nan
 }
 VOXELD_HD inline bool HasZero(const Interval& a) { return a.lo <= 0 && a.hi >= 0; }
 
-VOXELD_HD inline Interval Mul(const Interval& a, const Interval& b) {
+VOXELD_INTERVAL Mul(const Interval& a, const Interval& b) {
   // Zero times infinity.
   const bool undefined = (HasZero(a) && !Bounded(b)) || (HasZero(b) && !Bounded(a));
   if (undefined) return Interval::Everything();
   return OfCorners(a.lo * b.lo, a.lo * b.hi, a.hi * b.lo, a.hi * b.hi, a.nan || b.nan);
 }
-VOXELD_HD inline Interval Div(const Interval& a, const Interval& b) {
+VOXELD_INTERVAL Div(const Interval& a, const Interval& b) {
   if (HasZero(b) || (!Bounded(a) && !Bounded(b))) return Interval::Everything();
   return OfCorners(a.lo / b.lo, a.lo / b.hi, a.hi / b.lo, a.hi / b.hi, a.nan || b.nan);
 }
@@ -98,23 +106,23 @@ VOXELD_HD inline float AboveEnd(float x) {
   return x == -Infinity() ? -3.0e38f : (x == Infinity() ? x : Above(x));
 }
 
-VOXELD_HD inline Interval Cbrt(const Interval& a) {
+VOXELD_INTERVAL Cbrt(const Interval& a) {
   return {BelowEnd(Cbrt(a.lo)), AboveEnd(Cbrt(a.hi)), a.nan};
 }
 
 // Products of monotonic factors of one sign, rounded, are monotonic.
-VOXELD_HD inline Interval PowI(const Interval& a, int32_t n) {
+VOXELD_INTERVAL PowI(const Interval& a, int32_t n) {
   const int32_t m = n < 0 ? -n : n;
   const Interval b = m % 2 != 0 ? a : Abs(a);
   const Interval power = {PowI(b.lo, m), PowI(b.hi, m), a.nan};
   return n < 0 ? Div(Interval{1, 1, false}, power) : power;
 }
 
-VOXELD_HD inline Interval Exp(const Interval& a) {
+VOXELD_INTERVAL Exp(const Interval& a) {
   const float lo = BelowEnd(Exp(a.lo));
   return {lo > 0 ? lo : 0, AboveEnd(Exp(a.hi)), a.nan};
 }
-VOXELD_HD inline Interval Log(const Interval& a) {
+VOXELD_INTERVAL Log(const Interval& a) {
   if (!(a.hi > 0)) {
     return {-Infinity(), -Infinity(), true};
   }
@@ -123,7 +131,7 @@ VOXELD_HD inline Interval Log(const Interval& a) {
 }
 
 // Of x + quarters·π/2.
-VOXELD_HD inline Interval SineOf(const Interval& a, int32_t quarters) {
+VOXELD_INTERVAL SineOf(const Interval& a, int32_t quarters) {
   const float lo = a.lo, hi = a.hi;
   const bool lost = !(lo >= -kMostAngle && hi <= kMostAngle);
   const Interval all = {-1.0f - kSlack, 1.0f + kSlack, a.nan || lost};
@@ -161,12 +169,14 @@ VOXELD_HD inline Interval Max(const Interval& a, const Interval& b) {
 }
 
 // Extreme at corners, unless the box meets the cut along the negative x axis.
-VOXELD_HD inline Interval Atan2(const Interval& y, const Interval& x) {
+VOXELD_INTERVAL Atan2(const Interval& y, const Interval& x) {
   const bool nan = x.nan || y.nan;
   if (x.lo <= 0 && HasZero(y)) return {-3.14159274f - kSlack, 3.14159274f + kSlack, nan};
   const Interval box =
       OfCorners(Atan2(y.lo, x.lo), Atan2(y.lo, x.hi), Atan2(y.hi, x.lo), Atan2(y.hi, x.hi), nan);
   return {box.lo - 2 * kSlack, box.hi + 2 * kSlack, nan};
 }
+
+#undef VOXELD_INTERVAL
 
 }  // namespace voxeld::gpu::implicit

@@ -99,7 +99,8 @@ struct Capsule {
 };
 
 template <class Emit>
-VOXELD_HD void EmitCapsule(const Capsule& capsule, const Box3& box, Emit&& emit) {
+VOXELD_HD VOXELD_DEVICE_NOINLINE void EmitCapsule(const Capsule& capsule, const Box3& box,
+                                                  Emit emit) {
   // Blocks of 4³ voxels whose middle is farther from the axis than any centre of theirs can be are
   // passed over: 1.5·√3 voxels and some.
   constexpr int32_t kBlock = 4;

@@ -369,7 +369,8 @@ VOXELD_HD inline uint32_t CompactColorAt(const CompactTriangle& t, const uint32_
 template <class F>
 VOXELD_HD void EmitCompactFlat(const CompactTriangle& t, const uint32_t color[3], const Box3& box,
                                F&& f) {
-  EmitLine(LongestEdge(TriangleOf(t, color)), box, f);
+  static_assert(CompactTriangle::kMostUnits <= kNarrowLine);
+  EmitLine(LongestEdge(TriangleOf(t, color)), box, /*narrow=*/true, f);
 }
 
 }  // namespace voxeld::gpu

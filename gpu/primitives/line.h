@@ -16,8 +16,8 @@
 // the line crosses; EUCLIDEAN: steps of one voxel along the line.
 #pragma once
 
-#include "gpu/delta.h"
 #include "gpu/primitives/fixed.h"
+#include "gpu/records.h"
 
 namespace voxeld::gpu {
 
@@ -50,7 +50,8 @@ VOXELD_HD inline int64_t LineSteps(const Line& line) {
 
 // `I`: an integer type that holds 2²·|position|·N and |position|².
 template <class I, class Emit>
-VOXELD_HD void EmitSteps(const Line& line, int64_t n, const Box3& box, Emit&& emit) {
+VOXELD_HD VOXELD_DEVICE_NOINLINE void EmitSteps(const Line& line, int64_t n, const Box3& box,
+                                                Emit emit) {
   const int64_t m = n * kUnitsPerVoxel;
   I k0 = 0, k1 = n + 1;
   for (int a = 0; a < 3; ++a) {
@@ -136,7 +137,7 @@ VOXELD_HD int64_t CrossingsUntil(const Crossings& c, int axis, const CrossingTim
 }
 
 template <class I, class Emit>
-VOXELD_HD void EmitCells(const Line& line, const Box3& box, Emit&& emit) {
+VOXELD_HD VOXELD_DEVICE_NOINLINE void EmitCells(const Line& line, const Box3& box, Emit emit) {
   Crossings c[3];
   CrossingTime entry, exit;
   int64_t total = 0;
@@ -210,12 +211,20 @@ VOXELD_HD inline Line Ordered(const Line& line) {
   return {line.e, line.s, line.color_e, line.color_s, line.sampling};
 }
 
-// Calls emit(x, y, z, rgb) for every voxel of `line` in `box`, some perhaps more than once.
-template <class Emit>
-VOXELD_HD void EmitLine(const Line& line, const Box3& box, Emit&& emit) {
-  constexpr int64_t kNarrow = int64_t{1} << 28;  // up to here products fit 64 bits
+// Up to such coordinates (units) the products that a line's voxels take fit 64 bits.
+inline constexpr int64_t kNarrowLine = int64_t{1} << 28;
+
+VOXELD_HD inline bool IsNarrow(const Line& line) {
   bool narrow = true;
-  for (int a = 0; a < 3; ++a) narrow &= Abs(line.s[a]) <= kNarrow && Abs(line.e[a]) <= kNarrow;
+  for (int a = 0; a < 3; ++a) {
+    narrow &= Abs(line.s[a]) <= kNarrowLine && Abs(line.e[a]) <= kNarrowLine;
+  }
+  return narrow;
+}
+
+// Calls emit(x, y, z, rgb) for every voxel of `line` in `box`, some perhaps more than once. `narrow`: it IsNarrow.
+template <class Emit>
+VOXELD_HD void EmitLine(const Line& line, const Box3& box, bool narrow, Emit&& emit) {
   if (line.sampling == LineSampling::kCover) {
     const Line ordered = Ordered(line);
     bool one_cell = true;
@@ -228,6 +237,11 @@ VOXELD_HD void EmitLine(const Line& line, const Box3& box, Emit&& emit) {
   }
   EmitVoxelOf(line.s, line.color_s, box, emit);
   EmitVoxelOf(line.e, line.color_e, box, emit);
+}
+
+template <class Emit>
+VOXELD_HD void EmitLine(const Line& line, const Box3& box, Emit&& emit) {
+  EmitLine(line, box, IsNarrow(line), emit);
 }
 
 }  // namespace voxeld::gpu

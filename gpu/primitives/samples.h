@@ -222,8 +222,9 @@ struct Samples {
 
   // Of a voxel with a depth: |P| ≤ h·|∇P|, the gradient in voxel space; of NEAREST grids there is
   // none.
-  VOXELD_HD static bool IsWithinShell(const Source& source, const SampleView& view, int32_t x,
-                                      int32_t y, int32_t z, float depth) {
+  VOXELD_HD VOXELD_DEVICE_NOINLINE static bool IsWithinShell(const Source& source,
+                                                             const SampleView& view, int32_t x,
+                                                             int32_t y, int32_t z, float depth) {
     Cell cell;
     if (view.head().filter == SampleFilter::kNearest || !Find(source, view, x, y, z, &cell)) {
       return false;
@@ -318,8 +319,8 @@ struct Samples {
   }
 
   // level − v; nothing is infinite, as what is no number.
-  VOXELD_HD static float Depth(const Source& source, const SampleView& view, int32_t x, int32_t y,
-                               int32_t z) {
+  VOXELD_HD VOXELD_DEVICE_NOINLINE static float Depth(const Source& source, const SampleView& view,
+                                                      int32_t x, int32_t y, int32_t z) {
     Cell cell;
     if (!Find(source, view, x, y, z, &cell)) return implicit::Infinity();
     const float depth = view.head().level - ValueIn(view, cell);

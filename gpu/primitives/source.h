@@ -3,9 +3,9 @@
 
 #include <cstring>
 
-#include "gpu/delta.h"
 #include "gpu/primitives/fixed.h"
 #include "gpu/primitives/solid.h"
+#include "gpu/records.h"
 #include "gpu/word.h"
 
 namespace voxeld::gpu {

@@ -190,7 +190,8 @@ struct ThickTriangle {
 
 // Of a thick triangle, without its thin voxels.
 template <class Emit>
-VOXELD_HD void EmitThick(const Triangle& t, int64_t radius, const Box3& box, Emit&& emit) {
+VOXELD_HD VOXELD_DEVICE_NOINLINE void EmitThick(const Triangle& t, int64_t radius, const Box3& box,
+                                                Emit emit) {
   // Blocks of 4³ voxels whose middle is farther from the triangle than any centre of theirs can be
   // are passed over: 1.5·√3 voxels and some.
   constexpr int32_t kBlock = 4;

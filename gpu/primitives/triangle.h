@@ -17,10 +17,10 @@
 // the triangle. A shift by whole voxels shifts the result.
 #pragma once
 
-#include "gpu/delta.h"
 #include "gpu/primitives/fixed.h"
 #include "gpu/primitives/line.h"
 #include "gpu/primitives/texture.h"
+#include "gpu/records.h"
 #include "gpu/word.h"
 
 namespace voxeld::gpu {
@@ -108,7 +108,7 @@ struct TriangleSetup {
     for (int shift = 0; shift < 24; shift += 8) {
       I total = sum / 2;
       for (int i = 0; i < 3; ++i) total += weight[i] * static_cast<I>((t.color[i] >> shift) & 0xFF);
-      rgb |= static_cast<uint32_t>(total / sum) << shift;
+      rgb |= static_cast<uint32_t>(Quotient(total, sum)) << shift;
     }
     return t.texture.texels == nullptr ? rgb : Tinted(TexelAt(t, weight, sum), rgb);
   }
@@ -239,22 +239,19 @@ VOXELD_HD inline Line LongestEdge(const Triangle& t) {
           t.rule == SurfaceRule::kThin ? LineSampling::kThin : LineSampling::kCover};
 }
 
+// The inner voxels of a triangle with an area; false: it has none. `part`, not empty, lies within its bounds.
 template <class I, class Emit>
-VOXELD_HD void EmitTriangleAs(const Triangle& t, const Box3& box, Emit&& emit) {
-  const Box3 part = Intersect(box, BoundsOf(t));
-  if (IsEmpty(part)) return;
+VOXELD_HD VOXELD_DEVICE_NOINLINE bool EmitArea(const Triangle& t, const Box3& part, Emit emit) {
   const TriangleSetup<I> setup(t);
-  if (setup.n[0] == 0 && setup.n[1] == 0 && setup.n[2] == 0) {
-    EmitLine(LongestEdge(t), box, emit);
-  } else if (t.rule == SurfaceRule::kCover) {
+  if (setup.n[0] == 0 && setup.n[1] == 0 && setup.n[2] == 0) return false;
+  if (t.rule == SurfaceRule::kCover) {
     EmitCover(t, setup, part, emit);
-    return;
-  } else {
-    for (int a = 0; a < 3; ++a) {
-      if (setup.n[a] != 0) EmitThinAlong(t, setup, a, part, emit);
-    }
+    return true;
   }
-  for (int i = 0; i < 3; ++i) EmitVoxelOf(t.v[i], t.ColorOfCorner(i), box, emit);
+  for (int a = 0; a < 3; ++a) {
+    if (setup.n[a] != 0) EmitThinAlong(t, setup, a, part, emit);
+  }
+  return true;
 }
 
 VOXELD_HD inline int64_t Extent(const Triangle& t) {
@@ -267,14 +264,21 @@ VOXELD_HD inline int64_t Extent(const Triangle& t) {
   return extent;
 }
 
+// narrow: TriangleSetup's products fit 64 bits.
+template <class Emit>
+VOXELD_HD void EmitTriangle(const Triangle& t, const Box3& box, bool narrow, Emit&& emit) {
+  const Box3 part = Intersect(box, BoundsOf(t));
+  if (IsEmpty(part)) return;
+  const bool has_area = narrow ? EmitArea<int64_t>(t, part, emit) : EmitArea<Wide>(t, part, emit);
+  if (has_area && t.rule == SurfaceRule::kCover) return;
+  if (!has_area) EmitLine(LongestEdge(t), box, emit);
+  for (int i = 0; i < 3; ++i) EmitVoxelOf(t.v[i], t.ColorOfCorner(i), box, emit);
+}
+
 template <class Emit>
 VOXELD_HD void EmitTriangle(const Triangle& t, const Box3& box, Emit&& emit) {
   constexpr int64_t kNarrow = int64_t{1} << 19;
-  if (Extent(t) <= kNarrow) {
-    EmitTriangleAs<int64_t>(t, box, emit);
-  } else {
-    EmitTriangleAs<Wide>(t, box, emit);
-  }
+  EmitTriangle(t, box, Extent(t) <= kNarrow, emit);
 }
 
 }  // namespace voxeld::gpu

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "display/api/slice_frame.h"
+#include "display/api/frame_layout.h"
 #include "gpu/portable.h"
 #include "gpu/slice/pack.h"
 #include "gpu/slice/quantize.h"

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "display/api/slice_frame.h"
+#include "display/api/frame_layout.h"
 #include "gpu/portable.h"
 
 namespace voxeld::gpu {

@@ -6,6 +6,7 @@
 
 #include "absl/status/status.h"
 #include "gpu/cpu/cpu_engine.h"
+#include "gpu/worker/no_cuda_engine.h"
 #include "gpu/worker/process.h"
 #include "gpu/worker/worker_server.h"
 #if defined(VOXELD_HAVE_CUDA)
@@ -21,7 +22,7 @@ absl::StatusOr<std::unique_ptr<Engine>> MakeEngine(const EngineOptions& options)
 #if defined(VOXELD_HAVE_CUDA)
   return CreateCudaEngine(options, "");
 #else
-  return absl::FailedPreconditionError("this build has no CUDA engine");
+  return NoCudaEngine(GpuIsVisible());
 #endif
 }
 

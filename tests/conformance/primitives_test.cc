@@ -233,10 +233,10 @@ TEST(Primitives, NarrowTrianglesEqualWideOnes) {
     }
     t.rule = static_cast<SurfaceRule>(i % 2);
     Voxels narrow, wide;
-    EmitTriangleAs<int64_t>(t, box, [&](int32_t x, int32_t y, int32_t z, uint32_t rgb) {
+    EmitTriangle(t, box, /*narrow=*/true, [&](int32_t x, int32_t y, int32_t z, uint32_t rgb) {
       narrow[{x, y, z}][rgb] = true;
     });
-    EmitTriangleAs<Wide>(t, box, [&](int32_t x, int32_t y, int32_t z, uint32_t rgb) {
+    EmitTriangle(t, box, /*narrow=*/false, [&](int32_t x, int32_t y, int32_t z, uint32_t rgb) {
       wide[{x, y, z}][rgb] = true;
     });
     ASSERT_TRUE(narrow == wide);

@@ -1,0 +1,17 @@
+// A voxel of a footprint (footprint.h), as engines keep it in their own memory.
+#pragma once
+
+#include <cstdint>
+
+namespace voxeld::display {
+
+inline constexpr uint16_t kFullWeight = 255;
+inline constexpr uint16_t kOwnWeight = 128;  // at least, of the voxel that holds a pixel's centre
+
+struct FootprintEntry {
+  uint16_t x = 0, y = 0, z = 0;
+  uint16_t weight = kFullWeight;  // 1 to 255
+  bool operator==(const FootprintEntry&) const = default;
+};
+
+}  // namespace voxeld::display

@@ -1,9 +1,0 @@
-// Regions with anything in them, drawn into the tiles.
-#include "gpu/cuda/draw-inl.h"
-
-namespace voxeld::gpu::cuda {
-
-template cudaError_t DrawRegionsTo<DrawWhat::kAll, DrawTo::kTiles>(const DrawView&, uint32_t,
-                                                                   cudaStream_t);
-
-}  // namespace voxeld::gpu::cuda
