@@ -7,6 +7,7 @@ Runs without root, network, packages or compiler: PATH is one folder of stubs an
 """
 import json
 import os
+import pty
 import re
 import shutil
 import stat
@@ -356,6 +357,34 @@ mkdir -p build/demo/bin; cp "$STUBS/voxeld" "$STUBS/voxelctl" build/demo/bin"""
         self.assertIn("without the globe: tools/setup brings it", done.stderr)
         self.assertIsNone(self.times()["page"])
         self.assertEqual(self.times()["scenes"], ["galaxy"])
+
+    def test_in_a_terminal_it_stays_up_until_ctrl_c(self) -> None:
+        child, terminal = pty.fork()
+        if child == 0:
+            os.execve(str(self.clone / "tools/demo"), ["demo"], self.environment)
+        said = b""
+        sent = False
+        while True:
+            try:
+                chunk = os.read(terminal, 65536)
+            except OSError:  # The child has closed its end.
+                break
+            if not chunk:
+                break
+            said += chunk
+            if not sent and b"demo: first light after" in said:
+                os.write(terminal, b"\x03")
+                sent = True
+        os.close(terminal)
+        _, status = os.waitpid(child, 0)
+        words = said.decode()
+        self.assertEqual(os.waitstatus_to_exitcode(status), 0, words)
+        page = re.search(r"demo: the page is at (http://127\.0\.0\.1:\d+/)", words)
+        self.assertIsNotNone(page, words)
+        self.assertLess(page.start(), words.index("== playing globe galaxy"))
+        self.assertIn("plays globe galaxy", words)
+        self.assertIn("Ctrl-C stops it", words)
+        self.assertEqual(self.times()["page"], page[1])
 
     def test_a_compiler_that_runs_out_of_memory_is_named(self) -> None:
         self.programs(build='echo "@ 1 3 Building CXX object x/1.cc.o"; echo "FAILED: x/2.cc.o"; '
