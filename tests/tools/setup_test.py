@@ -18,7 +18,7 @@ import unittest
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-ORDINARY = ("awk basename bash cat chmod cp cut date dirname env find grep head id kill ln ls mkdir mktemp mv nproc printf rm sed seq sh sleep "
+ORDINARY = ("awk basename bash cat chmod cp cut date dirname env find grep head id kill ln ls mkdir mktemp mv nproc paste printf rm sed seq sh sleep "
             "sort tail tar touch tr uname wc").split()
 MODULES = ["world-atlas", "three", "uplot", "esbuild"]  # of the default tier
 
@@ -213,6 +213,22 @@ class Installing(Sandbox):
         self.assertIn("apt-get update failed (no network?)", done.stderr)
         self.assertIn("apt-get install failed (no network", done.stderr)
         self.assertIn("E: Unable to fetch some archives", done.stderr)
+
+    def test_without_package_lists_it_asks_for_a_network(self) -> None:
+        self.installed("none")
+        self.stub("apt-get", """case " $* " in *" update "*) echo "W: Failed to fetch http://mirror/ Temporary failure"; exit 0 ;; esac
+echo "E: Unable to locate package cmake"; echo "E: Package 'g++' has no installation candidate"; exit 100""")
+        done = self.run_tool("setup")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("apt-get update failed (no network?)", done.stderr)
+        self.assertIn("there are no package lists for cmake g++; run tools/setup again when there is a network", done.stderr)
+
+    def test_a_package_that_debian_does_not_have_is_named(self) -> None:
+        self.installed("none")
+        self.stub("apt-get", 'case " $* " in *" update "*) exit 0 ;; esac\necho "E: Unable to locate package cmake"; exit 100')
+        done = self.run_tool("setup")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("apt-get cannot install cmake; are Debian's main packages in /etc/apt/sources.list?", done.stderr)
 
     def test_without_apt_get_it_names_the_packages(self) -> None:
         self.installed("none")
