@@ -7,6 +7,7 @@ Runs without root, network, packages or compiler: PATH is one folder of stubs an
 """
 import json
 import os
+import pty
 import re
 import shutil
 import stat
@@ -17,7 +18,7 @@ import unittest
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-ORDINARY = ("awk basename bash cat chmod cp cut date dirname env find grep head id kill ln ls mkdir mktemp mv nproc printf rm sed seq sh sleep "
+ORDINARY = ("awk basename bash cat chmod cp cut date dirname env find grep head id kill ln ls mkdir mktemp mv nproc paste printf rm sed seq sh sleep "
             "sort tail tar touch tr uname wc").split()
 MODULES = ["world-atlas", "three", "uplot", "esbuild"]  # of the default tier
 
@@ -213,6 +214,22 @@ class Installing(Sandbox):
         self.assertIn("apt-get install failed (no network", done.stderr)
         self.assertIn("E: Unable to fetch some archives", done.stderr)
 
+    def test_without_package_lists_it_asks_for_a_network(self) -> None:
+        self.installed("none")
+        self.stub("apt-get", """case " $* " in *" update "*) echo "W: Failed to fetch http://mirror/ Temporary failure"; exit 0 ;; esac
+echo "E: Unable to locate package cmake"; echo "E: Package 'g++' has no installation candidate"; exit 100""")
+        done = self.run_tool("setup")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("apt-get update failed (no network?)", done.stderr)
+        self.assertIn("there are no package lists for cmake g++; run tools/setup again when there is a network", done.stderr)
+
+    def test_a_package_that_debian_does_not_have_is_named(self) -> None:
+        self.installed("none")
+        self.stub("apt-get", 'case " $* " in *" update "*) exit 0 ;; esac\necho "E: Unable to locate package cmake"; exit 100')
+        done = self.run_tool("setup")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("apt-get cannot install cmake; are Debian's main packages in /etc/apt/sources.list?", done.stderr)
+
     def test_without_apt_get_it_names_the_packages(self) -> None:
         self.installed("none")
         self.remove("apt-get")
@@ -356,6 +373,34 @@ mkdir -p build/demo/bin; cp "$STUBS/voxeld" "$STUBS/voxelctl" build/demo/bin"""
         self.assertIn("without the globe: tools/setup brings it", done.stderr)
         self.assertIsNone(self.times()["page"])
         self.assertEqual(self.times()["scenes"], ["galaxy"])
+
+    def test_in_a_terminal_it_stays_up_until_ctrl_c(self) -> None:
+        child, terminal = pty.fork()
+        if child == 0:
+            os.execve(str(self.clone / "tools/demo"), ["demo"], self.environment)
+        said = b""
+        sent = False
+        while True:
+            try:
+                chunk = os.read(terminal, 65536)
+            except OSError:  # The child has closed its end.
+                break
+            if not chunk:
+                break
+            said += chunk
+            if not sent and b"demo: first light after" in said:
+                os.write(terminal, b"\x03")
+                sent = True
+        os.close(terminal)
+        _, status = os.waitpid(child, 0)
+        words = said.decode()
+        self.assertEqual(os.waitstatus_to_exitcode(status), 0, words)
+        page = re.search(r"demo: the page is at (http://127\.0\.0\.1:\d+/)", words)
+        self.assertIsNotNone(page, words)
+        self.assertLess(page.start(), words.index("== playing globe galaxy"))
+        self.assertIn("plays globe galaxy", words)
+        self.assertIn("Ctrl-C stops it", words)
+        self.assertEqual(self.times()["page"], page[1])
 
     def test_a_compiler_that_runs_out_of_memory_is_named(self) -> None:
         self.programs(build='echo "@ 1 3 Building CXX object x/1.cc.o"; echo "FAILED: x/2.cc.o"; '

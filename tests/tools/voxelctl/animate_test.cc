@@ -208,7 +208,7 @@ TEST_F(Mp4Test, SaysWhatFfmpegSaysWhenItFails) {
 }
 
 TEST_F(Mp4Test, IsReadAsItWasDrawn) {
-  ASSERT_EQ(std::system("ffmpeg -version >/dev/null 2>&1"), 0) << "run tools/setup";
+  ASSERT_EQ(std::system("ffmpeg -version >/dev/null 2>&1"), 0) << "run tools/setup --dev";
   const std::string path = folder_.Path("a: b.mp4");
   auto movie = Mp4Movie(path, 24, 96, 64);
   ASSERT_THAT(movie, IsOk());

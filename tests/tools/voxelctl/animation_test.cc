@@ -41,7 +41,7 @@ class MoreMeshes : public testing::TestWithParam<Real> {};
 
 TEST_P(MoreMeshes, AreReadWhole) {
   const auto model = ImportFile(ModelFile(GetParam().path), {});
-  ASSERT_THAT(model, IsOk()) << "tools/setup installs assimp-testmodels";
+  ASSERT_THAT(model, IsOk()) << "tools/setup --import installs assimp-testmodels";
   EXPECT_EQ(model->format, GetParam().format);
   size_t indices = 0;
   for (const Part& part : model->parts) indices += part.indices.size();

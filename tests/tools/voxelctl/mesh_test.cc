@@ -131,7 +131,7 @@ class RealFiles : public testing::TestWithParam<RealFile> {};
 
 TEST_P(RealFiles, AreReadWhole) {
   const absl::StatusOr<Model> model = ImportFile(ModelFile(GetParam().path), {});
-  ASSERT_THAT(model, IsOk()) << "tools/setup installs assimp-testmodels";
+  ASSERT_THAT(model, IsOk()) << "tools/setup --import installs assimp-testmodels";
   EXPECT_EQ(model->format, GetParam().format);
   const Totals totals = Count(*model);
   EXPECT_EQ(totals.triangles, GetParam().triangles);

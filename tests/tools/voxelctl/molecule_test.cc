@@ -95,7 +95,7 @@ TEST_F(Molecules, OneModelAndOneLocation) {
 
 TEST_F(Molecules, RealProteins) {
   const auto model = ImportFile("/usr/share/pymol/data/tut/1hpv.pdb", {});
-  ASSERT_THAT(model, IsOk()) << "tools/setup installs pymol-data";
+  ASSERT_THAT(model, IsOk()) << "tools/setup --import installs pymol-data";
   size_t atoms = 0;
   for (const Part& part : model->parts) {
     if (part.kind == Kind::kPoints) atoms += part.positions.size();

@@ -203,7 +203,7 @@ TEST_F(Volumes, ManyEmptyStreamsTakeNoTime) {
 
 TEST_F(Volumes, RealBrains) {
   const auto brain = ImportFile(absl::StrCat(kTemplates, "ch2bet.nii.gz"), {});
-  ASSERT_THAT(brain, IsOk()) << "tools/setup installs mricron-data";
+  ASSERT_THAT(brain, IsOk()) << "tools/setup --import installs mricron-data";
   EXPECT_EQ(brain->format, "NIfTI, compressed");
   EXPECT_THAT(brain->volumes.at(0).size, ElementsAre(181, 217, 181));
   for (const char* name : {"aal.nii.gz", "ch2.nii.gz", "inia19-t1-brain.nii.gz", "brodmann.nii.gz"})
