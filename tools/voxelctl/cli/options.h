@@ -9,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-#include "display/drivers/network/protocol.h"
+#include "tools/lights/datagram.h"
 #include "tools/voxelctl/import/model.h"
 #include "tools/voxelctl/import/pdb_molecule.h"
 #include "tools/voxelctl/import/raw_volume.h"
@@ -198,7 +198,7 @@ struct LightsOptions {
 };
 
 struct InputOptions {
-  display::network::Protocol protocol = display::network::Protocol::kOpc;
+  lights::Protocol protocol = lights::Protocol::kOpc;
   LightsOptions lights;
   std::string listen;          // HOST:PORT
   int32_t first_universe = 1;  // E1.31, Art-Net
