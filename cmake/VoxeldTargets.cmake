@@ -86,7 +86,7 @@ if(VOXELD_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   target_compile_options(voxeld_warnings INTERFACE -Wno-array-bounds -Wno-maybe-uninitialized -Wno-nonnull -Wno-restrict
                                                    -Wno-stringop-overflow -Wno-stringop-overread)
 endif()
-if(VOXELD_HARDENING AND NOT VOXELD_SANITIZE AND NOT VOXELD_HASTY AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+if(VOXELD_HARDENING AND NOT VOXELD_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # Nor all through the library's assertions, and the less the more is inlined: what it then warns of ends no build.
   target_compile_options(voxeld_warnings INTERFACE -Wno-error=array-bounds -Wno-error=maybe-uninitialized -Wno-error=nonnull -Wno-error=restrict
                                                    -Wno-error=stringop-overflow -Wno-error=stringop-overread)
@@ -349,13 +349,14 @@ function(voxeld_whole_test test program labels filter without timeout shards dee
   endforeach()
 endfunction()
 
-# voxeld_fuzz(NAME SOURCES … LINK …): a fuzz target `NAME_fuzz` in bin/fuzz, of NAME_fuzz.cc and SOURCES. With VOXELD_FUZZ libFuzzer
+# voxeld_fuzz(FOLDER/NAME SOURCES … LINK …): a fuzz target `NAME_fuzz` in bin/fuzz, of FOLDER/NAME_fuzz.cc and SOURCES. With VOXELD_FUZZ libFuzzer
 # drives it (tools/fuzz runs it); elsewhere it is a test, fuzz.NAME, which replays its corpus as unpacked into fuzz/corpus/NAME of the build
 # (target fuzz_corpora), and where edges are counted (VOXELD_FUZZ_TESTS) has libFuzzer look for more for VOXELD_FUZZ_SECONDS.
-function(voxeld_fuzz name)
+function(voxeld_fuzz path)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  get_filename_component(name ${path} NAME)
   set(target ${name}_fuzz)
-  add_executable(${target} ${name}_fuzz.cc ${ARG_SOURCES})
+  add_executable(${target} ${path}_fuzz.cc ${ARG_SOURCES})
   target_link_libraries(${target} PRIVATE ${ARG_LINK} voxeld_options voxeld_warnings absl::status absl::statusor absl::strings)
   target_compile_options(${target} PRIVATE -pthread)
   set_target_properties(${target} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin/fuzz)

@@ -154,7 +154,7 @@ class Session final : public WebSocketSession, public std::enable_shared_from_th
   }
 
   const std::shared_ptr<asio::io_context> io_;
-  websocket::stream<ConnectionStream> socket_;
+  websocket::stream<ConnectionStream, false> socket_;
   const std::chrono::nanoseconds message_limit_;
   asio::steady_timer write_timer_;
   std::function<void(WebSocketSession*)> closed_;  // empty once closed

@@ -37,33 +37,13 @@ __device__ inline Box3 RegionAround(const TileGrid& grid, uint32_t tile) {
   return box;
 }
 
-// Raises an item's voxels into the region's words. One type for all primitives, so that they share what they have in
-// common, as lines; and it holds its state itself, so that this stays in registers where a function has a copy.
-class RaiseVoxel {
- public:
-  __device__ explicit RaiseVoxel(const TableEntry& entry)
-      : priority_(entry.priority),
-        erase_(entry.erase != 0),
-        word_(MakeWord(priority_, erase_, 0)) {}
-  __device__ void operator()(int32_t x, int32_t y, int32_t z, uint32_t rgb) {
-    if (rgb != rgb_) {
-      rgb_ = rgb;
-      word_ = MakeWord(priority_, erase_, rgb);
-    }
-    atomicMax(&SharedRegion().words[IndexInRegion(x, y, z)], word_);
-  }
-
- private:
-  uint32_t priority_;
-  bool erase_;
-  uint32_t rgb_ = 0, word_;  // of the voxel before
-};
-
 // Raises a pair's voxels in `box`.
 template <class Primitive>
 static __device__ __noinline__ void DrawItem(const TableEntry& entry, uint32_t item,
                                              const Box3& box) {
-  Primitive::EmitVoxels(entry.source, item, box, RaiseVoxel(entry));
+  const bool erase = entry.erase != 0;
+  Primitive::EmitVoxels(entry.source, item, box,
+                        RaiseVoxel(MakeWord(entry.priority, erase, 0), /*recolor=*/!erase));
 }
 
 static __device__ __noinline__ Box3 BoundsOfTriangle(const TableEntry& entry, uint32_t item) {

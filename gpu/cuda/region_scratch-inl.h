@@ -90,6 +90,30 @@ __device__ inline Scratch& SharedBehind() {
   static_assert(sizeof(RegionScratch) % 16 == 0);
   return *reinterpret_cast<Scratch*>(SharedMemory() + sizeof(RegionScratch));
 }
+// The word of a colour, where `word` is that of another.
+__device__ inline uint32_t Recolored(uint32_t word, uint32_t rgb) {
+  return (word & ~kColorMask) | Interleave(rgb);
+}
+
+// Raises an item's voxels into the region's words. One type for all primitives, so that they share what they have in
+// common, as lines; and it holds its state itself, so that this stays in registers where a function has a copy.
+class RaiseVoxel {
+ public:
+  // word: of colour 0; if not `recolor`, of every colour.
+  __device__ RaiseVoxel(uint32_t word, bool recolor) : word_(word), recolor_(recolor) {}
+  __device__ void operator()(int32_t x, int32_t y, int32_t z, uint32_t rgb) {
+    if (recolor_ && rgb != rgb_) {
+      rgb_ = rgb;
+      word_ = Recolored(word_, rgb);
+    }
+    atomicMax(&SharedRegion().words[IndexInRegion(x, y, z)], word_);
+  }
+
+ private:
+  uint32_t word_, rgb_ = 0;  // of the voxel before
+  bool recolor_;
+};
+
 __device__ inline SpanScratch& SharedSpans() { return SharedBehind<SpanScratch>(); }
 
 __device__ inline PointScratch& SharedPoints() {

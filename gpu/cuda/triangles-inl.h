@@ -12,11 +12,6 @@ __device__ inline CompactTriangle LoadTriangle(const CompactTriangle* triangle) 
   return {{{a.x, a.y}, {a.z, a.w}, {b.x, b.y}}, b.z, b.w};
 }
 
-// The word of a colour, where `word` is that of another.
-__device__ inline uint32_t Recolored(uint32_t word, uint32_t rgb) {
-  return (word & ~kColorMask) | Interleave(rgb);
-}
-
 // What is rare is kept apart, and finds all anew, so that the rest has the registers. x, y, z: the
 // region's first voxel.
 __device__ __noinline__ inline void RaiseMixed(const TriangleBatchView& batch, uint32_t triangle,
@@ -39,10 +34,7 @@ __device__ __noinline__ inline void RaiseFlat(const TriangleBatchView& batch, ui
   for (uint32_t i = 0; i < 3 && mixed; ++i) {
     color[i] = batch.colors[static_cast<size_t>(triangle) * 3 + i];
   }
-  EmitCompactFlat(t, color, box, [&](int32_t vx, int32_t vy, int32_t vz, uint32_t rgb) {
-    atomicMax(&SharedRegion().words[IndexInRegion(vx, vy, vz)],
-              mixed ? Recolored(t.word, rgb) : t.word);
-  });
+  EmitCompactFlat(t, color, box, RaiseVoxel(mixed ? Recolored(t.word, 0) : t.word, mixed));
 }
 
 // One row of what a triangle has in the region; at: the region's first voxel.

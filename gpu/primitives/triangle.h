@@ -223,7 +223,7 @@ VOXELD_HD void EmitCover(const Triangle& t, const TriangleSetup<I>& s, const Box
 }
 
 // The longest edge, as a line.
-VOXELD_HD inline Line LongestEdge(const Triangle& t) {
+VOXELD_HD VOXELD_DEVICE_NOINLINE inline Line LongestEdge(const Triangle& t) {
   int longest = 0;
   Wide greatest = -1;
   for (int i = 0; i < 3; ++i) {

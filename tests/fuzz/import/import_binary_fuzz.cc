@@ -6,6 +6,7 @@
 #include "tools/voxelctl/import/las_points.h"
 #include "tools/voxelctl/import/pcd_points.h"
 #include "tools/voxelctl/import/ply_header.h"
+#include "tools/voxelctl/import/ply_mesh.h"
 #include "tools/voxelctl/import/ply_points.h"
 #include "tools/voxelctl/import/ply_realign.h"
 #include "tools/voxelctl/import/vox_model.h"
@@ -17,7 +18,10 @@ using namespace voxelctl;  // NOLINT(google-build-using-namespace)
 
 void ReadPly(const SourceFile& file) {
   const absl::StatusOr<PlyHeader> header = ParsePlyHeader(file);
-  if (header.ok()) return CheckModel(ReadPlyPoints(file, *header));
+  if (header.ok()) {
+    return CheckModel(HasPlySurfaces(*header) ? ReadPlyMesh(file, *header)
+                                              : ReadPlyPoints(file, *header));
+  }
   ExpectSays(header.status());
   const absl::StatusOr<PlyHeader> unchecked = ParsePlyHeader(file, PlyCounts::kUnchecked);
   if (!unchecked.ok()) return;

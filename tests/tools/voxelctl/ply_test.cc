@@ -97,6 +97,35 @@ TEST(PlyPoints, SeventyThousandPoints) {
   EXPECT_EQ(part.colors[0x1234], (Rgb{0x34, 0x12, 'z'}));
 }
 
+TEST(PlyPoints, PointsThatAreNotANumberAreLeftOutAndSaid) {
+  TempFolder folder;
+  const absl::StatusOr<Model> model =
+      ImportFile(folder.Write("a.ply", Header("ascii", "3",
+                                              absl::StrCat(kXyz,
+                                                           "property uchar red\nproperty "
+                                                           "uchar green\nproperty uchar "
+                                                           "blue\n")) +
+                                           "0 0 0 1 2 3\nnan nan nan 4 5 6\n9 9 9 7 8 9\n"),
+                 {});
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(model->parts[0].positions, (std::vector<Point3>{{0, 0, 0}, {9, 9, 9}}));
+  EXPECT_EQ(model->parts[0].colors, (std::vector<Rgb>{{1, 2, 3}, {7, 8, 9}}));
+  EXPECT_THAT(model->note, testing::HasSubstr("1 of 3 points are not a number (NaN)"));
+}
+
+TEST(PlyPoints, FloatColorsGoTo255WhereOneIsGreaterThan1) {
+  TempFolder folder;
+  const std::string properties =
+      absl::StrCat(kXyz, "property float red\nproperty float green\nproperty float blue\n");
+  const auto colors = [&](const std::string& body) {
+    return ImportFile(folder.Write("a.ply", Header("ascii", "2", properties) + body), {})
+        ->parts.at(0)
+        .colors;
+  };
+  EXPECT_EQ(colors("0 0 0 255 0 0\n1 1 1 64 1 0.5\n"), (std::vector<Rgb>{{255, 0, 0}, {64, 1, 1}}));
+  EXPECT_EQ(colors("0 0 0 1 0 0\n1 1 1 0.5 1 0\n"), (std::vector<Rgb>{{255, 0, 0}, {128, 255, 0}}));
+}
+
 std::string Lines(int count, const std::string& line) {
   std::string lines;
   for (int i = 0; i < count; ++i) absl::StrAppend(&lines, line, "\n");
@@ -173,8 +202,8 @@ INSTANTIATE_TEST_SUITE_P(
                 Header("ascii", "1", kXyz) + "0 zero 0\n",
                 {"vertex 0 of 1", "no number"}},
         BadFile{"ascii_nan",
-                Header("ascii", "2", kXyz) + "0 0 0\n0 nan 0\n",
-                {"vertex 1", "nan", "finite"}},
+                Header("ascii", "2", kXyz) + "nan nan nan\n0 nan 0\n",
+                {"all of its 2 points", "NaN"}},
         BadFile{"infinite",
                 Header("binary_little_endian", "1", kXyz) +
                     LittleXyz(0, std::numeric_limits<float>::infinity(), 0),

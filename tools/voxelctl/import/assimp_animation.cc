@@ -171,6 +171,10 @@ absl::StatusOr<std::unique_ptr<FrameSource>> OpenAnimation(const std::string& pa
                                                            double fps) {
   absl::StatusOr<SourceFile> file = ReadSourceFile(path);
   if (!file.ok()) return file.status();
+  if (file->extension == "stl" || file->extension == "ply") {
+    return FileError(*file, absl::StrCat("is .", file->extension, ", which has no animations"),
+                     "a .glb, .gltf, .fbx, .dae or .bvh is expected");
+  }
   if (absl::Status status = CheckMeshFile(*file); !status.ok()) return status;
   // First where a crash does no harm; what ends well there does so here.
   const absl::StatusOr<Model> tried = ReadContained(*file, [&]() -> absl::StatusOr<Model> {

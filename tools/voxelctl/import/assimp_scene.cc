@@ -328,20 +328,12 @@ struct Format {
   absl::string_view extension, name;
   Up up = Up::kY;
 };
-constexpr Format kFormats[] = {{"glb", "glTF binary"},
-                               {"gltf", "glTF"},
-                               {"obj", "Wavefront OBJ"},
-                               {"stl", "STL", Up::kZ},
-                               {"ply", "PLY mesh", Up::kZ},
-                               {"off", "OFF"},
-                               {"fbx", "FBX"},
-                               {"3mf", "3MF", Up::kZ},
-                               {"dae", "COLLADA"},
-                               {"blend", "Blender", Up::kZ},
-                               {"ifc", "IFC"},
-                               {"bvh", "BVH"},
-                               {"amf", "AMF", Up::kZ},
-                               {"dxf", "DXF"}};
+constexpr Format kFormats[] = {{"glb", "glTF binary"},   {"gltf", "glTF"},
+                               {"obj", "Wavefront OBJ"}, {"off", "OFF"},
+                               {"fbx", "FBX"},           {"3mf", "3MF", Up::kZ},
+                               {"dae", "COLLADA"},       {"blend", "Blender", Up::kZ},
+                               {"ifc", "IFC"},           {"bvh", "BVH"},
+                               {"amf", "AMF", Up::kZ},   {"dxf", "DXF"}};
 
 Format FormatOf(const SourceFile& file) {
   for (const Format& format : kFormats) {
@@ -425,7 +417,7 @@ absl::StatusOr<Model> ModelOf(const SourceFile& file, const aiScene& scene, cons
     model.parts.push_back(std::move(bones));
     return model;
   }
-  const bool bare = file.extension == "stl" || file.extension == "ply" || file.extension == "off";
+  const bool bare = file.extension == "off";
   Context context{.file = file,
                   .scene = scene,
                   .linear = absl::StartsWith(file.extension, "gl"),

@@ -11,8 +11,10 @@
 #include "tools/voxelctl/import/json_text.h"
 #include "tools/voxelctl/import/more_formats.h"
 #include "tools/voxelctl/import/ply_header.h"
+#include "tools/voxelctl/import/ply_mesh.h"
 #include "tools/voxelctl/import/ply_points.h"
 #include "tools/voxelctl/import/ply_realign.h"
+#include "tools/voxelctl/import/stl_mesh.h"
 #include "tools/voxelctl/import/text_points.h"
 #include "tools/voxelctl/import/vox_model.h"
 
@@ -30,7 +32,7 @@ absl::StatusOr<Model> ReadMap(const SourceFile& file, bool globe) {
                              : ReadGeoJson(file, *document, globe);
 }
 
-absl::StatusOr<Model> ReadPly(const SourceFile& file, const ImportOptions& options) {
+absl::StatusOr<Model> ReadPly(const SourceFile& file) {
   const absl::StatusOr<PlyHeader> header = ParsePlyHeader(file);
   if (!header.ok()) {
     const absl::StatusOr<PlyHeader> unchecked = ParsePlyHeader(file, PlyCounts::kUnchecked);
@@ -45,13 +47,13 @@ absl::StatusOr<Model> ReadPly(const SourceFile& file, const ImportOptions& optio
     }
     return model;
   }
-  const bool surfaces = header->Find("face") != nullptr || header->Find("tristrips") != nullptr;
-  return surfaces ? ReadMoreFormats(file, options) : ReadPlyPoints(file, *header);
+  return HasPlySurfaces(*header) ? ReadPlyMesh(file, *header) : ReadPlyPoints(file, *header);
 }
 
 absl::StatusOr<Model> Read(const SourceFile& file, const ImportOptions& options) {
   const std::string& extension = file.extension;
-  if (extension == "ply") return ReadPly(file, options);
+  if (extension == "ply") return ReadPly(file);
+  if (extension == "stl") return ReadStlMesh(file);
   if (extension == "xyz" || extension == "txt" || extension == "asc" || extension == "pts" ||
       extension == "csv") {
     return ReadTextPoints(file);

@@ -18,12 +18,11 @@ struct ImportOptions {
   MoleculeStyle style = MoleculeStyle::kBalls;
 };
 
-// Reads `path` by its extension, having checked that the contents are of that kind. Every build reads vox, xyz, txt, asc, pts,
-// csv, geojson, topojson, json and the points of ply. VOXELD_IMPORTERS adds obj, stl, gltf, glb, the meshes of ply; pcd, las; nii, nii.gz, hdr,
-// img, nrrd, nhdr, raw, dcm, and folders of DICOM slices; pdb, ent; svg; off, fbx, 3mf, dae, blend, ifc, bvh, and what else assimp
-// reads, in a process of its own (contained.h). Every index is in range and every number finite (samples may be no number) in what is returned, and it is not
-// empty. An error's message begins with the path and says what was found
-// and what would be right.
+// Reads `path` by its extension, having checked that the contents are of that kind. Every build reads stl, ply, vox, xyz, txt, asc,
+// pts, csv, geojson, topojson and json. VOXELD_IMPORTERS adds obj, gltf, glb; pcd, las; nii, nii.gz, hdr, img, nrrd, nhdr, raw,
+// dcm, and folders of DICOM slices; pdb, ent; svg; off, fbx, 3mf, dae, blend, ifc, bvh, and what else assimp reads, in a process of
+// its own (contained.h). Every index is in range and every number finite (samples may be no number) in what is returned, and it is
+// not empty. An error's message begins with the path and says what was found and what would be right.
 absl::StatusOr<Model> ImportFile(const std::string& path, const ImportOptions& options);
 
 }  // namespace voxeld::voxelctl

@@ -12,15 +12,15 @@ namespace voxeld::voxelctl {
 namespace {
 
 absl::Status NoImporter(absl::string_view path, absl::string_view wanted) {
-  return NotBuilt(path, "reads PLY points, VOX, GeoJSON, TopoJSON and text clouds",
+  return NotBuilt(path, "reads STL, PLY, VOX, GeoJSON, TopoJSON and text clouds",
                   "VOXELD_IMPORTERS", wanted);
 }
 
 // The extensions that docs/files.md names.
 constexpr absl::string_view kMoreFormats[] = {
-    "3ds",  "3mf", "amf", "blend", "bvh", "dae", "dcm", "dxf", "ent",  "fbx", "glb",
-    "gltf", "gz",  "hdr", "ifc",   "img", "las", "laz", "lwo", "nhdr", "nii", "nrrd",
-    "obj",  "off", "pcd", "pdb",   "ply", "raw", "stl", "svg", "x"};
+    "3ds", "3mf",  "amf", "blend", "bvh", "dae", "dcm", "dxf", "ent", "fbx",
+    "glb", "gltf", "gz",  "hdr",   "ifc", "img", "las", "laz", "lwo", "nhdr",
+    "nii", "nrrd", "obj", "off",   "pcd", "pdb", "raw", "svg", "x"};
 
 }  // namespace
 
@@ -39,7 +39,7 @@ absl::StatusOr<Model> ReadMoreFormats(const SourceFile& file, const ImportOption
       extension.empty()
           ? "its name has no extension"
           : absl::StrCat("files of type .", EscapeForTerminal(extension), " are not read"),
-      "this build reads points (.ply), voxels (.vox), points as text (.xyz, "
+      "this build reads meshes and points (.stl, .ply), voxels (.vox), points as text (.xyz, "
       ".txt, .asc, .pts, .csv) and maps (.geojson, .topojson, .json); -DVOXELD_IMPORTERS=ON adds "
       "more formats");
 }

@@ -14,9 +14,6 @@ absl::Status CheckMeshFile(const SourceFile& file);
 // refers to a vertex that is not there.
 absl::Status CheckObj(const SourceFile& file);
 
-// STL, ASCII or binary: the facets that it announces are there.
-absl::Status CheckStl(const SourceFile& file);
-
 // glTF text or GLB: well-formed, nested less than 64 deep; nodes form a forest;
 // accessors lie within their views, views within their buffers;
 // extensions that it requires are ones that can be read.

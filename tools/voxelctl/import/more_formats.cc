@@ -35,16 +35,13 @@ absl::Status CheckImporters(absl::string_view) { return absl::OkStatus(); }
 absl::Status CheckMeshFile(const SourceFile& file) {
   const std::string& extension = file.extension;
   if (extension == "obj") return CheckObj(file);
-  if (extension == "stl") return CheckStl(file);
   if (extension == "gltf" || extension == "glb") return CheckGltf(file);
   return CheckMeshBeginning(file);
 }
 
 absl::StatusOr<Model> ReadMoreFormats(const SourceFile& file, const ImportOptions& options) {
   const std::string& extension = file.extension;
-  if (extension == "obj" || extension == "stl" || extension == "ply" || extension == "gltf" ||
-      extension == "glb")
-    return ReadMesh(file);
+  if (extension == "obj" || extension == "gltf" || extension == "glb") return ReadMesh(file);
   if (extension == "pcd") return ReadPcdPoints(file);
   if (extension == "las" || extension == "laz") return ReadLasPoints(file);
   if (extension == "nii" || (extension == "gz" && absl::EndsWithIgnoreCase(file.path, ".nii.gz")))

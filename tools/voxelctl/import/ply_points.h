@@ -8,9 +8,9 @@
 
 namespace voxeld::voxelctl {
 
-// Takes x, y, z; nx, ny, nz; red, green, blue (also r, g, b and diffuse_…) of any type: integers on
-// the full range of their type, floats from 0 to 1. InvalidArgument with the number of the vertex
-// that is cut off, not a number or not finite.
+// Requires: `header` is of `file`, and has vertices. Colors are on the full range of their type; floating-point ones go to 1, or to
+// 255 where one of them is greater than 1. Points that are not a number are left out, and the model's note says how many.
+// Returns: InvalidArgument with the number of the vertex that is cut off, no number or infinite.
 absl::StatusOr<Model> ReadPlyPoints(const SourceFile& file, const PlyHeader& header);
 
 }  // namespace voxeld::voxelctl

@@ -1,0 +1,70 @@
+// The body of a PLY file, value by value, and its vertices, which clouds and meshes share.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "tools/voxelctl/import/model.h"
+#include "tools/voxelctl/import/ply_header.h"
+#include "tools/voxelctl/import/source_file.h"
+
+namespace voxeld::voxelctl {
+
+// Hands out the values of a file's body one by one, whichever way they are written. Views the file.
+class PlyValues {
+ public:
+  PlyValues(const SourceFile& file, const PlyHeader& header)
+      : rest_(absl::string_view(file.bytes).substr(header.body)), format_(header.format) {}
+
+  // Returns: false at the end of the data, or where there is no number.
+  bool Next(PlyType type, double* value);
+
+ private:
+  bool NextWord(double* value);
+  bool NextBinary(PlyType type, double* value);
+  template <typename T>
+  double Take();
+
+  absl::string_view rest_;
+  PlyHeader::Format format_;
+};
+
+// Where the values of an element's colors stand: of each channel the property's index, and the number that is as bright as can be.
+class PlyColorProperties {
+ public:
+  explicit PlyColorProperties(const PlyElement& element);
+  // Whether there are all three.
+  bool found() const { return at_[0] >= 0 && at_[1] >= 0 && at_[2] >= 0; }
+  // Whether a channel is a floating-point number. Such colors go to 1, or to 255 where one of them is greater than 1.
+  bool floating() const { return floating_; }
+  // 0 to 2; −1: the property is no channel.
+  int ChannelOf(size_t property) const;
+  // Whether a floating-point channel is greater than 1, so that all of them go to 255.
+  bool IsBeyond1(const double (&channels)[3]) const;
+  // With `to_255` floating-point numbers go to 255.
+  Rgb ColorOf(const double (&channels)[3], bool to_255) const;
+
+ private:
+  int at_[3] = {-1, -1, -1};
+  double full_scale_[3] = {1, 1, 1};
+  bool floating_ = false;
+};
+
+struct PlyVertices {
+  std::vector<Point3> positions;  // not all finite
+  std::vector<Point3> normals;    // of unit length, or zero; or none
+  std::vector<Rgb> colors;        // or none
+};
+
+// Reads the entries of "vertex": x, y, z; nx, ny, nz; red, green, blue (also r, g, b and diffuse_…) of any type.
+// Returns: InvalidArgument with the number of the vertex that is cut off or no number.
+absl::StatusOr<PlyVertices> ReadPlyVertices(const SourceFile& file, const PlyElement& vertex,
+                                            PlyValues* values);
+
+// Passes over the entries of an element. Returns: InvalidArgument with the entry that is cut off.
+absl::Status SkipPlyElement(const SourceFile& file, const PlyElement& element, PlyValues* values);
+
+}  // namespace voxeld::voxelctl
