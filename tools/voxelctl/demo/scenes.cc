@@ -32,7 +32,7 @@ std::span<const SceneAbout> Scenes() {
        "USGS, 31 January to 7 February 2018 (npm's vega-datasets); Natural Earth",
        {Atlas(),
         {{"vega-datasets/data/earthquakes.json", "vega-datasets/earthquakes.json"},
-         "tools/setup (npm's vega-datasets)"}},
+         "tools/setup --import (npm's vega-datasets)"}},
        false,
        MakeEarthquakes},
       {"house",
