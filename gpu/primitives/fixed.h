@@ -62,27 +62,15 @@ VOXELD_HD constexpr bool Contains(const Box3& box, int64_t x, int64_t y, int64_t
          z < box.hi[2];
 }
 
-template <class I>
-VOXELD_HD constexpr I Quotient(I a, I b) {
-  return a / b;
-}
-#if defined(__CUDACC__)
-// nvcc would expand each division in 128 bits to 150 instructions where it stands.
-template <>
-VOXELD_HD VOXELD_DEVICE_NOINLINE inline Wide Quotient(Wide a, Wide b) {
-  return a / b;
-}
-#endif
-
 // Rounded towards −∞ and +∞; b > 0.
 template <class I>
 VOXELD_HD constexpr I FloorDiv(I a, I b) {
-  const I q = Quotient(a, b);
+  const I q = a / b;
   return q - static_cast<I>(q * b > a);
 }
 template <class I>
 VOXELD_HD constexpr I CeilDiv(I a, I b) {
-  const I q = Quotient(a, b);
+  const I q = a / b;
   return q + static_cast<I>(q * b < a);
 }
 

@@ -108,7 +108,7 @@ struct TriangleSetup {
     for (int shift = 0; shift < 24; shift += 8) {
       I total = sum / 2;
       for (int i = 0; i < 3; ++i) total += weight[i] * static_cast<I>((t.color[i] >> shift) & 0xFF);
-      rgb |= static_cast<uint32_t>(Quotient(total, sum)) << shift;
+      rgb |= static_cast<uint32_t>(total / sum) << shift;
     }
     return t.texture.texels == nullptr ? rgb : Tinted(TexelAt(t, weight, sum), rgb);
   }
