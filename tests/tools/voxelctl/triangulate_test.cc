@@ -34,12 +34,12 @@ double Sum(const std::vector<double>& values) {
   return sum;
 }
 
-// A star with this many points, counter-clockwise.
+// A star with this many points, counter-clockwise, and not quite plane.
 std::vector<Point3> Star(int points) {
   std::vector<Point3> corners;
   for (int i = 0; i < 2 * points; ++i) {
     const double radius = i % 2 == 0 ? 1 : 0.3, angle = i * M_PI / points;
-    corners.push_back({radius * std::cos(angle), radius * std::sin(angle), 0.01 * i});
+    corners.push_back({radius * std::cos(angle), radius * std::sin(angle), 0.001 * i});
   }
   return corners;
 }
