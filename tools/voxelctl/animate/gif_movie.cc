@@ -19,8 +19,8 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr int kColors = 255;      // one of 256 is for pixels that stay as they were
-constexpr int kMostSide = 65535;  // of the format
+constexpr int kGifColors = 255;      // one of 256 is for pixels that stay as they were
+constexpr int kGifMostSide = 65535;  // of the format
 
 struct Rows {
   int top = 0, bottom = 0, left = 0, right = 0;  // the ends are beyond the last
@@ -52,9 +52,9 @@ class Gif : public MovingPicture {
       : path_(std::move(path)), fps_(fps), file_(std::move(file)) {}
 
   absl::Status Add(const Image& image) override {
-    if (image.width > kMostSide || image.height > kMostSide) {
+    if (image.width > kGifMostSide || image.height > kGifMostSide) {
       return Error(absl::StrCat("the picture is ", image.width, "x", image.height,
-                                "; a GIF is at most ", kMostSide, "x", kMostSide));
+                                "; a GIF is at most ", kGifMostSide, "x", kGifMostSide));
     }
     width_ = image.width;
     height_ = image.height;
@@ -73,7 +73,7 @@ class Gif : public MovingPicture {
 
   absl::Status Finish() override {
     if (packed_.empty()) return Error("it has no picture");
-    std::vector<Color8> palette = colors_.Cut(kColors);
+    std::vector<Color8> palette = colors_.Cut(kGifColors);
     ColorMapObject* map = ::GifMakeMapObject(256, nullptr);
     if (map == nullptr) return Error("there is no memory for its palette");
     const absl::Cleanup free_map = [map] { ::GifFreeMapObject(map); };
@@ -147,7 +147,7 @@ class Gif : public MovingPicture {
     const Rows rows =
         before.empty() ? Rows{0, height_, 0, width_} : Changed(before, now, width_, height_);
     const GraphicsControlBlock control = {DISPOSE_DO_NOT, false, Time(i + 1) - Time(i),
-                                          before.empty() ? NO_TRANSPARENT_COLOR : kColors};
+                                          before.empty() ? NO_TRANSPARENT_COLOR : kGifColors};
     GifByteType block[4];
     const size_t size = ::EGifGCBToExtension(&control, block);
     if (::EGifPutExtension(gif, GRAPHICS_EXT_FUNC_CODE, static_cast<int>(size), block) != GIF_OK ||
@@ -159,7 +159,7 @@ class Gif : public MovingPicture {
       const size_t row = static_cast<size_t>(y) * static_cast<size_t>(width_);
       for (int x = rows.left; !before.empty() && x < rows.right; ++x) {
         uint8_t& index = now[row + static_cast<size_t>(x)];
-        if (index == before[row + static_cast<size_t>(x)]) index = kColors;
+        if (index == before[row + static_cast<size_t>(x)]) index = kGifColors;
       }
       if (::EGifPutLine(gif, now.data() + row + rows.left, rows.right - rows.left) != GIF_OK)
         return GifError(gif->Error);

@@ -12,12 +12,12 @@ namespace {
 constexpr double kBreath_s = 8;
 constexpr double kRadius = 2.5 * std::numbers::pi;  // two and a half cells across
 // Of coarse displays one cell, or its walls would be everywhere.
-constexpr int kCoarse = 32;
+constexpr int kFewVoxels = 32;
 
 class GyroidScene final : public Scene {
  public:
   explicit GyroidScene(const SceneSettings& settings) : space_(settings.space) {
-    radius_ = settings.least_side < kCoarse ? std::numbers::pi : kRadius;
+    radius_ = settings.least_side < kFewVoxels ? std::numbers::pi : kRadius;
     const double half = FitRadius(space_, 1e-9);
     scale_ = half / radius_;
     height_ = 0.97 * space_.half.z / scale_;

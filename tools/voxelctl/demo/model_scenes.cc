@@ -21,7 +21,7 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr double kEarthTilt = 23.4;
-constexpr int kCoarse = 100;  // a display of fewer voxels has no room for every border
+constexpr int kLeastWithBorders = 100;  // a display of fewer voxels has no room for every border
 constexpr uint64_t kGalaxySeed = 20;
 constexpr Rgb kCoastColor = {70, 215, 190}, kDimCoastColor = {18, 75, 85};
 constexpr Rgb kGraticuleColor = {8, 24, 60};
@@ -124,7 +124,7 @@ Model Graticule() {
 // Coasts and borders, or coasts alone from the file beside it where the display is coarse.
 absl::StatusOr<Model> ReadAtlas(const SceneSettings& settings) {
   std::string path = settings.files[0];
-  if (settings.least_side < kCoarse) {
+  if (settings.least_side < kLeastWithBorders) {
     const std::filesystem::path coarse =
         std::filesystem::path(path).parent_path() / "land-110m.json";
     std::error_code error;
@@ -148,7 +148,7 @@ absl::StatusOr<std::unique_ptr<Scene>> MakeGlobe(const SceneSettings& settings) 
   Paint(kCoastColor, &*atlas);
   std::vector<Model> models;
   models.push_back(*std::move(atlas));
-  if (settings.least_side >= kCoarse) models.push_back(Graticule());
+  if (settings.least_side >= kLeastWithBorders) models.push_back(Graticule());
   return SpunModels(settings, std::move(models), {.turn_s = 16, .tilt_degrees = kEarthTilt});
 }
 

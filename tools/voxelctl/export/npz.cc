@@ -22,7 +22,7 @@ namespace {
 
 // Without ZIP64.
 constexpr uint64_t kMost = std::numeric_limits<uint32_t>::max() - uint64_t{1};
-constexpr uint16_t kDeflated = 8, kVersion = 20;
+constexpr uint16_t kDeflated = 8, kZipVersion = 20;
 constexpr uint32_t kFirstOfJanuary1980 = 0x0021'0000;  // ZIP knows no "never"
 
 // The header of an array file, as "NPY" 1.0 has it: what follows begins at a multiple of 64.
@@ -52,7 +52,7 @@ class Zip {
     if (at_ + packed.size() > kMost) return TooLarge("the file", at_ + packed.size());
 
     std::string about;
-    PutU16(&about, kVersion);
+    PutU16(&about, kZipVersion);
     PutU16(&about, 0);
     PutU16(&about, kDeflated);
     PutU32(&about, kFirstOfJanuary1980);
@@ -63,7 +63,7 @@ class Zip {
     PutU16(&about, 0);
 
     directory_ += "PK\x01\x02";
-    PutU16(&directory_, kVersion);
+    PutU16(&directory_, kZipVersion);
     directory_ += about;
     directory_.append(10, '\0');  // no comment, the first disk, no attributes
     PutU32(&directory_, static_cast<uint32_t>(at_));

@@ -18,9 +18,9 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr int32_t kMostSide = 256;
-constexpr int kColors = 255;  // a voxel's 0 means that there is none
-constexpr uint32_t kVersion = 150;
+constexpr int32_t kModelSide = 256;
+constexpr int kVoxColors = 255;  // a voxel's 0 means that there is none
+constexpr uint32_t kVoxVersion = 150;
 
 using Cell = std::array<int32_t, 3>;
 
@@ -85,8 +85,8 @@ class Voxels {
       const double place = std::floor(from[a] + 1e-6);
       if (!(place >= 0 && place < size_[a])) return false;
       cell[a] = static_cast<int32_t>(place);
-      block[a] = cell[a] / kMostSide;
-      within |= static_cast<uint32_t>(cell[a] % kMostSide) << (8 * a);
+      block[a] = cell[a] / kModelSide;
+      within |= static_cast<uint32_t>(cell[a] % kModelSide) << (8 * a);
     }
     const Color8 color = {rgb[0], rgb[1], rgb[2]};
     const auto [voxel, is_new] = blocks_[block].try_emplace(within, color);
@@ -103,7 +103,7 @@ class Voxels {
       for (const auto& [within, color] : voxels) colors.Add(color);
     }
     absl::flat_hash_map<uint32_t, uint8_t> places;
-    const std::vector<Color8> palette = colors.Cut(kColors, &places);
+    const std::vector<Color8> palette = colors.Cut(kVoxColors, &places);
 
     std::string models, nodes, children;
     uint32_t model = 0;
@@ -127,7 +127,7 @@ class Voxels {
       rgba.push_back(static_cast<char>(0xff));
     }
     std::string file = "VOX ";
-    PutU32(&file, kVersion);
+    PutU32(&file, kVoxVersion);
     return file + Chunk("MAIN", "",
                         models + Transform(0, 1, "") + Chunk("nGRP", group + children) + nodes +
                             Chunk("RGBA", rgba));
@@ -137,7 +137,7 @@ class Voxels {
   using Block = absl::flat_hash_map<uint32_t, Color8>;  // x, y and z in it, 8 bits each
 
   int32_t Side(const Cell& block, size_t axis) const {
-    return std::min(kMostSide, size_[axis] - block[axis] * kMostSide);
+    return std::min(kModelSide, size_[axis] - block[axis] * kModelSide);
   }
 
   std::string Model(const Cell& block, const Block& voxels,
@@ -157,7 +157,7 @@ class Voxels {
   std::string Move(const Cell& block) const {
     Cell to;
     for (size_t a = 0; a < 3; ++a) {
-      to[a] = block[a] * kMostSide + Side(block, a) / 2 - (a < 2 ? size_[a] / 2 : 0);
+      to[a] = block[a] * kModelSide + Side(block, a) / 2 - (a < 2 ? size_[a] / 2 : 0);
     }
     return absl::StrCat(to[0], " ", to[1], " ", to[2]);
   }

@@ -7,6 +7,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
+#include "tools/voxelctl/import/surface_builder.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -50,12 +51,6 @@ double Of(const PointRow& row, PointColumn column) { return row[static_cast<size
 uint8_t Byte(double fraction) {
   const double scaled = fraction * 255 + 0.5;
   return std::isfinite(scaled) ? static_cast<uint8_t>(std::clamp(scaled, 0.0, 255.0)) : 0;
-}
-
-Point3 UnitOrZero(const Point3& v) {
-  const double length = std::hypot(v.x, v.y, v.z);
-  if (!(length > 1e-12) || !std::isfinite(length)) return {};
-  return {v.x / length, v.y / length, v.z / length};
 }
 
 }  // namespace

@@ -66,7 +66,7 @@ Corner SurfaceBuilder::VertexAt(uint32_t vertex) const {
 }
 
 Point3 UnitOrZero(const Point3& v) {
-  const double length = std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z);
+  const double length = std::hypot(v.x, v.y, v.z);
   if (!(length > 1e-12) || !std::isfinite(length)) return {};
   return {v.x / length, v.y / length, v.z / length};
 }

@@ -11,7 +11,6 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr uint64_t kPieceBytes = 512 << 10;
-constexpr uint64_t kMessageOverhead = 4096;
 constexpr uint64_t kInstanceBytes = 32;  // of a part that draws another object, about
 constexpr uint64_t kVertexBytes = 3 * sizeof(float) + 3;
 constexpr uint32_t kU16Vertices = 65536;  // of which 16-bit indices can speak

@@ -11,7 +11,6 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr uint64_t kMessageOverhead = 4096;
 constexpr uint64_t kMostBytes = 64u << 20;  // where the server names no limit
 constexpr uint32_t kMostAlong = 65536;
 constexpr size_t kBins = 1024;

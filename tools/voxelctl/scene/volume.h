@@ -21,6 +21,9 @@ struct VolumeLook {
   std::optional<double> level;  // the surface there instead
 };
 
+// Bytes of a message that are kept for all beside its bulk.
+inline constexpr uint64_t kMessageOverhead = 4096;
+
 // Brings bytes to the server as an asset.
 using AssetSink = std::function<absl::StatusOr<client::Asset>(absl::string_view bytes)>;
 

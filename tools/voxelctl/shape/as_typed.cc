@@ -11,16 +11,16 @@
 namespace voxeld::voxelctl {
 namespace {
 
-enum class Kind : uint8_t { kShape, kMask, kObject, kClip };
+enum class TypedKind : uint8_t { kShape, kMask, kObject, kClip };
 
-Kind KindOf(const std::string& text) {
-  if (absl::StartsWith(text, "mask:")) return Kind::kMask;
-  if (absl::StartsWith(text, "object ")) return Kind::kObject;
-  return absl::StartsWith(text, "clip_") ? Kind::kClip : Kind::kShape;
+TypedKind KindOf(const std::string& text) {
+  if (absl::StartsWith(text, "mask:")) return TypedKind::kMask;
+  if (absl::StartsWith(text, "object ")) return TypedKind::kObject;
+  return absl::StartsWith(text, "clip_") ? TypedKind::kClip : TypedKind::kShape;
 }
 
 // The `number`-th of a kind, from 1; nothing if there is none.
-std::string Nth(std::span<const std::string> shapes, Kind kind, size_t number) {
+std::string Nth(std::span<const std::string> shapes, TypedKind kind, size_t number) {
   for (const std::string& shape : shapes) {
     if (KindOf(shape) == kind && --number == 0) return shape;
   }
@@ -74,7 +74,7 @@ absl::Status AsTyped(const absl::Status& refused, std::span<const std::string> s
   if (absl::string_view part = whole, skipped; TakeUpTo("definition.parts[", &part, &skipped)) {
     typed = OfObject(shapes, std::string(id), NumberIn(absl::StripSuffix(part, "]")));
   } else if (const size_t space = id.rfind(' '); space != absl::string_view::npos) {
-    typed = Nth(shapes, layer == kMaskLayer ? Kind::kMask : Kind::kShape,
+    typed = Nth(shapes, layer == kMaskLayer ? TypedKind::kMask : TypedKind::kShape,
                 NumberIn(id.substr(space + 1)));
   }
   if (typed.empty()) return refused;

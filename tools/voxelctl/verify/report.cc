@@ -15,7 +15,7 @@ using display::conformance::CaseResult;
 using display::conformance::RunResult;
 using display::conformance::Verdict;
 using display::conformance::VerdictName;
-using Kind = Verdict::Kind;
+using VerdictKind = Verdict::Kind;
 
 std::string SectionOf(const CaseResult& result) {
   return result.verdict.section.empty() ? result.what->section : result.verdict.section;
@@ -49,11 +49,11 @@ nlohmann::ordered_json CaseJson(const CaseResult& result) {
                                  {"section", SectionOf(result)},
                                  {"result", VerdictName(result.verdict.kind)},
                                  {"duration_ns", result.duration}};
-  if (result.verdict.kind == Kind::kFailed) {
+  if (result.verdict.kind == VerdictKind::kFailed) {
     json["expected"] = result.verdict.expected;
     json["seen"] = result.verdict.seen;
   }
-  if (result.verdict.kind == Kind::kNotApplicable) json["reason"] = result.verdict.reason;
+  if (result.verdict.kind == VerdictKind::kNotApplicable) json["reason"] = result.verdict.reason;
   return json;
 }
 
@@ -63,13 +63,13 @@ std::string CaseXml(const CaseResult& result, const DeviceReport& device,
                                     absl::StrCat("verify.", Xml(driver)), Xml(result.what->id),
                                     Seconds(result.duration));
   const Verdict& verdict = result.verdict;
-  if (verdict.kind == Kind::kFailed) {
+  if (verdict.kind == VerdictKind::kFailed) {
     absl::StrAppend(&xml, ">\n      <failure message=\"expected ", Xml(verdict.expected), "; seen ",
                     Xml(verdict.seen), "\" type=\"conformance\">", Xml(result.what->title),
                     "\nexpected: ", Xml(verdict.expected), "\nseen: ", Xml(verdict.seen),
                     "\nsee: ", Xml(device.page), " §", Xml(SectionOf(result)),
                     "</failure>\n    </testcase>\n");
-  } else if (verdict.kind == Kind::kNotApplicable) {
+  } else if (verdict.kind == VerdictKind::kNotApplicable) {
     absl::StrAppend(&xml, ">\n      <skipped message=\"", Xml(verdict.reason),
                     "\"/>\n    </testcase>\n");
   } else {
@@ -80,7 +80,7 @@ std::string CaseXml(const CaseResult& result, const DeviceReport& device,
 
 }  // namespace
 
-size_t VerifyReport::Count(Kind kind) const {
+size_t VerifyReport::Count(VerdictKind kind) const {
   size_t count = 0;
   for (const DeviceReport& device : devices) count += device.run.Count(kind);
   return count;
@@ -91,12 +91,12 @@ std::string CaseText(const CaseResult& result, const std::string& page) {
   std::string text =
       absl::StrFormat("%-14s  %-28s  §%-4s %10s  %s\n", VerdictName(verdict.kind), result.what->id,
                       result.what->section, Duration(result.duration), result.what->title);
-  if (verdict.kind == Kind::kFailed) {
+  if (verdict.kind == VerdictKind::kFailed) {
     absl::StrAppend(&text, "    expected: ", EscapeForTerminal(verdict.expected),
                     "\n    seen:     ", EscapeForTerminal(verdict.seen), "\n    see:      ", page,
                     " §", SectionOf(result), "\n");
   }
-  if (verdict.kind == Kind::kNotApplicable) {
+  if (verdict.kind == VerdictKind::kNotApplicable) {
     absl::StrAppend(&text, "    because:  ", EscapeForTerminal(verdict.reason), "\n");
   }
   return text;
@@ -111,8 +111,8 @@ std::string SummaryText(const VerifyReport& report) {
   }
   return absl::StrFormat("%s in %.1f s: %d passed, %d failed, %d not applicable",
                          Counted(cases, "case"), static_cast<double>(took) / sync::kSecond,
-                         report.Count(Kind::kPassed), report.Count(Kind::kFailed),
-                         report.Count(Kind::kNotApplicable));
+                         report.Count(VerdictKind::kPassed), report.Count(VerdictKind::kFailed),
+                         report.Count(VerdictKind::kNotApplicable));
 }
 
 nlohmann::ordered_json ReportJson(const VerifyReport& report) {
@@ -133,9 +133,9 @@ nlohmann::ordered_json ReportJson(const VerifyReport& report) {
   return {{"display", report.display},
           {"driver", report.driver},
           {"seed", report.seed},
-          {"passed", report.Count(Kind::kPassed)},
-          {"failed", report.Count(Kind::kFailed)},
-          {"not_applicable", report.Count(Kind::kNotApplicable)},
+          {"passed", report.Count(VerdictKind::kPassed)},
+          {"failed", report.Count(VerdictKind::kFailed)},
+          {"not_applicable", report.Count(VerdictKind::kNotApplicable)},
           {"devices", std::move(devices)}};
 }
 
@@ -147,8 +147,8 @@ std::string JunitXml(const VerifyReport& report) {
     const RunResult& run = device.run;
     absl::StrAppend(
         &suites, "  <testsuite name=\"", Xml(device.protocol), ": ", Xml(device.name), "\" ",
-        Counts(run.results.size(), run.Count(Kind::kFailed), run.Count(Kind::kNotApplicable),
-               Took(run)),
+        Counts(run.results.size(), run.Count(VerdictKind::kFailed),
+               run.Count(VerdictKind::kNotApplicable), Took(run)),
         ">\n    <properties>\n      <property name=\"serial\" value=\"", Xml(run.identity.serial),
         "\"/>\n      <property name=\"path\" value=\"", Xml(run.identity.path),
         "\"/>\n      <property name=\"firmware\" value=\"",
@@ -164,8 +164,9 @@ std::string JunitXml(const VerifyReport& report) {
       "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"voxelctl "
       "verify ",
       Xml(report.driver), "\" ",
-      Counts(tests, report.Count(Kind::kFailed), report.Count(Kind::kNotApplicable), time), ">\n",
-      suites, "</testsuites>\n");
+      Counts(tests, report.Count(VerdictKind::kFailed), report.Count(VerdictKind::kNotApplicable),
+             time),
+      ">\n", suites, "</testsuites>\n");
 }
 
 }  // namespace voxeld::voxelctl
