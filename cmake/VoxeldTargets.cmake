@@ -101,7 +101,7 @@ if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
 endif()
 if(VOXELD_QUICK AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # GCC otherwise collects its garbage every 128 MB, a tenth of its time. Memory stays below what tools/jobs counts for a compiler.
-  target_compile_options(voxeld_warnings INTERFACE "$<$<COMPILE_LANGUAGE:CXX>:SHELL:--param ggc-min-heapsize=1000000>")
+  target_compile_options(voxeld_warnings INTERFACE "$<$<COMPILE_LANGUAGE:CXX>:SHELL:--param ggc-min-heapsize=800000>")
 endif()
 if(VOXELD_WERROR)
   target_compile_options(voxeld_warnings INTERFACE -Werror)
