@@ -19,6 +19,7 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
+#include "common/text/printable.h"
 #include "daemon/access/security.h"
 #include "daemon/access/ticker.h"
 #include "daemon/assets/asset_store.h"
@@ -61,7 +62,7 @@ constexpr sync::TimeNs kEndLimit = 5 * sync::kSecond;
 constexpr int kSpareThreads = 8;
 
 int Fail(int code, const absl::Status& status) {
-  std::fprintf(stderr, "voxeld: %s\n", std::string(status.message()).c_str());
+  std::fprintf(stderr, "voxeld: %s\n", EscapeControls(status.message()).c_str());
   return code;
 }
 

@@ -8,6 +8,7 @@ import sys
 
 # A folder may include itself and these; the longest prefix decides.
 ALLOWED = {
+    "common": [],
     "display/sync": [],
     "display/crc": [],
     "display/api": ["display/sync"],
@@ -60,7 +61,7 @@ ALLOWED = {
     # What comes in by the protocols by which pictures go out.
     "tools/lights": ["display/drivers/network/protocol", "display/sync", "daemon/address", "tools/lights"],
     "tools/voxelctl/lights": ["display/drivers/wiring", "display/sync", "gpu/affine", "voxeld", "tools/lights", "tools/voxelctl"],
-    "tools/markers": ["voxeld", "scene_update", "display/sync", "tools/json", "tools/markers"],
+    "tools/markers": ["voxeld", "scene_update", "display/sync", "tools/markers"],
     # A program of its own over what of voxelctl makes its connection and shows what comes in.
     "tools/ros": ["voxeld/credentials", "daemon/usage", "display/sync", "tools/markers", "tools/voxelctl/cli/server_options",
                   "tools/voxelctl/commands/console", "tools/voxelctl/connection/address", "tools/voxelctl/connection/connection",
@@ -81,13 +82,16 @@ ALLOWED = {
     "tests": ["daemon", "gpu", "display", "voxeld", "tools", "client"],
 }
 
+# Every folder may include these.
+SHARED = ("common/",)
+
 # The only places that may include gRPC's headers: one on each side of the wire. No header does.
 GRPC = ("daemon/services/", "tools/voxelctl/connection", "tools/bench/voxel_bench/", "client/cpp/")
 GRPC_TESTS = ("tests/daemon/services/", "tests/e2e/", "tests/hil/", "tests/tools/", "tests/integration/")
-PROTOBUF_FREE = ("gpu/", "display/", "daemon/scene/", "daemon/core/", "daemon/pipeline/", "daemon/config/")
+PROTOBUF_FREE = ("common/", "gpu/", "display/", "daemon/scene/", "daemon/core/", "daemon/pipeline/", "daemon/config/")
 
 # What is written from the repository root, or from where protobuf's files are made.
-OURS = re.compile(r"(display|gpu|daemon|tools|client|tests|voxeld)/")
+OURS = re.compile(r"(common|display|gpu|daemon|tools|client|tests|voxeld)/")
 INCLUDE = re.compile(r'^\s*#\s*include\s+([<"])([^">]+)[">]')
 
 
@@ -131,7 +135,7 @@ def wrong_includes(path, lines, own_header=os.path.exists):
             wrong.append(f'{where}: <{target}> is one of ours; it must be written "{target}"')
         if target.startswith("tests/") and not path.startswith("tests/"):
             wrong.append(f"{where}: product code includes a test's header")
-        ok = target.startswith(folder + "/") or any(
+        ok = target.startswith((folder + "/", *SHARED)) or any(
             target.startswith(a) for a in ALLOWED[folder]) or path.startswith("tests/")
         if not ok:
             wrong.append(f"{where}: {folder} must not include {target}")

@@ -3,7 +3,6 @@
 #include <openssl/evp.h>
 #include <pwd.h>
 #include <sys/stat.h>
-#include <toml++/toml.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -21,6 +20,7 @@
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "common/toml/parse_toml.h"
 #include "daemon/suggest/suggest.h"
 
 namespace voxeld::daemon::access {
@@ -195,14 +195,9 @@ class Reader {
 }  // namespace
 
 absl::StatusOr<Grants> ParseGrants(std::string_view text, const std::string& name) {
-  try {
-    const toml::table root = toml::parse(text, name);
-    return Reader(root, name).Take();
-  } catch (const toml::parse_error& error) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(name, ":", error.source().begin.line, ": ",
-                     absl::Utf8SafeCHexEscape(std::string(error.description()))));
-  }
+  const absl::StatusOr<toml::table> root = ParseToml(text, name);
+  if (!root.ok()) return root.status();
+  return Reader(*root, name).Take();
 }
 
 absl::StatusOr<Grants> ReadGrants(const std::string& path) {

@@ -2,10 +2,10 @@
 
 #include <vector>
 
-#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
+#include "common/text/printable.h"
 
 namespace voxeld::daemon::access {
 namespace {
@@ -62,7 +62,7 @@ absl::StatusOr<Scopes> ParseScopes(std::string_view text) {
     }
     if (!known) {
       return absl::InvalidArgumentError(
-          absl::StrCat("the scope \"", absl::Utf8SafeCHexEscape(word),
+          absl::StrCat("the scope \"", EscapeQuoted(word),
                        "\" is none; there are view, draw, control, and all or none alone"));
     }
   }

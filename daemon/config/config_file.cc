@@ -1,6 +1,4 @@
 // The TOML file: read with line and column, printed back.
-#include <toml++/toml.h>
-
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
@@ -9,9 +7,10 @@
 #include <type_traits>
 #include <utility>
 
-#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "common/text/printable.h"
+#include "common/toml/parse_toml.h"
 #include "daemon/config/config.h"
 #include "daemon/config/fields.h"
 #include "daemon/suggest/suggest.h"
@@ -119,7 +118,7 @@ class FileReader {
     if (text->starts_with("unix:") && !text->starts_with("unix:/")) {
       return Wrong(
           *Find(key), key,
-          absl::StrCat("is \"", absl::Utf8SafeCHexEscape(*text),
+          absl::StrCat("is \"", EscapeQuoted(*text),
                        "\", which is no absolute path; give a program's file, or unix: and "
                        "a socket's absolute path"));
     }
@@ -281,7 +280,7 @@ class FileReader {
 
   // A line of printable text, whatever keys and values are.
   void Error(const toml::source_region& source, const std::string& text) {
-    errors_.push_back(absl::StrCat(Where(source), ": ", display::Printable(text)));
+    errors_.push_back(absl::StrCat(Where(source), ": ", EscapeControls(text)));
   }
 
   void Wrong(const toml::node& node, const std::string& key, const std::string& text) {
@@ -358,16 +357,11 @@ class Printer {
 }  // namespace
 
 absl::Status ReadConfigText(std::string_view text, const std::string& name, Config* config) {
-  try {
-    const toml::table root = toml::parse(text, name);
-    absl::Status status = FileReader(root, name, config).status();
-    if (status.ok()) config->file = name;
-    return status;
-  } catch (const toml::parse_error& error) {
-    const toml::source_position& at = error.source().begin;
-    return absl::InvalidArgumentError(absl::StrCat(name, ":", at.line, ":", at.column, ": ",
-                                                   display::Printable(error.description())));
-  }
+  const absl::StatusOr<toml::table> root = ParseToml(text, name);
+  if (!root.ok()) return root.status();
+  absl::Status status = FileReader(*root, name, config).status();
+  if (status.ok()) config->file = name;
+  return status;
 }
 
 std::string ToToml(const Config& config) {

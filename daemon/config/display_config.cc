@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "absl/strings/ascii.h"
-#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "common/text/printable.h"
 
 namespace voxeld::daemon {
 namespace {
@@ -16,7 +16,7 @@ constexpr size_t kNameBytes = 64;
 absl::string_view View(std::string_view text) { return {text.data(), text.size()}; }
 
 // For messages, which are one line of printable text.
-std::string Shown(absl::string_view text) { return absl::Utf8SafeCHexEscape(text); }
+std::string Shown(absl::string_view text) { return EscapeQuoted(text); }
 
 absl::Status Wrong(std::string_view text, const std::string& why) {
   return absl::InvalidArgumentError(

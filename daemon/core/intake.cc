@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <utility>
 
-#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "common/text/printable.h"
 #include "daemon/scene/commit_applier.h"
 #include "daemon/scene/draft.h"
 
@@ -79,8 +79,8 @@ void RefusalTally::CountMore(uint64_t more, const std::optional<Issue>& first) {
 }
 
 std::string RefusalTally::Describe(const Issue& issue) {
-  std::string text = absl::Utf8SafeCHexEscape(issue.layer);
-  if (!issue.id.empty()) absl::StrAppend(&text, "/", absl::Utf8SafeCHexEscape(issue.id));
+  std::string text = EscapeQuoted(issue.layer);
+  if (!issue.id.empty()) absl::StrAppend(&text, "/", EscapeQuoted(issue.id));
   if (!issue.field.empty()) absl::StrAppend(&text, text.empty() ? "" : ", ", issue.field);
   if (!text.empty()) text += ": ";
   return text + issue.message;

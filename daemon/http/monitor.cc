@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "common/text/printable.h"
 #include "daemon/http/metrics.h"
 
 namespace voxeld::daemon::http {
@@ -84,7 +85,7 @@ Response HealthResponse(const std::vector<DisplayDescription>& displays, const S
   const char* status = fails ? "failing" : reasons.empty() ? "ok" : "degraded";
   const Json answer = {{"status", status}, {"reasons", std::move(reasons)}};
   return {fails || held ? 503u : 200u, "application/json",
-          answer.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n"};
+          EscapeJson(answer.dump(-1, ' ', false, Json::error_handler_t::replace)) + "\n"};
 }
 
 Handler MonitorHandler(Core& core, std::shared_ptr<const std::atomic<Phase>> phase) {

@@ -9,6 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
 #include "daemon/log/descriptor_sink.h"
 
 namespace voxeld::daemon {
@@ -44,7 +45,7 @@ absl::string_view View(std::string_view text) { return {text.data(), text.size()
 
 std::string JsonText(std::string_view text) {
   using Json = nlohmann::json;
-  return Json(std::string(text)).dump(-1, ' ', false, Json::error_handler_t::replace);
+  return EscapeJson(Json(std::string(text)).dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
 // Bare where no reader could be misled.

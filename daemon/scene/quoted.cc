@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
 
 namespace voxeld::daemon {
 namespace {
@@ -17,7 +17,7 @@ std::string Quoted(std::string_view text) {
   if (size < text.size()) {  // between characters
     while (size > 0 && (static_cast<unsigned char>(text[size]) & 0xC0) == 0x80) --size;
   }
-  return absl::StrCat("\"", absl::Utf8SafeCHexEscape(absl::string_view(text.data(), size)),
+  return absl::StrCat("\"", EscapeQuoted(absl::string_view(text.data(), size)),
                       size < text.size() ? "…\"" : "\"");
 }
 

@@ -9,6 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "common/json/bounded_json.h"
 #include "daemon/wire/convert.h"
 
 namespace voxeld::daemon::viewer::page {
@@ -91,7 +92,7 @@ absl::StatusOr<Message> ReadClear(const Json& json) {
 }  // namespace
 
 absl::StatusOr<Message> Read(const std::string& text, bool control) {
-  const Json message = Json::parse(text, nullptr, false);
+  const Json message = ParseBoundedJson(text);
   if (!message.is_object()) return Wrong("a message is a JSON object");
   if (message.contains("hello")) return Hello{};
   if (message.contains("watch")) return ReadWatch(message);

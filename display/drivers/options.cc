@@ -8,11 +8,11 @@
 #include <utility>
 #include <variant>
 
-#include "absl/strings/escaping.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
+#include "common/text/printable.h"
 #include "display/drivers/geometry_options.h"
 #include "display/geometry/footprint.h"
 
@@ -95,8 +95,8 @@ void OptionReader::Refuse(const std::string& key, std::string_view right) {
   const auto it = options_.options.find(key);
   status_ = absl::InvalidArgumentError(
       absl::StrCat("display \"", options_.name, "\": ", key, " is \"",
-                   it == options_.options.end() ? "" : absl::Utf8SafeCHexEscape(it->second),
-                   "\"; it must be ", std::string(right)));
+                   it == options_.options.end() ? "" : EscapeQuoted(it->second), "\"; it must be ",
+                   std::string(right)));
 }
 
 std::string OptionReader::Text(const std::string& key, const std::string& fallback) {
@@ -194,10 +194,9 @@ absl::Status OptionReader::Finish() const {
   if (!status_.ok()) return status_;
   for (const auto& [key, value] : options_.options) {
     if (known_.contains(key)) continue;
-    return absl::InvalidArgumentError(
-        absl::StrCat("display \"", options_.name, "\": there is no option ",
-                     absl::Utf8SafeCHexEscape(key), " (\"", absl::Utf8SafeCHexEscape(value),
-                     "\") here; there are ", absl::StrJoin(known_, ", ")));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "display \"", options_.name, "\": there is no option ", EscapeQuoted(key), " (\"",
+        EscapeQuoted(value), "\") here; there are ", absl::StrJoin(known_, ", ")));
   }
   return absl::OkStatus();
 }

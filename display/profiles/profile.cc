@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <set>
 #include <sstream>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -12,6 +14,8 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "common/text/printable.h"
+#include "common/toml/parse_toml.h"
 #include "display/profiles/toml_options.h"
 
 namespace voxeld::display {
@@ -19,25 +23,17 @@ namespace {
 
 constexpr const char* kEnding = ".toml";
 
-// `parse` gives the table, or throws what is wrong.
-template <typename Parse>
-absl::StatusOr<Profile> ProfileOf(const std::string& path, Parse&& parse) {
-  toml::table root;
-  try {
-    root = parse();
-  } catch (const toml::parse_error& wrong) {
-    return absl::InvalidArgumentError(absl::StrCat(path, ":", wrong.source().begin.line, ":",
-                                                   wrong.source().begin.column, ": ",
-                                                   Printable(wrong.description())));
-  }
+absl::StatusOr<Profile> ProfileOf(const std::string& path, std::string_view text) {
+  const absl::StatusOr<toml::table> parsed = ParseToml(text, path);
+  if (!parsed.ok()) return parsed.status();
   Profile profile;
-  for (const auto& [key, node] : root) {
+  for (const auto& [key, node] : *parsed) {
     const std::string name(key.str());
     const std::optional<std::string> value = OptionText(node);
     if (!value.has_value() || name == "name" || name == "profile") {
       return absl::InvalidArgumentError(absl::StrCat(
           path, ":", node.source().begin.line, ":", node.source().begin.column, ": ",
-          Printable(name),
+          EscapeControls(name),
           value.has_value() ? " has no place in a profile: it is given where the display is"
                             : " is no text, number, boolean, or array of these"));
     }
@@ -59,11 +55,15 @@ absl::StatusOr<Profile> ReadProfile(const std::string& path) {
   if (!std::filesystem::is_regular_file(path, error)) {
     return absl::NotFoundError(absl::StrCat("there is no file ", path));
   }
-  return ProfileOf(path, [&] { return toml::parse_file(path); });
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  if (file.peek() != std::ifstream::traits_type::eof()) text << file.rdbuf();
+  if (!file || !text) return absl::UnavailableError(absl::StrCat(path, " cannot be read"));
+  return ProfileOf(path, text.str());
 }
 
 absl::StatusOr<Profile> ParseProfile(std::string_view text, const std::string& name) {
-  return ProfileOf(name, [&] { return toml::parse(text, name); });
+  return ProfileOf(name, text);
 }
 
 std::vector<std::string> ProfilePlaces(const std::function<std::string(const char*)>& environment,

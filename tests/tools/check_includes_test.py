@@ -24,6 +24,11 @@ class CheckIncludesTest(unittest.TestCase):
         self.assertEqual(wrong("gpu/a.cc", "", '#include "daemon/core/core.h"'),
                          ["gpu/a.cc:2: gpu must not include daemon/core/core.h"])
 
+    def test_everybody_may_include_common_which_includes_nobody(self):
+        self.assertEqual(wrong("gpu/a.cc", '#include "common/text/printable.h"'), [])
+        self.assertEqual(wrong("common/text/a.cc", '#include "gpu/word.h"'),
+                         ["common/text/a.cc:1: common must not include gpu/word.h"])
+
     def test_a_files_own_header_comes_first(self):
         lines = ["#include <vector>", '#include "gpu/a.h"']
         self.assertEqual(check_includes.wrong_includes("gpu/a.cc", lines, lambda path: path == "gpu/a.h"),

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "common/json/bounded_json.h"
 
 namespace voxeld::markers {
 namespace {
@@ -31,7 +32,7 @@ std::optional<uint64_t> NumberOf(const Json& object, const char* key) {
 }  // namespace
 
 absl::StatusOr<std::string> FoxgloveChannels::Told(std::string_view text) {
-  const Json json = Json::parse(text, nullptr, false);
+  const Json json = ParseBoundedJson(text);
   if (!json.is_object()) return absl::InvalidArgumentError("the server's text is no JSON object");
   const std::string what = TextOf(json, "op");
   if (what == "unadvertise") {

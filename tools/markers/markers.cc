@@ -12,7 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/time/time.h"
-#include "tools/json/json_depth.h"
+#include "common/json/json_depth.h"
 
 namespace voxeld::markers {
 namespace {

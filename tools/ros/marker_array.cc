@@ -8,8 +8,8 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
+#include "common/text/printable.h"
 #include "tools/markers/markers.h"
-#include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::ros1 {
 namespace {
@@ -272,7 +272,7 @@ std::string WhatIsWrong(const Marker& marker) {
   if (marker.lifetime.sec < 0 || marker.lifetime.nsec < 0) {
     return absl::StrCat("has a lifetime of ", marker.lifetime.sec, " s");
   }
-  if (!voxelctl::IsUtf8(View(marker.text)) || !voxelctl::IsUtf8(View(marker.mesh_resource))) {
+  if (!IsUtf8(View(marker.text)) || !IsUtf8(View(marker.mesh_resource))) {
     return "has a text that is not UTF-8";
   }
   return "";
@@ -307,7 +307,7 @@ void PendingMarkers::AddMalformed(std::string why) {
 }
 
 void PendingMarkers::Add(const Marker& marker) {
-  if (!voxelctl::IsUtf8(View(marker.ns))) {
+  if (!IsUtf8(View(marker.ns))) {
     return AddMalformed(std::string(Wrong(marker, "has a namespace that is not UTF-8").message()));
   }
   switch (marker.action) {

@@ -6,9 +6,9 @@
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
 #include "daemon/usage/usage_error.h"
 #include "tools/voxelctl/cli/server_options.h"
-#include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::ros1 {
 namespace {
@@ -31,7 +31,7 @@ std::string ChooseMaster(const RosOptions& given, const client::Environment& env
 ParsedCommandLine Usage(const std::string& what) {
   ParsedCommandLine result;
   result.exit_code = kExitUsage;
-  result.err = absl::StrCat("voxeld-ros: ", voxelctl::EscapeForTerminal(what),
+  result.err = absl::StrCat("voxeld-ros: ", EscapeForTerminal(what),
                             "\nvoxeld-ros --help says what there is\n");
   return result;
 }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "common/text/printable.h"
 #include "tools/voxelctl/cli/options.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/commands/console.h"
@@ -32,13 +33,13 @@ int main(int argc, char** argv) {
     const ParsedCommandLine parsed =
         ParseCommandLine(std::vector<std::string>(argv + 1, argv + argc));
     std::cout << parsed.out << std::flush;
-    std::cerr << parsed.err;
+    std::cerr << voxeld::EscapeControls(parsed.err);
     if (!parsed.options) return parsed.exit_code;
     Interrupt interrupt(Interrupt::Watch::kSignals);
     Console console(std::cout, std::cerr, parsed.options->json, ::isatty(STDERR_FILENO) == 1);
     return Run(*parsed.options, EnvironmentVariable, interrupt, console);
   } catch (const std::exception& error) {
-    std::cerr << "voxelctl: " << error.what() << "\n";
+    std::cerr << "voxelctl: " << voxeld::EscapeControls(error.what()) << "\n";
     return kExitFailure;
   }
 }

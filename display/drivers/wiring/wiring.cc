@@ -12,6 +12,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "common/json/bounded_json.h"
 #include "display/geometry/footprint.h"
 
 namespace voxeld::display::wiring {
@@ -200,11 +201,12 @@ absl::StatusOr<Lattice> CubeLattice(const CubeWiring& wiring, const PixelNumbers
 
 absl::StatusOr<Lattice> ParseLayout(std::string_view json, const PixelNumbers& numbers,
                                     double pitch_mm) {
-  const Json entries = Json::parse(json, nullptr, false);
+  const Json entries = ParseBoundedJson(json);
   if (!entries.is_array()) {
     return absl::InvalidArgumentError(
-        entries.is_discarded() ? "it is not JSON, or has a number beyond all bounds"
-                               : "it is not an array; it must be one, with an entry a pixel");
+        entries.is_discarded()
+            ? "it is not JSON, is nested too deep, or has a number beyond all bounds"
+            : "it is not an array; it must be one, with an entry a pixel");
   }
   Lattice lattice = EmptyLattice(numbers, pitch_mm);
   if (entries.size() > lattice.points_mm.size()) {

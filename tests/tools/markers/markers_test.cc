@@ -7,7 +7,7 @@
 #include <limits>
 #include <numbers>
 
-#include "tools/json/json_depth.h"
+#include "common/json/json_depth.h"
 #include "tools/markers/foxglove_client.h"
 #include "tools/markers/marker_scene.h"
 

@@ -4,7 +4,6 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/proto_json.h"
 #include "tools/voxelctl/text/table.h"
 #include "voxeld/v1/display.pb.h"
@@ -12,35 +11,6 @@
 
 namespace voxeld::voxelctl {
 namespace {
-
-TEST(EscapeForTerminal, LeavesTextAlone) {
-  EXPECT_EQ(EscapeForTerminal("Grüße, 体積 ✓"), "Grüße, 体積 ✓");
-}
-
-TEST(IsUtf8, IsOfTheWholeText) {
-  for (const char* text : {"", "a", "Grüße, 体積 ✓", "\xf4\x8f\xbf\xbf"})
-    EXPECT_TRUE(IsUtf8(text)) << text;
-  for (const char* text :
-       {"\xff", "a\xe2\x82", "\xc0\x80", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\x80 a"}) {
-    EXPECT_FALSE(IsUtf8(text));
-  }
-}
-
-TEST(EscapeForTerminal, TakesTheStingOut) {
-  EXPECT_EQ(EscapeForTerminal("\x1b]0;title\x07"), "\\u{1b}]0;title\\u{7}");
-  EXPECT_EQ(EscapeForTerminal("a\nb\tc\\"), "a\\u{a}b\\u{9}c\\\\");
-  EXPECT_EQ(EscapeForTerminal("\xc2\x9b"
-                              "31m"),
-            "\\u{9b}31m");  // C1 CSI
-  EXPECT_EQ(EscapeForTerminal("\xe2\x80\xae"
-                              "gnp"),
-            "\\u{202e}gnp");                                        // right-to-left override
-  EXPECT_EQ(EscapeForTerminal("\xff\xfe"), "\\xff\\xfe");           // never UTF-8
-  EXPECT_EQ(EscapeForTerminal("\xe2\x82"), "\\xe2\\x82");           // cut
-  EXPECT_EQ(EscapeForTerminal("\xc0\xaf"), "\\xc0\\xaf");           // overlong
-  EXPECT_EQ(EscapeForTerminal("\xed\xa0\x80"), "\\xed\\xa0\\x80");  // a surrogate
-  EXPECT_EQ(EscapeForTerminal(absl::string_view("\0x", 2)), "\\u{0}x");
-}
 
 TEST(Table, AlignsAndEscapes) {
   Table table({{"NAME"}, {"COUNT", Table::Align::kRight}});

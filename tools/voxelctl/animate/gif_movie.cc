@@ -10,11 +10,11 @@
 
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/animate/dither.h"
 #include "tools/voxelctl/animate/moving_picture.h"
 #include "tools/voxelctl/files/whole_file.h"
 #include "tools/voxelctl/render/palette.h"
-#include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
 namespace {

@@ -17,6 +17,7 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
+#include "common/text/printable.h"
 #include "daemon/config/display_config.h"
 #include "daemon/config/display_view.h"
 #include "display/geometry/corrector.h"
@@ -24,7 +25,6 @@
 #include "display/usb/libusb/libusb_bus.h"
 #include "tools/voxelctl/ask/asker.h"
 #include "tools/voxelctl/calibrate/trial.h"
-#include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
 namespace {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
 #include "daemon/suggest/suggest.h"
-#include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
 

@@ -11,6 +11,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "common/text/printable.h"
 #include "daemon/suggest/suggest.h"
 #include "daemon/usage/usage_error.h"
 #include "tools/voxelctl/cli/about.h"
@@ -23,7 +24,6 @@
 #include "tools/voxelctl/cli/play_options.h"
 #include "tools/voxelctl/cli/server_options.h"
 #include "tools/voxelctl/cli/service_options.h"
-#include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
 namespace {

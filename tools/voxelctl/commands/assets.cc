@@ -5,9 +5,9 @@
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
 #include "nlohmann/json.hpp"
 #include "tools/voxelctl/commands/commands.h"
-#include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/table.h"
 
 namespace voxeld::voxelctl {

@@ -3,13 +3,13 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/cli/patterns.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/commands/display_names.h"
 #include "tools/voxelctl/commands/end_patterns.h"
 #include "tools/voxelctl/connection/owned_layers.h"
 #include "tools/voxelctl/shape/drawing.h"
-#include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/proto_json.h"
 #include "tools/voxelctl/text/table.h"
 

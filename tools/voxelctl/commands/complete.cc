@@ -10,11 +10,11 @@
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
 #include "display/sync/clock.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/files/whole_file.h"
 #include "tools/voxelctl/profile/profile.h"
-#include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
 namespace {

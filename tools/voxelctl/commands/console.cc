@@ -4,23 +4,24 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "common/text/printable.h"
 
 namespace voxeld::voxelctl {
 
 bool Console::Data(absl::string_view text) {
   EndProgress();
-  out_ << std::string(text) << std::flush;
+  out_ << (json_ ? EscapeJson(text) : std::string(text)) << std::flush;
   return out_.good();
 }
 
 void Console::Say(absl::string_view text) {
   EndProgress();
-  err_ << std::string(text) << std::endl;
+  err_ << EscapeControls(text) << std::endl;
 }
 
 void Console::Progress(absl::string_view text) {
   if (!live_) return;
-  err_ << absl::StrCat("\r\x1b[K", text) << std::flush;
+  err_ << absl::StrCat("\r\x1b[K", EscapeControls(text)) << std::flush;
   drawn_ = true;
 }
 

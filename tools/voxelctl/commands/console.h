@@ -8,7 +8,8 @@
 
 namespace voxeld::voxelctl {
 
-// Data go to `out`, words to `err`. For one thread.
+// Data go to `out`, words to `err`. What others chose cannot control a terminal: characters that could are escaped in words and in
+// JSON. Not thread-safe.
 class Console {
  public:
   // `live`: err is a terminal, so a line may be drawn again and again.

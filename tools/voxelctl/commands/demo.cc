@@ -9,6 +9,7 @@
 #include "absl/algorithm/container.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "common/text/printable.h"
 #include "display/sync/clock.h"
 #include "tools/voxelctl/commands/choose_space.h"
 #include "tools/voxelctl/commands/commands.h"
@@ -18,7 +19,6 @@
 #include "tools/voxelctl/demo/scene.h"
 #include "tools/voxelctl/demo/stage.h"
 #include "tools/voxelctl/shape/drawing.h"
-#include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/table.h"
 
 namespace voxeld::voxelctl {

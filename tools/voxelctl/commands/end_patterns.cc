@@ -2,8 +2,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/connection/owned_layers.h"
-#include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
 

@@ -1,8 +1,8 @@
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/commands/capture_shown.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/export/export_files.h"
-#include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/proto_json.h"
 #include "tools/voxelctl/text/table.h"
 

@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
+#include "common/text/printable.h"
 #include "daemon/text/stroke_font.h"
 #include "display/sync/clock.h"
 #include "tools/voxelctl/commands/captured_volume.h"
@@ -23,7 +24,6 @@
 #include "tools/voxelctl/render/render_volume.h"
 #include "tools/voxelctl/shape/drawing.h"
 #include "tools/voxelctl/shape/examples.h"
-#include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/proto_json.h"
 #include "tools/voxelctl/text/table.h"
 

@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "common/text/printable.h"
 #include "display/sync/clock.h"
 #include "tools/voxelctl/commands/choose_space.h"
 #include "tools/voxelctl/commands/commands.h"
@@ -22,7 +23,6 @@
 #include "tools/voxelctl/scene/pack.h"
 #include "tools/voxelctl/scene/placement.h"
 #include "tools/voxelctl/shape/drawing.h"
-#include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/table.h"
 
 namespace voxeld::voxelctl {

@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "absl/strings/str_join.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/import/animation.h"
 #include "tools/voxelctl/import/importer.h"
-#include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
 namespace {

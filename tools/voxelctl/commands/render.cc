@@ -10,12 +10,12 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "common/text/printable.h"
 #include "display/sync/clock.h"
 #include "tools/voxelctl/animate/moving_picture.h"
 #include "tools/voxelctl/commands/capture_shown.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/render/render_volume.h"
-#include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/proto_json.h"
 #include "tools/voxelctl/text/table.h"
 

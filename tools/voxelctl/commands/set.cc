@@ -1,8 +1,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/commands/display_names.h"
-#include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/proto_json.h"
 
 namespace voxeld::voxelctl {

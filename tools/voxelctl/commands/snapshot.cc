@@ -1,11 +1,11 @@
 #include <cstdint>
 
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/commands/capture_shown.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/render/png_file.h"
 #include "tools/voxelctl/render/render_volume.h"
-#include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/proto_json.h"
 
 namespace voxeld::voxelctl {

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/commands/commands.h"
-#include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/proto_json.h"
 
 namespace voxeld::voxelctl {

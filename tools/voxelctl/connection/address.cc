@@ -1,6 +1,6 @@
 #include "tools/voxelctl/connection/address.h"
 
-#include "tools/voxelctl/text/escape.h"
+#include "common/text/printable.h"
 
 namespace voxeld::voxelctl {
 

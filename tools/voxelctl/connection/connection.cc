@@ -8,9 +8,9 @@
 #include <set>
 #include <utility>
 
+#include "common/text/printable.h"
 #include "display/sync/mutex.h"
 #include "tools/voxelctl/connection/status.h"
-#include "tools/voxelctl/text/escape.h"
 #include "voxeld/channel.h"
 #include "voxeld/v1/display.grpc.pb.h"
 #include "voxeld/v1/scene.grpc.pb.h"

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/connection/status.h"
-#include "tools/voxelctl/text/escape.h"
 #include "voxeld/v1/scene.grpc.pb.h"
 
 namespace voxeld::voxelctl {

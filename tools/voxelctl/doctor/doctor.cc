@@ -13,8 +13,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
+#include "common/text/printable.h"
 #include "daemon/address/address.h"
-#include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/proto_json.h"
 
 namespace voxeld::voxelctl {

@@ -11,11 +11,11 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/export/export_files.h"
 #include "tools/voxelctl/export/lit_pixels.h"
 #include "tools/voxelctl/export/little_endian.h"
 #include "tools/voxelctl/files/whole_file.h"
-#include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
 namespace {

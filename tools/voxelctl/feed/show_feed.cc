@@ -8,10 +8,10 @@
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "common/text/printable.h"
 #include "display/sync/clock.h"
 #include "tools/markers/marker_scene.h"
 #include "tools/voxelctl/connection/session_end.h"
-#include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/table.h"
 
 namespace voxeld::voxelctl {

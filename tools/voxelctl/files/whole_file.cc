@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "tools/voxelctl/text/escape.h"
+#include "common/text/printable.h"
 
 namespace voxeld::voxelctl {
 namespace {

@@ -9,11 +9,11 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/import/animation.h"
 #include "tools/voxelctl/import/assimp_scene.h"
 #include "tools/voxelctl/import/contained.h"
 #include "tools/voxelctl/import/mesh_checks.h"
-#include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
 namespace {

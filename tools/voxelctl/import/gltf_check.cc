@@ -10,10 +10,10 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/import/json_text.h"
 #include "tools/voxelctl/import/mesh_checks.h"
 #include "tools/voxelctl/import/model.h"
-#include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
 namespace {

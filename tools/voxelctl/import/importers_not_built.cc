@@ -3,9 +3,9 @@
 #include <iterator>
 
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/import/animation.h"
 #include "tools/voxelctl/import/more_formats.h"
-#include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/not_built.h"
 
 namespace voxeld::voxelctl {

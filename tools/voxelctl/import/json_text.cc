@@ -4,7 +4,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
-#include "tools/json/json_depth.h"
+#include "common/json/json_depth.h"
 
 namespace voxeld::voxelctl {
 

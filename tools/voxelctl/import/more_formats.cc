@@ -4,6 +4,7 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/import/assimp_scene.h"
 #include "tools/voxelctl/import/contained.h"
 #include "tools/voxelctl/import/dicom_check.h"
@@ -15,7 +16,6 @@
 #include "tools/voxelctl/import/nrrd_volume.h"
 #include "tools/voxelctl/import/pcd_points.h"
 #include "tools/voxelctl/import/svg_drawing.h"
-#include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
 namespace {

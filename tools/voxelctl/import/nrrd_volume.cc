@@ -21,9 +21,9 @@
 #include "absl/strings/str_replace.h"
 #include "absl/strings/str_split.h"
 #include "absl/strings/strip.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/import/inflate.h"
 #include "tools/voxelctl/import/volume_samples.h"
-#include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
 namespace {

@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/import/ply_values.h"
 #include "tools/voxelctl/import/surface_builder.h"
 #include "tools/voxelctl/import/triangulate.h"
-#include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
 namespace {

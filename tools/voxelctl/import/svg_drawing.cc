@@ -19,13 +19,13 @@
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
 #include "absl/strings/string_view.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/import/svg_fill.h"
 #include "tools/voxelctl/import/svg_layers.h"
 #include "tools/voxelctl/import/svg_path.h"
 #include "tools/voxelctl/import/svg_shapes.h"
 #include "tools/voxelctl/import/svg_style.h"
 #include "tools/voxelctl/import/svg_transform.h"
-#include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
 namespace {

@@ -8,7 +8,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
-#include "tools/voxelctl/text/escape.h"
+#include "common/text/printable.h"
 
 namespace voxeld::voxelctl {
 namespace {

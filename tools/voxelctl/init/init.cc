@@ -13,12 +13,12 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
+#include "common/text/printable.h"
 #include "display/drivers/options.h"
 #include "display/drivers/registry.h"
 #include "display/profiles/profile.h"
 #include "display/sync/clock.h"
 #include "tools/voxelctl/ask/asker.h"
-#include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
 namespace {

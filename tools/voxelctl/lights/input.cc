@@ -7,13 +7,13 @@
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "common/text/printable.h"
 #include "display/sync/clock.h"
 #include "tools/lights/intake.h"
 #include "tools/lights/receiver.h"
 #include "tools/voxelctl/connection/session_end.h"
 #include "tools/voxelctl/lights/choose_lights.h"
 #include "tools/voxelctl/lights/lights.h"
-#include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/table.h"
 
 namespace voxeld::voxelctl {

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
 #include "display/sync/clock.h"
 #include "tools/voxelctl/lights/choose_lights.h"
 #include "tools/voxelctl/lights/lights.h"
-#include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/table.h"
 
 namespace voxeld::voxelctl {

@@ -1,7 +1,5 @@
 #include "tools/voxelctl/playlist/playlist.h"
 
-#include <toml++/toml.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -12,6 +10,7 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "common/toml/parse_toml.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -169,14 +168,9 @@ bool IsWithin(const Hours& hours, WeekMinute now) {
 }
 
 absl::StatusOr<Playlist> ParsePlaylist(std::string_view text, const std::string& path) {
-  try {
-    const toml::table root = toml::parse(text, path);
-    return Reader(root, path).Take();
-  } catch (const toml::parse_error& error) {
-    const toml::source_position& at = error.source().begin;
-    return absl::InvalidArgumentError(
-        absl::StrCat(path, ":", at.line, ":", at.column, ": ", error.what()));
-  }
+  const absl::StatusOr<toml::table> root = ParseToml(text, path);
+  if (!root.ok()) return root.status();
+  return Reader(*root, path).Take();
 }
 
 absl::StatusOr<Playlist> ReadPlaylist(const std::string& path) {

@@ -11,12 +11,12 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
+#include "common/text/printable.h"
 #include "display/drivers/options.h"
 #include "display/drivers/simulated/emulated_device.h"
 #include "display/drivers/usb_options.h"
 #include "display/geometry/footprint.h"
 #include "display/profiles/profile.h"
-#include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/proto_json.h"
 
 namespace voxeld::voxelctl {

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <utility>
 
-#include "tools/voxelctl/text/escape.h"
+#include "common/text/printable.h"
 
 namespace voxeld::voxelctl {
 

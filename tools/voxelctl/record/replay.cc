@@ -8,13 +8,13 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "common/text/printable.h"
 #include "display/sync/clock.h"
 #include "tools/recording/mcap.h"
 #include "tools/recording/scene_recording.h"
 #include "tools/voxelctl/connection/owned_layers.h"
 #include "tools/voxelctl/record/playback.h"
 #include "tools/voxelctl/record/record.h"
-#include "tools/voxelctl/text/escape.h"
 #include "tools/voxelctl/text/table.h"
 
 namespace voxeld::voxelctl {

@@ -16,7 +16,7 @@
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_replace.h"
 #include "absl/strings/str_split.h"
-#include "tools/voxelctl/text/escape.h"
+#include "common/text/printable.h"
 
 namespace voxeld::voxelctl {
 namespace {

@@ -11,10 +11,10 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "common/text/printable.h"
 #include "daemon/suggest/suggest.h"
 #include "gpu/affine.h"
 #include "tools/voxelctl/shape/field_text.h"
-#include "tools/voxelctl/text/escape.h"
 
 namespace voxeld::voxelctl {
 namespace {

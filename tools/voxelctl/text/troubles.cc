@@ -1,7 +1,7 @@
 #include "tools/voxelctl/text/troubles.h"
 
 #include "absl/strings/str_cat.h"
-#include "tools/voxelctl/text/escape.h"
+#include "common/text/printable.h"
 
 namespace voxeld::voxelctl {
 

@@ -10,7 +10,7 @@
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
 #include "absl/strings/strip.h"
-#include "tools/voxelctl/text/escape.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/text/table.h"
 #include "tools/voxelctl/text/troubles.h"
 

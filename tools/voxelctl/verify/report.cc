@@ -5,7 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_replace.h"
-#include "tools/voxelctl/text/escape.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/text/table.h"
 
 namespace voxeld::voxelctl {

@@ -1,0 +1,133 @@
+#include "common/toml/parse_toml.h"
+
+#include <optional>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+#include "common/text/printable.h"
+
+namespace voxeld {
+namespace {
+
+struct Excess {
+  size_t line = 1, column = 1;
+  std::string what;
+};
+
+// Walks over the text without recursion. It knows strings and comments, and otherwise only counts: dots between two delimiters
+// (of a number there is one at the most) and brackets that are open. Of text that is not TOML it may count too many, never too few.
+class ExcessFinder {
+ public:
+  ExcessFinder(std::string_view text, const TomlLimits& limits) : text_(text), limits_(limits) {}
+
+  std::optional<Excess> Find() {
+    while (at_ < text_.size()) {
+      const char c = text_[at_];
+      if (c == '#') {
+        SkipComment();
+      } else if (c == '"' || c == '\'') {
+        SkipString(c);
+      } else {
+        Count(c);
+        if (dots_ + 1 > limits_.max_key_parts) {
+          return Found(absl::StrCat("a key has more than ", limits_.max_key_parts, " parts"));
+        }
+        if (depth_ > limits_.max_depth) {
+          return Found(absl::StrCat("values are nested more than ", limits_.max_depth, " deep"));
+        }
+        ++at_;
+      }
+    }
+    return std::nullopt;
+  }
+
+ private:
+  void Count(char c) {
+    switch (c) {
+      case '.':
+        ++dots_;
+        break;
+      case '[':
+      case '{':
+        ++depth_;
+        dots_ = 0;
+        break;
+      case ']':
+      case '}':
+        if (depth_ > 0) --depth_;
+        dots_ = 0;
+        break;
+      case '\n':
+      case ',':
+      case '=':
+        dots_ = 0;
+        break;
+      default:
+        break;
+    }
+  }
+
+  void SkipComment() {
+    while (at_ < text_.size() && text_[at_] != '\n') ++at_;
+  }
+
+  // A string of one line ends at the line's end at the latest, since the parser takes it for an error there.
+  void SkipString(char quote) {
+    const std::string three(3, quote);
+    const bool long_string = text_.substr(at_, 3) == three;
+    at_ += long_string ? 3 : 1;
+    while (at_ < text_.size()) {
+      if (quote == '"' && text_[at_] == '\\') {
+        at_ += 2;
+      } else if (long_string ? text_.substr(at_, 3) == three : text_[at_] == quote) {
+        at_ += long_string ? 3 : 1;
+        return;
+      } else if (!long_string && text_[at_] == '\n') {
+        return;
+      } else {
+        ++at_;
+      }
+    }
+  }
+
+  Excess Found(std::string what) const {
+    Excess excess{.what = std::move(what)};
+    for (const char c : text_.substr(0, at_)) {
+      ++excess.column;
+      if (c == '\n') ++excess.line, excess.column = 1;
+    }
+    return excess;
+  }
+
+  const std::string_view text_;
+  const TomlLimits limits_;
+  size_t at_ = 0, dots_ = 0, depth_ = 0;
+};
+
+}  // namespace
+
+absl::StatusOr<toml::table> ParseToml(std::string_view text, const std::string& name,
+                                      const TomlLimits& limits) {
+  const std::string shown = EscapeControls(name);
+  if (text.size() > limits.max_bytes) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(shown, ": has ", text.size(), " bytes; ", limits.max_bytes, " is the most"));
+  }
+  if (const std::optional<Excess> excess = ExcessFinder(text, limits).Find()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(shown, ":", excess->line, ":", excess->column, ": ", excess->what));
+  }
+  try {
+    return toml::parse(text, name);
+  } catch (const toml::parse_error& error) {
+    const toml::source_position& at = error.source().begin;
+    const std::string_view what = error.description();
+    return absl::InvalidArgumentError(
+        absl::StrCat(shown, ":", at.line, ":", at.column, ": ",
+                     EscapeControls(absl::string_view(what.data(), what.size()))));
+  }
+}
+
+}  // namespace voxeld
