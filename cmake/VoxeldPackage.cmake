@@ -59,6 +59,7 @@ if(VOXELD_DPKG_QUERY AND CMAKE_GENERATOR STREQUAL "Ninja")
   if(TARGET voxeld-engine-cuda)
     list(APPEND arguments --cuda ${CUDAToolkit_VERSION})
     set(cuda_program --program $<TARGET_FILE:voxeld-engine-cuda>)
+    set(cuda_target voxeld-engine-cuda)
   endif()
   foreach(tool ${CMAKE_CXX_COMPILER} ${VOXELD_MOLD} ${CMAKE_COMMAND} ${CMAKE_MAKE_PROGRAM} ${VOXELD_NODE} ${VOXELD_GRPC_PYTHON_PLUGIN})
     list(APPEND arguments --tool ${tool})
@@ -69,7 +70,7 @@ if(VOXELD_DPKG_QUERY AND CMAKE_GENERATOR STREQUAL "Ninja")
     COMMAND ${VOXELD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tools/sbom/sbom.py --build ${CMAKE_BINARY_DIR} --version ${PROJECT_VERSION}
             --epoch ${VOXELD_EPOCH} --program $<TARGET_FILE:voxeld> --program $<TARGET_FILE:voxelctl> --program $<TARGET_FILE:voxeld-engine> ${cuda_program}
             --notice ${packaging}/notices/colormaps.txt --out ${sbom}/voxeld.spdx.json --out-notices ${sbom}/NOTICES ${arguments}
-    DEPENDS voxeld voxelctl voxeld-engine ${scripts} ${packaging}/notices/colormaps.txt
+    DEPENDS voxeld voxelctl voxeld-engine ${cuda_target} ${scripts} ${packaging}/notices/colormaps.txt
     COMMENT "Listing what voxeld is made of"
     VERBATIM)
   add_custom_target(sbom ALL DEPENDS ${sbom}/voxeld.spdx.json ${sbom}/NOTICES)

@@ -126,11 +126,11 @@ function(voxeld_test_options name)
   endif()
 endfunction()
 
-# Headers that most sources include are compiled once for all of them (VOXELD_PRECOMPILE): with the options of sources that are
+# Headers that most sources include are compiled once for all of them: with the options of sources that are
 # optimised, and with those of sources below voxeld_compile_quickly(). The wire messages and gRPC are not among them: loading what GCC makes
 # of those costs as much as compiling them.
 set(VOXELD_COMMON_HEADERS OFF)
-if(VOXELD_PRECOMPILE OR VOXELD_INSTRUMENTED OR VOXELD_QUICK)
+if(VOXELD_INSTRUMENTED OR VOXELD_QUICK)
   set(VOXELD_COMMON_HEADERS ON)
   foreach(headers voxeld_common_headers voxeld_common_headers_plain)
     file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/headers/${headers}.cc CONTENT "int ${headers};\n" @ONLY)

@@ -62,7 +62,7 @@ constexpr sync::TimeNs kEndLimit = 5 * sync::kSecond;
 constexpr int kSpareThreads = 8;
 
 int Fail(int code, const absl::Status& status) {
-  std::fprintf(stderr, "voxeld: %s\n", EscapeControls(status.message()).c_str());
+  std::fprintf(stderr, "voxeld: %s\n", EscapeLines(status.message()).c_str());
   return code;
 }
 
@@ -225,8 +225,9 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   access::Ticker turns(clock, TimeWatch::kTurn, [&process] { process.LookAtTime(); });
   const absl::StatusOr<access::AccessOptions> access_options = AccessOf(config.security);
   if (!access_options.ok()) return Fail(1, access_options.status());
-  absl::StatusOr<std::unique_ptr<access::Security>> opened =
-      access::Security::Open(*access_options, config.security.tls, config.log.audit, log);
+  absl::StatusOr<std::unique_ptr<access::Security>> opened = access::Security::Open(
+      *access_options, config.security.tls,
+      {.path = config.log.audit, .required = config.log.audit_required}, log);
   if (!opened.ok()) return Fail(1, opened.status());
   const std::unique_ptr<access::Security> security = *std::move(opened);
   std::unique_ptr<state::KeptState> kept;  // none: nothing outlives the daemon
@@ -268,6 +269,8 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
                  [counters, security = security.get(), &reloads, &clock] {
                    ListenFigures figures = counters->Read(clock.Now());
                    figures.access_trouble = security->trouble();
+                   const access::AuditStats audit = security->audit().stats();
+                   figures.audit_pending = audit.pending, figures.audit_lost = audit.lost;
                    const access::TlsStore::Counts tls = security->tls_counts();
                    figures.tls_taken = tls.taken, figures.tls_refused = tls.refused;
                    const reload::Reloader* reloader = reloads;

@@ -53,4 +53,8 @@ def main() -> None:
         print(f"build: {done} of {total} steps in {time.monotonic() - begin:.0f} s", flush=True)
 
 
-main()
+if __name__ == "__main__":
+    try:
+        main()
+    except KeyboardInterrupt:  # the build, which got it too, ends by itself
+        sys.exit(130)

@@ -31,6 +31,8 @@ size_t Decode(absl::string_view text, uint32_t* code) {
   return length;
 }
 
+bool IsAsciiControl(uint32_t code) { return code < 0x20 || code == 0x7f; }
+
 bool Harmful(uint32_t code) {
   return code < 0x20 || (code >= 0x7f && code < 0xa0) || (code >= 0x200b && code <= 0x200f) ||
          (code >= 0x2028 && code <= 0x202e) || (code >= 0x2066 && code <= 0x2069) ||
@@ -68,16 +70,29 @@ void AppendPrintable(std::string* out, std::optional<uint32_t> code, absl::strin
   }
 }
 
+void AppendWithoutControls(std::string* out, std::optional<uint32_t> code,
+                           absl::string_view bytes) {
+  if (code && IsAsciiControl(*code)) {
+    absl::StrAppendFormat(out, "\\x%02x", *code);
+  } else if (code == '\\') {
+    *out += '\\';
+  } else {
+    AppendPrintable(out, code, bytes);
+  }
+}
+
 }  // namespace
 
 std::string EscapeForTerminal(absl::string_view text) { return Escaped(text, AppendPrintable); }
 
-std::string EscapeControls(absl::string_view text) {
+std::string EscapeControls(absl::string_view text) { return Escaped(text, AppendWithoutControls); }
+
+std::string EscapeLines(absl::string_view text) {
   return Escaped(text, [](std::string* out, std::optional<uint32_t> code, absl::string_view bytes) {
-    if (code == '\n' || code == '\\') {
-      out->append(bytes.data(), bytes.size());
+    if (code == '\n') {
+      *out += '\n';
     } else {
-      AppendPrintable(out, code, bytes);
+      AppendWithoutControls(out, code, bytes);
     }
   });
 }
@@ -98,7 +113,7 @@ std::string EscapeQuoted(absl::string_view text) {
         *out += "\\t";
         break;
       default:
-        if (code && (*code < 0x20 || *code == 0x7f)) {
+        if (code && IsAsciiControl(*code)) {
           absl::StrAppendFormat(out, "\\x%02x", *code);
         } else {
           AppendPrintable(out, code, bytes);

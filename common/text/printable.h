@@ -14,9 +14,12 @@ namespace voxeld {
 // cannot move a cursor or set a title.
 std::string EscapeForTerminal(absl::string_view text);
 
-// Returns: `text` with harmful characters but line feeds as \u{N}, and bytes that are not UTF-8 as \xNN. Text that has been through
-// EscapeForTerminal or EscapeQuoted stays as it is, so whatever prints whole messages can make sure of them.
+// Returns: `text` with C0 controls, DEL and bytes that are not UTF-8 as \xNN, and other harmful characters as \u{N}. Text that has
+// been escaped stays as it is, so whatever puts messages together or prints them can make sure of them.
 std::string EscapeControls(absl::string_view text);
+
+// Returns: as EscapeControls, but line feeds stay: for text of several lines.
+std::string EscapeLines(absl::string_view text);
 
 // Returns: `text` for a place between double quotes: as EscapeForTerminal does, but quotes, C0 controls and DEL are
 // escaped as in C: \", \n, \r, \t, \xNN.

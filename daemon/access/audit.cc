@@ -5,7 +5,9 @@
 
 #include <cerrno>
 #include <nlohmann/json.hpp>
+#include <string>
 #include <system_error>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
@@ -27,9 +29,9 @@ bool EndsWithinALine(int file) {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<Audit>> Audit::Open(const std::string& path, Logger* log) {
-  std::unique_ptr<Audit> audit(new Audit(path, log));
-  if (path.empty()) return audit;
+absl::StatusOr<std::unique_ptr<Audit>> Audit::Open(AuditOptions options, Logger* log) {
+  std::unique_ptr<Audit> audit(new Audit(std::move(options), log));
+  if (audit->options_.path.empty()) return audit;
   absl::StatusOr<Descriptor> file = audit->OpenFile();
   if (!file.ok()) return file.status();
   audit->Take(*std::move(file));
@@ -38,9 +40,19 @@ absl::StatusOr<std::unique_ptr<Audit>> Audit::Open(const std::string& path, Logg
 
 absl::StatusOr<Descriptor> Audit::OpenFile() const {
   Descriptor file(
-      open(path_.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0640));
-  if (!file.ok()) return absl::ErrnoToStatus(errno, absl::StrCat("the audit log ", path_));
+      open(options_.path.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0640));
+  if (!file.ok()) return absl::ErrnoToStatus(errno, absl::StrCat("the audit log ", options_.path));
   return file;
+}
+
+absl::Status Audit::MayAct() {
+  if (!options_.required || options_.path.empty()) return absl::OkStatus();
+  sync::MutexLock lock(mutex_);
+  if (!error_.empty()) WritePending();
+  if (error_.empty()) return absl::OkStatus();
+  return absl::UnavailableError(
+      absl::StrCat("the audit log ", options_.path, " cannot be written (", error_,
+                   "), and log.audit_required refuses control actions until it can"));
 }
 
 void Audit::Record(const std::string& who, const std::string& peer, const std::string& method,
@@ -48,7 +60,7 @@ void Audit::Record(const std::string& who, const std::string& peer, const std::s
   const std::string outcome =
       result.ok() ? "OK"
                   : absl::StrCat(absl::StatusCodeToString(result.code()), ": ", result.message());
-  if (path_.empty()) {
+  if (options_.path.empty()) {
     if (log_ != nullptr) {
       log_->Info(
           "audit",
@@ -66,22 +78,50 @@ void Audit::Record(const std::string& who, const std::string& peer, const std::s
   std::string line =
       entry.dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace) + "\n";
   sync::MutexLock lock(mutex_);
-  if (cut_) line.insert(0, "\n");
-  const ssize_t written = write(file_.get(), line.data(), line.size());
-  const int error = errno;
-  const bool failed = written != static_cast<ssize_t>(line.size());
-  if (failed && !failed_ && log_ != nullptr) {
-    log_->Error("the audit log cannot be written",
-                {{"file", path_},
-                 {"why", written < 0 ? std::generic_category().message(error)
-                                     : std::string("the disk is full")}});
+  if (!pending_.empty()) WritePending();
+  if (!pending_.empty() && pending_bytes_ + line.size() > options_.max_pending_bytes) {
+    if (lost_++ == 0 && log_ != nullptr) {
+      log_->Error("the audit log loses entries, its buffer is full", {{"file", options_.path}});
+    }
+    return;
   }
-  if (written > 0) cut_ = failed;
-  failed_ = failed;
+  pending_bytes_ += line.size();
+  pending_.push_back(std::move(line));
+  WritePending();
+}
+
+void Audit::WritePending() {
+  while (!pending_.empty()) {
+    const std::string line = cut_ ? "\n" + pending_.front() : pending_.front();
+    const ssize_t written = write(file_.get(), line.data(), line.size());
+    const int why = errno;
+    const bool whole = written == static_cast<ssize_t>(line.size());
+    if (written > 0) cut_ = !whole;
+    if (!whole) {
+      const bool first = error_.empty();
+      error_ = written < 0 ? std::generic_category().message(why) : std::string("the disk is full");
+      if (first && log_ != nullptr) {
+        log_->Error("the audit log cannot be written", {{"file", options_.path}, {"why", error_}});
+      }
+      return;
+    }
+    pending_bytes_ -= pending_.front().size();
+    pending_.pop_front();
+  }
+  if (!error_.empty() && log_ != nullptr) {
+    log_->Info("the audit log is written again",
+               {{"file", options_.path}, {"entries_lost", absl::StrCat(lost_)}});
+  }
+  error_.clear();
+}
+
+void Audit::Retry() {
+  sync::MutexLock lock(mutex_);
+  if (!pending_.empty()) WritePending();
 }
 
 void Audit::Reopen() {
-  if (path_.empty()) return;
+  if (options_.path.empty()) return;
   absl::StatusOr<Descriptor> file = OpenFile();
   if (!file.ok()) {
     if (log_ != nullptr) {
@@ -91,6 +131,7 @@ void Audit::Reopen() {
     return;
   }
   Take(*std::move(file));
+  Retry();
 }
 
 void Audit::Take(Descriptor file) {
@@ -98,6 +139,11 @@ void Audit::Take(Descriptor file) {
   sync::MutexLock lock(mutex_);
   file_ = std::move(file);
   cut_ = cut;
+}
+
+AuditStats Audit::stats() const {
+  sync::MutexLock lock(mutex_);
+  return {.pending = pending_.size(), .lost = lost_, .error = error_};
 }
 
 }  // namespace voxeld::daemon::access

@@ -5,6 +5,9 @@
 //    "method":"UpdateDisplay","what":"name=\"sim\" brightness=0.5","result":"OK"}
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <deque>
 #include <memory>
 #include <string>
 #include <utility>
@@ -18,30 +21,57 @@
 
 namespace voxeld::daemon::access {
 
-// Thread-safe. What it is told may be anything: bytes that are no text are escaped.
+struct AuditOptions {
+  std::string path;       // empty: entries go into the daemon's log
+  bool required = false;  // refuse control actions while entries cannot be written
+  size_t max_pending_bytes = size_t{1} << 20;
+};
+
+struct AuditStats {
+  uint64_t pending = 0;  // entries that wait until the file can be written
+  uint64_t lost = 0;     // entries that the buffer had no room for
+  std::string error;     // why the file cannot be written; empty: it can
+};
+
+// Thread-safe. Arguments may hold any bytes: those that are not text are escaped.
+//
+// Entries that cannot be written wait in a bounded buffer, in their order, and are written by the next Record, Retry or Reopen that
+// succeeds. Those that the buffer has no room for are counted as lost.
 class Audit {
  public:
-  // `path` empty: into `log`. The file is made with mode 0640. `log`, which may be none, outlives this.
-  static absl::StatusOr<std::unique_ptr<Audit>> Open(const std::string& path, Logger* log);
+  // The file is created with mode 0640. `log` may be null, and outlives this.
+  static absl::StatusOr<std::unique_ptr<Audit>> Open(AuditOptions options, Logger* log);
+
+  // Returns: Unavailable, with the reason and the remedy, if entries are required and cannot be written now. Call it before a control
+  // action is carried out.
+  absl::Status MayAct();
 
   void Record(const std::string& who, const std::string& peer, const std::string& method,
               const std::string& what, const absl::Status& result);
 
-  // Opens the file anew, where it was moved away (logrotate). What cannot be opened is said in the log,
-  // and the old one stays.
+  // Writes what is pending. Call it now and then.
+  void Retry();
+
+  // Opens the file again, after it was moved away (logrotate). If that fails, the log says so and the old file stays open.
   void Reopen();
 
+  AuditStats stats() const;
+
  private:
-  Audit(std::string path, Logger* log) : path_(std::move(path)), log_(log) {}
+  Audit(AuditOptions options, Logger* log) : options_(std::move(options)), log_(log) {}
   absl::StatusOr<Descriptor> OpenFile() const;
   void Take(Descriptor file);
+  void WritePending() VOXELD_REQUIRES(mutex_);
 
-  const std::string path_;
+  const AuditOptions options_;
   Logger* const log_;
-  sync::Mutex mutex_;
+  mutable sync::Mutex mutex_;
   Descriptor file_ VOXELD_GUARDED_BY(mutex_);
-  bool failed_ VOXELD_GUARDED_BY(mutex_) = false;  // the last line could not be written
-  bool cut_ VOXELD_GUARDED_BY(mutex_) = false;     // the file ends in the midst of a line
+  std::deque<std::string> pending_ VOXELD_GUARDED_BY(mutex_);
+  size_t pending_bytes_ VOXELD_GUARDED_BY(mutex_) = 0;
+  uint64_t lost_ VOXELD_GUARDED_BY(mutex_) = 0;
+  std::string error_ VOXELD_GUARDED_BY(mutex_);  // of the last write; empty: it succeeded
+  bool cut_ VOXELD_GUARDED_BY(mutex_) = false;   // the file ends in the middle of a line
 };
 
 }  // namespace voxeld::daemon::access

@@ -1,12 +1,17 @@
 #include "daemon/access/security.h"
 
+#include <string>
 #include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 
 namespace voxeld::daemon::access {
 
 absl::StatusOr<std::unique_ptr<Security>> Security::Open(const AccessOptions& options,
-                                                         const TlsFiles& tls,
-                                                         const std::string& audit, Logger& log) {
+                                                         const TlsFiles& tls, AuditOptions audit,
+                                                         Logger& log) {
   std::unique_ptr<Security> security(new Security);
   security->access_ = std::make_unique<Access>(options, Access::SystemWallClock(), &log);
   if (absl::Status status = security->access_->Look(); !status.ok()) return status;
@@ -15,7 +20,7 @@ absl::StatusOr<std::unique_ptr<Security>> Security::Open(const AccessOptions& op
     if (!store.ok()) return store.status();
     security->tls_ = *std::move(store);
   }
-  auto opened = Audit::Open(audit, &log);
+  auto opened = Audit::Open(std::move(audit), &log);
   if (!opened.ok()) return opened.status();
   security->audit_ = *std::move(opened);
   return security;
@@ -23,6 +28,7 @@ absl::StatusOr<std::unique_ptr<Security>> Security::Open(const AccessOptions& op
 
 void Security::LookAt(bool again) {
   (void)access_->Look(again);
+  audit_->Retry();
   if (tls_ != nullptr) (void)tls_->Look(again);
 }
 
@@ -32,10 +38,13 @@ void Security::Reload() {
 }
 
 std::string Security::trouble() const {
-  std::string trouble = access_->trouble();
-  const std::string of_tls = tls_ == nullptr ? "" : tls_->trouble();
-  if (!trouble.empty() && !of_tls.empty()) trouble += "; ";
-  return trouble + of_tls;
+  std::vector<std::string> wrong = {access_->trouble(), tls_ == nullptr ? "" : tls_->trouble()};
+  if (const AuditStats audit = audit_->stats(); !audit.error.empty()) {
+    wrong.push_back(absl::StrCat("the audit log cannot be written (", audit.error,
+                                 "): ", audit.pending, " entries wait, ", audit.lost, " are lost"));
+  }
+  std::erase(wrong, "");
+  return absl::StrJoin(wrong, "; ");
 }
 
 }  // namespace voxeld::daemon::access

@@ -20,10 +20,10 @@ class Security {
   static constexpr sync::TimeNs kLookInterval = sync::kSecond;
 
   // Fails if what is there now is not right: nothing is begun with less than was asked for. `tls` without
-  // any file: no address speaks it. `audit` empty: into the log, which outlives this.
+  // any file: no address speaks it. `log` outlives this.
   static absl::StatusOr<std::unique_ptr<Security>> Open(const AccessOptions& options,
-                                                        const TlsFiles& tls,
-                                                        const std::string& audit, Logger& log);
+                                                        const TlsFiles& tls, AuditOptions audit,
+                                                        Logger& log);
 
   // Reads what has changed. What is wrong is logged, and in trouble().
   void Look() { LookAt(false); }

@@ -93,6 +93,7 @@ struct LogConfig {
   std::string level = "info";           // trace, debug, info, warn, error, off
   std::string format = "text";          // text, json
   std::string audit;                    // a file for who did what; empty: the log
+  bool audit_required = false;          // refuse control actions while `audit` cannot be written
   uint32_t max_lines_per_second = 100;  // of one event; 0: any number
 };
 

@@ -91,6 +91,7 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Choice("level", config.log.level, {"trace", "debug", "info", "warn", "error", "off"});
   visitor.Choice("format", config.log.format, {"text", "json"});
   visitor.Text("audit", config.log.audit);
+  visitor.Flag("audit_required", config.log.audit_required);
   visitor.Integer("max_lines_per_second", config.log.max_lines_per_second, 0, 1000000);
 
   auto& security = config.security;

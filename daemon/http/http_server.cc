@@ -89,6 +89,10 @@ class Connection : public std::enable_shared_from_this<Connection> {
  private:
   void OnHeader(const error_code& error) {
     if (error || !closed_) return OnRead(error);
+    head_ = parser_->get().method() == wire::verb::head;
+    if (parser_->get().count(wire::field::host) > 1) {
+      return Write(Plain(400, "bad request: there is more than one Host header"), true);
+    }
     if (parser_->get().method() == wire::verb::post && served_.receive) {
       std::optional<Reception> reception = served_.receive(Asked());
       if (reception.has_value()) return GiveBodyAway(*std::move(reception));
@@ -124,12 +128,12 @@ class Connection : public std::enable_shared_from_this<Connection> {
         .host = View(request[wire::field::host]),
         .origin = View(request[wire::field::origin]),
         .cookie = View(request[wire::field::cookie]),
-        .accept_encoding = View(request[wire::field::accept_encoding])};
+        .accept_encoding = View(request[wire::field::accept_encoding]),
+        .head = head_};
   }
 
   void Answer() {
     const auto& request = parser_->get();
-    head_ = request.method() == wire::verb::head;
     const bool close = !request.keep_alive();
     if (request.method() != wire::verb::get && !head_) {
       return Write(Plain(405, "only GET and HEAD are answered"), close);

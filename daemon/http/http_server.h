@@ -32,6 +32,7 @@ struct Request {
   std::string_view query;  // behind '?'
   // Headers; empty: it has none.
   std::string_view host, origin, cookie, accept_encoding;
+  bool head = false;  // by HEAD: whoever asks gets no body
 };
 
 // Answers a path by calling `done` once, from any thread, at once or later. False: there is no such

@@ -67,8 +67,10 @@ absl::StatusOr<Child> Spawn(const PlayerOptions& options, PlayFile file) {
 
   std::vector<std::string> words;
   if (access(kSetpriv, X_OK) == 0) words = {kSetpriv, "--pdeathsig", "KILL", "--"};
-  for (const std::string& word : {options.program, std::string("--server"), options.server,
-                                  std::string("play"), std::string("--clear"), child.file.path()}) {
+  for (const std::string& word :
+       {options.program, std::string("--server"), options.server, std::string("play"),
+        std::string("--clear"), std::string("--other-files"), std::string("none"),
+        child.file.path()}) {
     words.push_back(word);
   }
   std::vector<std::string> environment;

@@ -20,6 +20,10 @@ Audited::Audited(ServiceContext& context, const grpc::CallbackServerContext& cal
   if (what_.size() > kMostOfRequest) what_.resize(kMostOfRequest);
 }
 
+absl::Status Audited::MayAct() const {
+  return audit_ == nullptr ? absl::OkStatus() : audit_->MayAct();
+}
+
 absl::Status Audited::Done(const absl::Status& result) const {
   if (audit_ != nullptr) audit_->Record(who_, peer_, method_, what_, result);
   return result;

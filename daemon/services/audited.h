@@ -25,8 +25,11 @@ class Audited {
   Audited(ServiceContext& context, const grpc::CallbackServerContext& call, const char* method,
           const google::protobuf::Message& request, const char* without_fields = "nothing");
 
-  // Who it is; before that, somebody who was turned away.
+  // Names the caller; before that, the entry says that it was turned away.
   void By(const access::Caller& caller) { who_ = caller.who; }
+
+  // Returns: Unavailable if the audit log is required and cannot be written; the call is then refused.
+  absl::Status MayAct() const;
 
   // Writes the line; answers `result`.
   absl::Status Done(const absl::Status& result) const;

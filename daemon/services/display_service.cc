@@ -61,6 +61,7 @@ class DisplayService final : public v1::DisplayService::CallbackService {
         Authorise(context_, *call, Scope::kControl, "UpdateDisplay");
     if (!caller.ok()) return Refuse(call, audited.Done(caller.status()));
     audited.By(*caller);
+    if (absl::Status may = audited.MayAct(); !may.ok()) return Refuse(call, audited.Done(may));
     return DoUpdateDisplay(call->DefaultReactor(), audited, *request, response);
   }
 

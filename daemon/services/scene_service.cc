@@ -157,6 +157,7 @@ class SceneService final : public SceneBase {
         Authorise(context_, *call, Scope::kControl, "ControlOwner");
     if (!caller.ok()) return Refuse(call, audited.Done(caller.status()));
     audited.By(*caller);
+    if (absl::Status may = audited.MayAct(); !may.ok()) return Refuse(call, audited.Done(may));
     ServerUnaryReactor* reactor = call->DefaultReactor();
     context_.core.ControlOwner(wire::FromWire(*request),
                                audited.Watching(Answer<OwnerInfo>(
@@ -265,6 +266,7 @@ class SceneService final : public SceneBase {
                                    v1::ClearLayerResponse* response) {
     Audited audited(context_, *call, "ClearLayer", request, "everything");
     audited.By(caller);
+    if (absl::Status may = audited.MayAct(); !may.ok()) return Refuse(call, audited.Done(may));
     ServerUnaryReactor* reactor = call->DefaultReactor();
     // Without control one's own alone.
     context_.core.ClearLayer(

@@ -3,8 +3,11 @@
 #include <arpa/inet.h>
 
 #include <algorithm>
+#include <charconv>
 #include <optional>
+#include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -32,14 +35,30 @@ constexpr char kContentPolicy[] =
 
 constexpr size_t kNameDigits = 8;
 
-// Without its port.
-std::string HostName(std::string_view host) {
-  if (host.starts_with('[')) {
-    return std::string(host.substr(1, host.find(']') - 1));
+bool IsPort(std::string_view text) {
+  int port = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
+  return error == std::errc() && end == text.data() + text.size() && port >= 0 && port <= 65535;
+}
+
+// Returns: the name or number in a Host header, in lower case, without its port and brackets; nothing if the header is not
+// well-formed (RFC 9110, 7.2).
+std::optional<std::string> HostName(std::string_view header) {
+  std::string_view name, rest;
+  if (header.starts_with('[')) {
+    const size_t end = header.find(']');
+    if (end == std::string_view::npos) return std::nullopt;
+    name = header.substr(1, end - 1);
+    rest = header.substr(end + 1);
+  } else {
+    const size_t colon = std::min(header.find(':'), header.size());
+    name = header.substr(0, colon);
+    rest = header.substr(colon);
   }
-  std::string name(host.substr(0, host.rfind(':')));
-  absl::AsciiStrToLower(&name);
-  return name;
+  if (!rest.empty() && (rest.front() != ':' || !IsPort(rest.substr(1)))) return std::nullopt;
+  std::string lower(name);
+  absl::AsciiStrToLower(&lower);
+  return lower;
 }
 
 bool IsNumber(const std::string& host) {
@@ -74,11 +93,12 @@ class Viewer::Impl {
 
   // A name that was made to resolve to here is no name of this machine; a number cannot be made to.
   bool KnownHost(std::string_view header) const {
-    const std::string host = HostName(header);
+    const std::optional<std::string> host = HostName(header);
     const std::vector<std::string>& more = shared_->options.hosts;
-    return host == "localhost" || IsNumber(host) ||
-           std::any_of(more.begin(), more.end(),
-                       [&](const std::string& name) { return absl::EqualsIgnoreCase(name, host); });
+    return host && (host == "localhost" || IsNumber(*host) ||
+                    std::any_of(more.begin(), more.end(), [&](const std::string& name) {
+                      return absl::EqualsIgnoreCase(name, *host);
+                    }));
   }
 
   // Nothing: it may look.
@@ -166,6 +186,11 @@ class Viewer::Impl {
 
  private:
   http::Response TakeControl(const http::Request& request) {
+    if (request.head) {  // what previews links must not use the address up
+      http::Response wrong = Plain(405, "an address for control is opened by GET");
+      wrong.headers = {{"Allow", "GET"}};
+      return wrong;
+    }
     std::string_view key = request.query;
     if (!key.starts_with("key=") || !SameSecret(key.substr(4), key_)) {
       return Plain(403,

@@ -142,6 +142,10 @@ class ViewerPlay::Upload final : public http::BodyReceiver {
 
   void Whole(http::Done done) override {
     if (held_ == nullptr) return done(Said(400, "the file is empty"));
+    if (play_->audit_ != nullptr) {
+      if (const absl::Status may = play_->audit_->MayAct(); !may.ok())
+        return done(Said(503, may.message()));
+    }
     // Every piece has been taken, so there is a file, and a thread.
     (void)play_->worker_.Post([held = held_, play = play_.get(), done] {
       if (held->given_up) return;

@@ -288,8 +288,19 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     };
   }
 
+  // Whether a control action may be carried out; if not, the page is told why.
+  bool MayAct(const char* method, const std::string& what) {
+    access::Audit* const audit = shared_->options.audit;
+    const absl::Status may = audit == nullptr ? absl::OkStatus() : audit->MayAct();
+    if (may.ok()) return true;
+    audit->Record("page", "http", method, what, may);
+    Complain(std::string(may.message()));
+    return false;
+  }
+
   void On(const page::Update& update) {
     const v1::UpdateDisplayRequest& request = update.request;
+    if (!MayAct("UpdateDisplay", request.ShortDebugString())) return;
     shared_->core.UpdateDisplay(
         request.name(), update.update,
         Audited("UpdateDisplay", request,
@@ -302,6 +313,7 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
 
   void On(const page::Clear& clear) {
     const v1::ClearLayerRequest& request = clear.request;
+    if (!MayAct("ClearLayer", request.ShortDebugString())) return;
     shared_->core.ClearLayer(
         request.owner(), request.layer(), false, std::nullopt,
         Audited("ClearLayer", request, Then<Cleared>([](ViewerSocket& self, auto cleared) {
@@ -310,7 +322,9 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
                 })));
   }
 
-  void On(const page::Stop&) { shared_->play->Stop(); }
+  void On(const page::Stop&) {
+    if (MayAct("StopPlaying", "")) shared_->play->Stop();
+  }
 
   const std::shared_ptr<ViewerShared> shared_;
   const std::shared_ptr<http::WebSocketPeer> peer_;

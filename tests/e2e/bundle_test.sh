@@ -11,7 +11,7 @@ archive=$(tail -n 1 "$work/said")
 mkdir "$work/bundle"
 tar -C "$work/bundle" -xJf "$archive"
 
-outside=$(for program in "$work"/bundle/bin/voxel* "$work"/bundle/bin/tests/*; do
+outside=$(for program in "$work"/bundle/bin/voxel*; do
   env -i LD_LIBRARY_PATH= ldd "$program"
 done | awk -v own="$work/bundle/" '$2 == "=>" && index($3, own) != 1 { print $1, $3 } /not found/ { print }' | sort -u)
 echo "from outside the bundle:"
@@ -36,6 +36,3 @@ done
 env -i LD_LIBRARY_PATH= "$work/bundle/bin/voxelctl" --server "$server" draw "sphere radius=0.5"
 env -i LD_LIBRARY_PATH= "$work/bundle/bin/voxelctl" --server "$server" --json snapshot "$work/picture.png" |
   python3 -c 'import json, sys; sys.exit(0 if int(json.load(sys.stdin)["lit_pixels"]) else "bundle_test: nothing is lit")'
-if [ -x "$work/bundle/bin/tests/gpu_conformance_test" ]; then
-  env -i LD_LIBRARY_PATH= "$work/bundle/bin/tests/gpu_conformance_test" --gtest_brief=1 --gtest_filter='*RandomScenes*cpu_worker'
-fi

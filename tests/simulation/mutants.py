@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Plants each of the defects of tests/simulation/mutants in a copy of the tree, one at a time, and has the simulation look for it.
+"""Plants each of the defects of tests/simulation/mutants.patch in a copy of the tree, one at a time, and has the simulation look for it.
 
     tests/simulation/mutants.py [--scratch DIR] [--seeds N] [--jobs N] [--json FILE] [NAME …]
     tests/simulation/mutants.py --check     only whether each still fits the tree, and builds nothing
 
-NAME: those whose file names hold it; none: all. A copy of the tree is built in DIR (build/mutants), by the
+NAME: those whose names contain it; none: all. A copy of the tree is built in DIR (build/mutants), by the
 preset "test". Prints a table: the defect, the first seed that finds it, what was found wrong. Ends with 0 if all were
 found.
 """
@@ -19,6 +19,16 @@ import time
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+
+
+def read_defects(names):
+    """The defects whose names contain one of `names` (all, if there are none): {name: patch}."""
+    defects = {}
+    for section in (HERE / "mutants.patch").read_text(encoding="utf-8").split("Defect: ")[1:]:
+        name, patch = section.split("\n", 1)
+        if not names or any(wanted in name for wanted in names):
+            defects[name] = patch
+    return defects
 
 
 def run(command, **options):
@@ -81,13 +91,12 @@ def main():
     parser.add_argument("names", nargs="*")
     options = parser.parse_args()
     source, build = options.scratch.resolve(), options.scratch.resolve() / "build" / "test"
-    patches = [patch for patch in sorted((HERE / "mutants").glob("*.patch"))
-               if not options.names or any(name in patch.stem for name in options.names)]
+    patches = read_defects(options.names)
     if not patches:
-        sys.exit(f"no defect in {HERE / 'mutants'} is called {' or '.join(options.names)}")
+        sys.exit(f"no defect in {HERE / 'mutants.patch'} is called {' or '.join(options.names)}")
     if options.check:
-        unfit = [patch.stem for patch in patches
-                 if subprocess.run(["git", "apply", "--check", patch], cwd=ROOT, check=False).returncode != 0]
+        unfit = [name for name, patch in patches.items()
+                 if subprocess.run(["git", "apply", "--check"], input=patch, text=True, cwd=ROOT, check=False).returncode != 0]
         print(f"{len(patches) - len(unfit)} of {len(patches)} fit{': not ' if unfit else ''}{', '.join(unfit)}")
         return 1 if unfit or len(patches) < 20 and not options.names else 0
     copy_tree(source)
@@ -95,17 +104,17 @@ def main():
     build_simulation(source, build, options.jobs)
     print(f"| defect | seeds until found | what was wrong |\n|---|---|---|", flush=True)
     results = []
-    for patch in patches:
+    for name, patch in patches.items():
         begun = time.monotonic()
-        run(["patch", "-p1", "--quiet", "-i", patch], cwd=source)
+        run(["patch", "-p1", "--quiet"], input=patch, text=True, cwd=source)
         try:
             build_simulation(source, build, options.jobs)
             found = simulate(build, options.seeds, options.jobs)
         finally:
-            run(["patch", "-p1", "--quiet", "-R", "-i", patch], cwd=source)
-        results.append({"defect": patch.stem, "found": found, "seconds": round(time.monotonic() - begun, 1)})
+            run(["patch", "-p1", "--quiet", "-R"], input=patch, text=True, cwd=source)
+        results.append({"defect": name, "found": found, "seconds": round(time.monotonic() - begun, 1)})
         seed, wrong = (found["seed"], found["wrong"]) if found else ("**none**", f"nothing in {options.seeds} seeds")
-        print(f"| {patch.stem} | {seed} | {wrong} |", flush=True)
+        print(f"| {name} | {seed} | {wrong} |", flush=True)
     if options.json:
         options.json.write_text(json.dumps(results, indent=1) + "\n")
     missed = [result["defect"] for result in results if result["found"] is None]

@@ -33,13 +33,13 @@ int main(int argc, char** argv) {
     const ParsedCommandLine parsed =
         ParseCommandLine(std::vector<std::string>(argv + 1, argv + argc));
     std::cout << parsed.out << std::flush;
-    std::cerr << voxeld::EscapeControls(parsed.err);
+    std::cerr << voxeld::EscapeLines(parsed.err);
     if (!parsed.options) return parsed.exit_code;
     Interrupt interrupt(Interrupt::Watch::kSignals);
     Console console(std::cout, std::cerr, parsed.options->json, ::isatty(STDERR_FILENO) == 1);
     return Run(*parsed.options, EnvironmentVariable, interrupt, console);
   } catch (const std::exception& error) {
-    std::cerr << "voxelctl: " << voxeld::EscapeControls(error.what()) << "\n";
+    std::cerr << "voxelctl: " << voxeld::EscapeLines(error.what()) << "\n";
     return kExitFailure;
   }
 }

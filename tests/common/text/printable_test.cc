@@ -66,8 +66,9 @@ TEST(Escape, LeavesNoHarmfulCharacterInAnyForm) {
     const std::string raw = Utf8(code), text = absl::StrCat("a", raw, "b");
     EXPECT_EQ(EscapeForTerminal(text).find(raw), std::string::npos) << code;
     EXPECT_EQ(EscapeQuoted(text).find(raw), std::string::npos) << code;
+    EXPECT_EQ(EscapeControls(text).find(raw), std::string::npos) << code;
     if (code != '\n') {
-      EXPECT_EQ(EscapeControls(text).find(raw), std::string::npos) << code;
+      EXPECT_EQ(EscapeLines(text).find(raw), std::string::npos) << code;
     }
     // C0 controls never occur in JSON text but for white space between its parts.
     if (code >= 0x7f) {
@@ -81,7 +82,8 @@ TEST(EscapeControls, LeavesTextThatIsEscapedAsItIs) {
        {EscapeForTerminal("\x1b[31m\\ \xff"), EscapeQuoted("\"\n\t\x9b\\")}) {
     EXPECT_EQ(EscapeControls(once), once);
   }
-  EXPECT_EQ(EscapeControls("two\nlines\x1b"), "two\nlines\\u{1b}");
+  EXPECT_EQ(EscapeControls("two\nlines\x1b"), "two\\x0alines\\x1b");
+  EXPECT_EQ(EscapeLines("two\nlines\x1b"), "two\nlines\\x1b");
 }
 
 TEST(EscapeQuoted, EscapesQuotesAndWhiteSpaceAsInC) {

@@ -64,7 +64,7 @@ class SmallFiles {
 };
 
 TEST_F(AuditTest, OneObjectALineWhateverTheWordsAre) {
-  auto audit = Audit::Open(path_, nullptr);
+  auto audit = Audit::Open({.path = path_}, nullptr);
   ASSERT_TRUE(audit.ok()) << audit.status();
   (*audit)->Record("token a\"\n{", "unix:", "UpdateDisplay", "name: \"\x1b[31m\xff\"",
                    absl::OkStatus());
@@ -85,7 +85,7 @@ TEST_F(AuditTest, OneObjectALineWhateverTheWordsAre) {
 }
 
 TEST_F(AuditTest, GoesOnInANewFileWhenAsked) {
-  auto audit = Audit::Open(path_, nullptr);
+  auto audit = Audit::Open({.path = path_}, nullptr);
   ASSERT_TRUE(audit.ok());
   (*audit)->Record("a", "", "First", "", absl::OkStatus());
   std::filesystem::rename(path_, path_ + ".1");
@@ -98,7 +98,7 @@ TEST_F(AuditTest, GoesOnInANewFileWhenAsked) {
 }
 
 TEST_F(AuditTest, WithoutAFileItIsLinesOfTheLog) {
-  auto audit = Audit::Open("", &log_);
+  auto audit = Audit::Open({}, &log_);
   ASSERT_TRUE(audit.ok());
   (*audit)->Record("token a\"\n", "unix:", "ClearLayer", "layer", absl::NotFoundError("none"));
   (*audit)->Reopen();
@@ -109,42 +109,110 @@ TEST_F(AuditTest, WithoutAFileItIsLinesOfTheLog) {
   EXPECT_EQ(line["method"], "ClearLayer");
   EXPECT_EQ(line["what"], "layer");
   EXPECT_EQ(line["result"], "NOT_FOUND: none");
-  auto none = Audit::Open("", nullptr);
+  auto none = Audit::Open({}, nullptr);
   ASSERT_TRUE(none.ok());
   (*none)->Record("a", "", "First", "", absl::OkStatus());
 }
 
-TEST_F(AuditTest, ADiskThatIsFullIsToldOnceUntilThereIsRoom) {
-  auto audit = Audit::Open(path_, &log_);
+TEST_F(AuditTest, EntriesWaitInOrderWhileTheFileCannotBeWritten) {
+  auto audit = Audit::Open({.path = path_}, &log_);
   ASSERT_TRUE(audit.ok());
+  std::vector<std::string> wanted;
   const auto record = [&](const char* method) {
     (*audit)->Record("a", "", method, "", absl::OkStatus());
+    wanted.emplace_back(method);
   };
   record("First");
   EXPECT_EQ(Logged(), "");
-  const uint64_t first = std::filesystem::file_size(path_);
   for (const char* again : {"Second", "Third"}) {
-    const uint64_t begins = std::filesystem::file_size(path_);
     {
-      const SmallFiles full(begins);
-      record("Lost");
-      const std::string told = Logged();
-      EXPECT_THAT(told, HasSubstr("the audit log cannot be written"));
-      EXPECT_THAT(told, HasSubstr(path_));
-      EXPECT_THAT(told, HasSubstr("File too large"));
-      record("Lost");
-      EXPECT_EQ(Logged(), "");
+      const SmallFiles full(std::filesystem::file_size(path_));
+      record("Waits");
+      const std::string logged = Logged();
+      EXPECT_THAT(logged, HasSubstr("the audit log cannot be written"));
+      EXPECT_THAT(logged, HasSubstr(path_));
+      EXPECT_THAT(logged, HasSubstr("File too large"));
+      EXPECT_EQ((*audit)->stats().pending, 1u);
+      EXPECT_EQ((*audit)->stats().error, "File too large");
+      record("WaitsToo");
+      EXPECT_EQ(Logged(), "") << "once is enough";
+      EXPECT_EQ((*audit)->stats().pending, 2u);
     }
     record(again);
-    EXPECT_EQ(Logged(), "");
+    EXPECT_THAT(Logged(), HasSubstr("the audit log is written again"));
+    EXPECT_EQ((*audit)->stats().pending, 0u);
+    EXPECT_EQ((*audit)->stats().error, "");
   }
-  EXPECT_EQ(Lines(path_).size(), 3u);
-  EXPECT_EQ(Lines(path_)[2]["method"], "Third");
-  EXPECT_EQ(std::filesystem::file_size(path_), 3 * first + 1) << "Second has one byte more";
+  std::vector<std::string> methods;
+  for (const json& line : Lines(path_)) methods.push_back(line["method"]);
+  EXPECT_EQ(methods, wanted);
+  EXPECT_EQ((*audit)->stats().lost, 0u);
+}
+
+TEST_F(AuditTest, RetryWritesWhatIsPending) {
+  auto audit = Audit::Open({.path = path_}, nullptr);
+  ASSERT_TRUE(audit.ok());
+  {
+    const SmallFiles full(0);
+    (*audit)->Record("a", "", "First", "", absl::OkStatus());
+    (*audit)->Retry();
+    EXPECT_EQ((*audit)->stats().pending, 1u);
+  }
+  (*audit)->Retry();
+  EXPECT_EQ((*audit)->stats().pending, 0u);
+  ASSERT_EQ(Lines(path_).size(), 1u);
+}
+
+TEST_F(AuditTest, ABufferThatIsFullCountsWhatItLoses) {
+  auto audit = Audit::Open({.path = path_, .max_pending_bytes = 400}, &log_);
+  ASSERT_TRUE(audit.ok());
+  uint64_t lost = 0;
+  {
+    const SmallFiles full(0);
+    for (int i = 0; i < 20; ++i) {
+      (*audit)->Record("a", "", absl::StrCat("Entry", i), "", absl::OkStatus());
+    }
+    const AuditStats stats = (*audit)->stats();
+    EXPECT_GE(stats.pending, 1u);
+    EXPECT_EQ(stats.pending + stats.lost, 20u);
+    EXPECT_GT(stats.lost, 0u);
+    EXPECT_THAT(Logged(), HasSubstr("loses entries"));
+    lost = stats.lost;
+  }
+  // An entry that is larger than the buffer is written all the same where it can be.
+  (*audit)->Record("a", "", "Large", std::string(1000, 'x'), absl::OkStatus());
+  const std::vector<json> lines = Lines(path_);
+  ASSERT_EQ(lines.size(), 20 - lost + 1);
+  for (size_t i = 0; i + 1 < lines.size(); ++i)
+    EXPECT_EQ(lines[i]["method"], absl::StrCat("Entry", i));
+  EXPECT_EQ(lines.back()["method"], "Large");
+  EXPECT_EQ((*audit)->stats().lost, lost);
+}
+
+TEST_F(AuditTest, WhereItIsRequiredNobodyMayActWhileItCannotBeWritten) {
+  auto required = Audit::Open({.path = path_, .required = true}, nullptr);
+  auto optional = Audit::Open({.path = path_ + ".1"}, nullptr);
+  auto none = Audit::Open({.required = true}, nullptr);
+  ASSERT_TRUE(required.ok() && optional.ok() && none.ok());
+  EXPECT_TRUE((*required)->MayAct().ok());
+  {
+    const SmallFiles full(0);
+    for (Audit* audit : {required->get(), optional->get(), none->get()}) {
+      audit->Record("a", "", "First", "", absl::OkStatus());
+    }
+    const absl::Status may = (*required)->MayAct();
+    EXPECT_TRUE(absl::IsUnavailable(may)) << may;
+    EXPECT_THAT(std::string(may.message()), HasSubstr("File too large"));
+    EXPECT_THAT(std::string(may.message()), HasSubstr("log.audit_required"));
+    EXPECT_TRUE((*optional)->MayAct().ok());
+    EXPECT_TRUE((*none)->MayAct().ok());
+  }
+  EXPECT_TRUE((*required)->MayAct().ok()) << "it is tried again at once";
+  EXPECT_EQ(Lines(path_).size(), 1u);
 }
 
 TEST_F(AuditTest, ALineThatIsCutSpoilsNoOther) {
-  auto audit = Audit::Open(path_, &log_);
+  auto audit = Audit::Open({.path = path_}, &log_);
   ASSERT_TRUE(audit.ok());
   const auto record = [&](const char* method) {
     (*audit)->Record("a", "", method, "", absl::OkStatus());
@@ -153,7 +221,7 @@ TEST_F(AuditTest, ALineThatIsCutSpoilsNoOther) {
     const SmallFiles full(10);
     record("Cut");
     EXPECT_THAT(Logged(), HasSubstr("the disk is full"));
-    record("Lost");
+    record("Waits");
     EXPECT_EQ(std::filesystem::file_size(path_), 10u);
   }
   record("Second");
@@ -161,10 +229,12 @@ TEST_F(AuditTest, ALineThatIsCutSpoilsNoOther) {
   std::ifstream file(path_);
   std::vector<std::string> lines;
   for (std::string line; std::getline(file, line);) lines.push_back(line);
-  ASSERT_EQ(lines.size(), 3u);
+  ASSERT_EQ(lines.size(), 5u);
   EXPECT_EQ(lines[0].size(), 10u);
-  EXPECT_EQ(json::parse(lines[1])["method"], "Second");
-  EXPECT_EQ(json::parse(lines[2])["method"], "Third");
+  EXPECT_EQ(json::parse(lines[1])["method"], "Cut");
+  EXPECT_EQ(json::parse(lines[2])["method"], "Waits");
+  EXPECT_EQ(json::parse(lines[3])["method"], "Second");
+  EXPECT_EQ(json::parse(lines[4])["method"], "Third");
   {
     const SmallFiles full(std::filesystem::file_size(path_) + 10);
     record("Cut");
@@ -172,7 +242,7 @@ TEST_F(AuditTest, ALineThatIsCutSpoilsNoOther) {
   std::filesystem::rename(path_, path_ + ".1");
   (*audit)->Reopen();
   record("Fourth");
-  ASSERT_EQ(Lines(path_).size(), 1u) << "a new file begins with its line";
+  ASSERT_EQ(Lines(path_).size(), 2u) << "a new file begins with the line that waited";
 }
 
 TEST_F(AuditTest, ALineThatWasCutBeforeTheFileWasOpenedSpoilsNoOther) {
@@ -187,24 +257,24 @@ TEST_F(AuditTest, ALineThatWasCutBeforeTheFileWasOpenedSpoilsNoOther) {
     while (std::getline(file, line)) found = line;
     return json::parse(found);
   };
-  auto audit = Audit::Open(path_, nullptr);
+  auto audit = Audit::Open({.path = path_}, nullptr);
   ASSERT_TRUE(audit.ok());
   cut(**audit, path_);
   (*audit)->Reopen();
   (*audit)->Record("a", "", "Second", "", absl::OkStatus());
   EXPECT_EQ(last()["method"], "Second");
   cut(**audit, path_);
-  audit = Audit::Open(path_, nullptr);
+  audit = Audit::Open({.path = path_}, nullptr);
   ASSERT_TRUE(audit.ok());
   (*audit)->Record("a", "", "Third", "", absl::OkStatus());
   EXPECT_EQ(last()["method"], "Third");
 }
 
 TEST_F(AuditTest, WithoutALogItGoesOnAllTheSame) {
-  auto full = Audit::Open("/dev/full", nullptr);
+  auto full = Audit::Open({.path = "/dev/full"}, nullptr);
   ASSERT_TRUE(full.ok()) << full.status();
   (*full)->Record("a", "", "First", "", absl::OkStatus());
-  auto audit = Audit::Open(path_, nullptr);
+  auto audit = Audit::Open({.path = path_}, nullptr);
   ASSERT_TRUE(audit.ok());
   std::filesystem::rename(path_, path_ + ".1");
   std::filesystem::create_symlink("/tmp/elsewhere", path_);
@@ -214,7 +284,7 @@ TEST_F(AuditTest, WithoutALogItGoesOnAllTheSame) {
 }
 
 TEST_F(AuditTest, WhatCannotBeOpenedAnewStaysWhereItWas) {
-  auto audit = Audit::Open(path_, &log_);
+  auto audit = Audit::Open({.path = path_}, &log_);
   ASSERT_TRUE(audit.ok());
   std::filesystem::rename(path_, path_ + ".1");
   std::filesystem::create_directory(path_);
@@ -227,9 +297,9 @@ TEST_F(AuditTest, WhatCannotBeOpenedAnewStaysWhereItWas) {
 }
 
 TEST_F(AuditTest, AFileThatCannotBeIsAnErrorAtOnce) {
-  EXPECT_FALSE(Audit::Open("/nonexistent/audit", nullptr).ok());
+  EXPECT_FALSE(Audit::Open({.path = "/nonexistent/audit"}, nullptr).ok());
   std::filesystem::create_symlink("/tmp/elsewhere", path_);
-  EXPECT_FALSE(Audit::Open(path_, nullptr).ok());
+  EXPECT_FALSE(Audit::Open({.path = path_}, nullptr).ok());
 }
 
 }  // namespace

@@ -296,7 +296,7 @@ TEST(Scopes, ReadBackAsTheyAreWritten) {
 
 TEST(Grants, WhatTheParserQuotesIsPrintable) {
   const std::string message(ParseGrants("a = t\x1c", "file").status().message());
-  EXPECT_EQ(message.rfind("file:1: ", 0), 0u) << message;
+  EXPECT_EQ(message.rfind("file:1:", 0), 0u) << message;
   for (const char c : message) EXPECT_FALSE(c >= 0 && c < 32) << message;
 }
 

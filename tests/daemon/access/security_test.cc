@@ -36,7 +36,7 @@ class SecurityTest : public ::testing::Test {
                         "\"\nscopes = [\"draw\"]\n");
   }
   absl::StatusOr<std::unique_ptr<Security>> Open(const TlsFiles& files) {
-    return Security::Open(options_, files, audit_, log_);
+    return Security::Open(options_, files, {.path = audit_}, log_);
   }
   size_t AuditLines() const {
     std::ifstream file(audit_);

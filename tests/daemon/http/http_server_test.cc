@@ -77,6 +77,18 @@ TEST_F(HttpServer, AnswersWhatItKnows) {
   EXPECT_THAT(refused, HasSubstr("Allow: GET, HEAD\r\n"));
 }
 
+TEST_F(HttpServer, SeveralHostHeadersAreRefused) {
+  Start();
+  for (const char* method : {"GET", "POST", "PUT"}) {
+    for (const char* second : {"x", "y", ""}) {
+      EXPECT_THAT(
+          Ask(absl::StrCat(method, " /hello HTTP/1.1\r\nHost: x\r\nhost: ", second, "\r\n\r\n")),
+          StartsWith("HTTP/1.1 400 "))
+          << method << second;
+    }
+  }
+}
+
 TEST_F(HttpServer, HeadHasNoBodyAndTheConnectionGoesOn) {
   Start();
   Connection connection(server_->address());

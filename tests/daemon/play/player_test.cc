@@ -103,7 +103,7 @@ TEST_F(PlayerTest, RunsVoxelctlWithTheFileAndNothingOfTheDaemons) {
   setenv("VOXELD_TOKEN", "secret", 1);
   Start(
       "printf '%s\\n' \"$@\" >$HERE/words; env >$HERE/environment; ls /proc/self/fd "
-      ">$HERE/descriptors; cut -d' ' -f5 /proc/$$/stat >$HERE/group; cat \"$5\" >$HERE/contents");
+      ">$HERE/descriptors; cut -d' ' -f5 /proc/$$/stat >$HERE/group; cat \"$7\" >$HERE/contents");
   const Descriptor open_here(open("/dev/null", O_RDONLY));  // without CLOEXEC, as a library might
   absl::StatusOr<PlayFile> file = PlayFile::Make("my arrow.stl");
   ASSERT_TRUE(file.ok() && file->Append("solid").ok());
@@ -118,7 +118,7 @@ TEST_F(PlayerTest, RunsVoxelctlWithTheFileAndNothingOfTheDaemons) {
     for (std::string line; std::getline(in, line);) all.push_back(line);
     return all;
   };
-  EXPECT_THAT(lines("words"), ElementsAre("--server", "unix:/run/v.sock", "play", "--clear", path));
+  EXPECT_THAT(lines("words"), ElementsAre("--server", "unix:/run/v.sock", "play", "--clear", "--other-files", "none", path));
   EXPECT_THAT(lines("contents"), ElementsAre("solid"));
   EXPECT_THAT(lines("environment"), Not(::testing::Contains(HasSubstr("secret"))));
   EXPECT_THAT(lines("descriptors"), ElementsAre("0", "1", "2", "3")) << "3 is of ls itself";
@@ -155,7 +155,7 @@ TEST_F(PlayerTest, StopsAndIsReplaced) {
 
 TEST_F(PlayerTest, TellsWhatWasWrong) {
   Start(
-      "echo 'a note' >&2; echo \"voxelctl: first\" >&2; echo \"voxelctl: $5: is no model;\" >&2; "
+      "echo 'a note' >&2; echo \"voxelctl: first\" >&2; echo \"voxelctl: $7: is no model;\" >&2; "
       "echo "
       "'  models begin otherwise' >&2; exit 1");
   Play("bad.obj");

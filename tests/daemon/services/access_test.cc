@@ -50,7 +50,7 @@ class ServicesAccess : public ::testing::Test {
                                                              .trusted = {}},
                                        Access::SystemWallClock(), nullptr);
     ASSERT_TRUE(access_->Look().ok());
-    auto audit = access::Audit::Open(folder_ + "/audit", nullptr);
+    auto audit = access::Audit::Open({.path = folder_ + "/audit"}, nullptr);
     ASSERT_TRUE(audit.ok()) << audit.status();
     audit_ = *std::move(audit);
   }
@@ -161,6 +161,24 @@ TEST_F(ServicesAccess, EveryMethodAsksForItsScope) {
   EXPECT_GT(daemon_->Stats().connections().calls_turned_away(), 40u);
   // What anybody may ask.
   EXPECT_TRUE(Call(channel, "/grpc.health.v1.Health/Check", "").ok());
+}
+
+TEST_F(ServicesAccess, ControlIsRefusedWhileARequiredAuditLogCannotBeWritten) {
+  auto audit = access::Audit::Open({.path = "/dev/full", .required = true}, nullptr);
+  ASSERT_TRUE(audit.ok()) << audit.status();
+  audit_ = *std::move(audit);
+  Start();
+  const auto channel = Plain();
+  // The first entry is the first that cannot be written.
+  audit_->Record("a", "", "First", "", absl::OkStatus());
+  for (const auto& [method, token] : {std::pair("DisplayService/UpdateDisplay", "boss"),
+                                      {"SceneService/ControlOwner", "boss"},
+                                      {"SceneService/ClearLayer", "painter"}}) {
+    const grpc::Status status = Call(channel, absl::StrCat("/voxeld.v1.", method), token);
+    EXPECT_EQ(status.error_code(), StatusCode::UNAVAILABLE) << method;
+    EXPECT_THAT(status.error_message(), HasSubstr("No space left on device")) << method;
+  }
+  EXPECT_TRUE(Call(channel, "/voxeld.v1.DisplayService/ListDisplays", "viewer").ok());
 }
 
 TEST_F(ServicesAccess, AHeaderThatIsNoneIsRefused) {

@@ -62,7 +62,7 @@ class ViewerPlayTest : public ::testing::Test {
     absl::StatusOr<play::PrivateFolder> folder = play::PrivateFolder::Make();
     ASSERT_TRUE(folder.ok());
     folder_.emplace(*std::move(folder));
-    auto audit = access::Audit::Open(folder_->path() + "/audit", nullptr);
+    auto audit = access::Audit::Open({.path = folder_->path() + "/audit"}, nullptr);
     ASSERT_TRUE(audit.ok());
     audit_ = *std::move(audit);
     core_ = std::make_unique<Core>(CoreOptions{.version = "1.2"}, clock_);
@@ -202,7 +202,7 @@ TEST_F(ViewerPlayTest, PagesWithControlAreToldWhatPlays) {
 }
 
 TEST_F(ViewerPlayTest, TheyAreToldWhyItDoesNotPlay) {
-  Start("echo \"voxelctl: $5: is no model\" >&2; exit 1");
+  Start("echo \"voxelctl: $7: is no model\" >&2; exit 1");
   const auto page = Open(true);
   HearOf(*page, "play");
   EXPECT_EQ(Post("/play?name=bad.obj").result_int(), 202u);
@@ -347,7 +347,7 @@ TEST_F(ViewerPlayTest, ADiskThatHangsKeepsNobodyOut) {
 
 TEST_F(ViewerPlayTest, WhatIsLargeComesInPieces) {
   const std::string played = folder_->path() + "/played";
-  Start(absl::StrCat("cp \"$5\" ", played, ".part; mv ", played, ".part ", played, "; ", kPlays));
+  Start(absl::StrCat("cp \"$7\" ", played, ".part; mv ", played, ".part ", played, "; ", kPlays));
   std::string body;
   for (int i = 0; body.size() < 1'000'000; ++i) absl::StrAppend(&body, "v ", i, " 0 0\n");
   EXPECT_EQ(Post("/play?name=a.obj", body).result_int(), 202u);

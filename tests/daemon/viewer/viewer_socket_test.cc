@@ -78,7 +78,7 @@ class ViewerSocketTest : public ::testing::Test {
   ViewerSocketTest() {
     folder_ = (std::filesystem::temp_directory_path() / "voxeld-socket-XXXXXX").string();
     EXPECT_NE(mkdtemp(folder_.data()), nullptr);
-    audit_ = *access::Audit::Open(folder_ + "/audit", nullptr);
+    audit_ = *access::Audit::Open({.path = folder_ + "/audit"}, nullptr);
     display::DisplayInfo lights = testing::SmallDisplay("lights");
     lights.geometry.shape =
         display::Lattice{.width_px = 1, .points_mm = {display::Vec3{}}, .cell_mm = {1, 1, 1}};

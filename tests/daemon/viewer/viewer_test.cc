@@ -138,7 +138,10 @@ TEST_F(ViewerTest, ThePageIsServedForThisMachineAlone) {
     EXPECT_NE(Get("/", {{"Host", host}}).result_int(), 403u) << host;
   }
   for (const char* host :
-       {"evil.example", "localhost.evil.example", "1.2.3.4.evil.example:80", ""}) {
+       {"evil.example", "localhost.evil.example", "1.2.3.4.evil.example:80", "",
+        "[::1].evil.example", "[::1]evil.example:80", "[::1", "[::1]9", "[localhost].evil.example",
+        "127.0.0.1:evil", "127.0.0.1:99999", "127.0.0.1:+80", "127.0.0.1:-1", "127.0.0.1:80:80",
+        "127.0.0.1:8 0", "localhost:80.evil.example", "::1"}) {
     EXPECT_EQ(Get("/", {{"Host", host}}).result_int(), 403u) << host;
   }
   EXPECT_EQ(Get("/", {{"Origin", "http://evil.example"}}).result_int(), 403u);
@@ -263,6 +266,15 @@ TEST_F(ViewerTest, ControlIsForTheAddressThatServesOnce) {
   EXPECT_EQ(Get("/control?key=00000000000000000000000000000000").result_int(), 403u);
   EXPECT_EQ(Get("/control").result_int(), 403u);
   const std::string used = viewer_->ControlAddress(server_->address());
+  unsigned status = 0;
+  const http::Handler handler =
+      viewer_->Handler([](const http::Request&, const http::Done&) { return false; });
+  EXPECT_TRUE(handler({.path = "/control",
+                       .query = std::string_view(used).substr(used.find("key=")),
+                       .host = "localhost",
+                       .head = true},
+                      [&](const http::Response& answer) { status = answer.status; }));
+  EXPECT_EQ(status, 405u) << "HEAD leaves the address as it was";
   const std::string cookie = Cookie();
   EXPECT_EQ(viewer_->ControlAddress(server_->address()), "");
   EXPECT_EQ(Get(used.substr(used.find("/control"))).result_int(), 403u) << "it has been used";

@@ -63,7 +63,7 @@ TEST_F(Profiles, OfTextAreTheSame) {
   EXPECT_EQ(read->options, parsed->options);
   EXPECT_THAT(std::string(ParseProfile("a = ", "here").status().message()),
               testing::StartsWith("here:1:"));
-  EXPECT_THAT(ErrorOf("\"a\\u0007\" = {}\n"), HasSubstr("a\\u{7} is no text"));
+  EXPECT_THAT(ErrorOf("\"a\\u0007\" = {}\n"), HasSubstr("a\\x07 is no text"));
 }
 
 TEST_F(Profiles, AreFoundByNameOrPath) {

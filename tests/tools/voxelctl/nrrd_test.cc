@@ -136,7 +136,7 @@ TEST_F(Volumes, NrrdThatIsWrong) {
                 HasSubstr("for \"datafile\""));
   }
   EXPECT_THAT(Error("a.nhdr", head + "encoding: raw\ndata file: gone.raw\n"),
-              HasSubstr("a.nhdr: has \"gone.raw\" for \"datafile\"; No such file"));
+              HasSubstr("a.nhdr: has \"gone.raw\" for \"datafile\"; a regular file in its folder"));
 }
 
 // Steps that span a volume, and so long that no number says where it ends.

@@ -35,9 +35,10 @@ struct PlayOptions {
   std::optional<RawLayout> raw;
   VolumeLook volume;
   MoleculeStyle style = MoleculeStyle::kBalls;
-  bool sequence = false;              // the files one after another, at `fps`
-  std::optional<uint32_t> animation;  // from 1 on: of the only file
-  bool loop = false;                  // a sequence or animation begins again at its end
+  OtherFiles other_files = OtherFiles::kBelow;  // that the files name
+  bool sequence = false;                        // the files one after another, at `fps`
+  std::optional<uint32_t> animation;            // from 1 on: of the only file
+  bool loop = false;                            // a sequence or animation begins again at its end
 };
 
 struct DemoOptions {

@@ -16,6 +16,8 @@ namespace {
 const Choices<Up> kUps = {{"auto", Up::kAuto}, {"x", Up::kX}, {"y", Up::kY}, {"z", Up::kZ}};
 const Choices<FillStyle> kFills = {
     {"dots", FillStyle::kDots}, {"lines", FillStyle::kLines}, {"surface", FillStyle::kSurface}};
+const Choices<OtherFiles> kOtherFiles = {
+    {"none", OtherFiles::kNone}, {"below", OtherFiles::kBelow}, {"any", OtherFiles::kAny}};
 const Choices<MoleculeStyle> kStyles = {{"balls", MoleculeStyle::kBalls},
                                         {"space", MoleculeStyle::kSpace}};
 const Choices<SampleType> kTypes = {{"u8", SampleType::kU8},   {"i8", SampleType::kI8},
@@ -59,6 +61,12 @@ void PlayArguments::Add(CLI::App* c) {
   c->add_flag("--each", options_.each, "Fit every file by itself instead of all together");
   c->add_option("--display", options_.display, "Fill this display's volume (default: fit into all)")
       ->type_name("NAME");
+  c->add_option(
+       "--other-files", other_files_,
+       "Files that a FILE names, such as buffers and materials: none, those in its folder and "
+       "below, or any")
+      ->type_name("none|below|any")
+      ->capture_default_str();
   c->add_flag("--clear", options_.clear, "Take the scene down at the end");
   c->add_option("--style", style_,
                 "Of molecules: balls with bonds between them, or space, atoms as large as they are")
@@ -144,6 +152,7 @@ PlayOptions PlayArguments::Read(const std::vector<std::string>& plain) {
   options_.up = Choose("--up", up_, kUps);
   options_.fill = Choose("--fill", fill_, kFills);
   options_.style = Choose("--style", style_, kStyles);
+  options_.other_files = Choose("--other-files", other_files_, kOtherFiles);
   if (!std::isnan(duration_)) options_.duration_s = duration_;
   ReadVolume();
   return options_;

@@ -26,7 +26,7 @@ class PlayArguments {
   void ReadAnimation();
 
   PlayOptions options_;
-  std::string up_ = "auto", fill_ = "surface", style_ = "balls";
+  std::string up_ = "auto", fill_ = "surface", style_ = "balls", other_files_ = "below";
   std::string size_, type_, window_;
   std::vector<std::string> animate_;  // with nothing, or a number, or what is a file
   CLI::Option* animate_option_ = nullptr;

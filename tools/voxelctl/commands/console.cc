@@ -16,12 +16,12 @@ bool Console::Data(absl::string_view text) {
 
 void Console::Say(absl::string_view text) {
   EndProgress();
-  err_ << EscapeControls(text) << std::endl;
+  err_ << EscapeLines(text) << std::endl;
 }
 
 void Console::Progress(absl::string_view text) {
   if (!live_) return;
-  err_ << absl::StrCat("\r\x1b[K", EscapeControls(text)) << std::flush;
+  err_ << absl::StrCat("\r\x1b[K", EscapeLines(text)) << std::flush;
   drawn_ = true;
 }
 

@@ -13,7 +13,10 @@ namespace voxeld::voxelctl {
 namespace {
 
 ImportOptions OptionsOf(const PlayOptions& options) {
-  return {.globe = options.globe, .raw = options.raw, .style = options.style};
+  return {.globe = options.globe,
+          .raw = options.raw,
+          .style = options.style,
+          .other_files = options.other_files};
 }
 
 }  // namespace
@@ -50,7 +53,7 @@ absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interru
 
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenFrames(const PlayOptions& options) {
   if (options.animation) {
-    return OpenAnimation(options.files[0], *options.animation, options.fps);
+    return OpenAnimation(options.files[0], *options.animation, options.fps, options.other_files);
   }
   const bool one = options.files.size() == 1 && IsSequence(options.files[0]);
   if (!options.sequence && !one) {

@@ -7,13 +7,15 @@
 
 #include "absl/status/statusor.h"
 #include "tools/voxelctl/import/frames.h"
+#include "tools/voxelctl/import/source_file.h"
 
 namespace voxeld::voxelctl {
 
 // Animation `number`, from 1 on, of a file that assimp reads (glTF, FBX, COLLADA, BVH, …), in frames of `fps` a second from its
 // beginning to its end. Meshes follow their bones; without meshes the bones are lines. InvalidArgument if there is no such
 // animation, with the names of those there are; without VOXELD_IMPORTERS always.
-absl::StatusOr<std::unique_ptr<FrameSource>> OpenAnimation(const std::string& path, size_t number,
-                                                           double fps);
+absl::StatusOr<std::unique_ptr<FrameSource>> OpenAnimation(
+    const std::string& path, size_t number, double fps,
+    OtherFiles other_files = OtherFiles::kBelow);
 
 }  // namespace voxeld::voxelctl

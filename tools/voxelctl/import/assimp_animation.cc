@@ -168,8 +168,8 @@ class AnimationFrames final : public FrameSource {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenAnimation(const std::string& path, size_t number,
-                                                           double fps) {
-  absl::StatusOr<SourceFile> file = ReadSourceFile(path);
+                                                           double fps, OtherFiles other_files) {
+  absl::StatusOr<SourceFile> file = ReadSourceFile(path, other_files);
   if (!file.ok()) return file.status();
   if (file->extension == "stl" || file->extension == "ply") {
     return FileError(*file, absl::StrCat("is .", file->extension, ", which has no animations"),

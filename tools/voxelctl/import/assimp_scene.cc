@@ -17,6 +17,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "common/text/printable.h"
+#include "tools/voxelctl/import/assimp_files.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -357,6 +358,7 @@ absl::StatusOr<const aiScene*> Load(const SourceFile& file, bool skinned,
   importer->SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, removed);
   importer->SetPropertyFloat(AI_CONFIG_PP_GSN_MAX_SMOOTHING_ANGLE, kSmoothingDegrees);
   importer->SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
+  importer->SetIOHandler(new AssimpFiles(file));  // which it deletes
   // Steps after reading trust the indices; so they come after a check of our own.
   const aiScene* scene = importer->ReadFile(file.path, 0);
   if (scene == nullptr) return Failed(file, importer->GetErrorString());

@@ -32,7 +32,7 @@ struct Pose {
 bool AssimpReads(const std::string& extension);
 
 // Reads `file` and checks all indices and coordinates before later steps trust them. `skinned`: with bones and animations. The
-// scene lives as long as the importer. InvalidArgument says what the library says.
+// scene lives as long as the importer, and `file` outlives that. InvalidArgument says what the library says.
 absl::StatusOr<const aiScene*> LoadScene(const SourceFile& file, bool skinned,
                                          Assimp::Importer* importer);
 

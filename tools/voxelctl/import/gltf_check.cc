@@ -97,12 +97,11 @@ std::string LoadBuffer(const SourceFile& file, const std::string& uri, absl::str
     return bytes;
   }
   const std::string name = PercentDecode(uri);
-  const std::string path = (std::filesystem::path(file.path).parent_path() / name).string();
-  absl::StatusOr<SourceFile> part = ReadSourceFile(path);
+  absl::StatusOr<SourceFile> part = ReadOtherFile(file, name);
   if (!part.ok()) {
     throw Failure{absl::StrCat(where, " is in the file \"", EscapeForTerminal(name),
                                "\", which cannot be read"),
-                  absl::StrCat("it is expected at ", EscapeForTerminal(path))};
+                  std::string(part.status().message())};
   }
   return std::move(part->bytes);
 }

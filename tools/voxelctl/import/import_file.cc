@@ -108,8 +108,11 @@ absl::Status CheckModel(const SourceFile& file, const Model& model) {
 absl::StatusOr<Model> ImportFile(const std::string& path, const ImportOptions& options) {
   std::error_code ignored;
   const bool folder = std::filesystem::is_directory(path, ignored);
-  const absl::StatusOr<SourceFile> file =
-      folder ? SourceFile{.path = path, .extension = {}, .bytes = {}} : ReadSourceFile(path);
+  const absl::StatusOr<SourceFile> file = folder ? SourceFile{.path = path,
+                                                              .extension = {},
+                                                              .bytes = {},
+                                                              .other_files = options.other_files}
+                                                 : ReadSourceFile(path, options.other_files);
   if (!file.ok()) return file.status();
   absl::StatusOr<Model> model = folder ? ReadFolder(path) : Read(*file, options);
   if (!model.ok()) return model;

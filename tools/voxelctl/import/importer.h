@@ -16,6 +16,7 @@ struct ImportOptions {
   bool globe = false;  // longitude and latitude of maps go on a sphere; meshes do not care
   std::optional<RawLayout> raw;  // what .raw files are
   MoleculeStyle style = MoleculeStyle::kBalls;
+  OtherFiles other_files = OtherFiles::kBelow;
 };
 
 // Reads `path` by its extension, having checked that the contents are of that kind. Every build reads stl, ply, vox, xyz, txt, asc,

@@ -48,8 +48,8 @@ absl::StatusOr<Model> ReadFolder(const std::string& path) {
   return NoImporter(path, "folders of DICOM slices");
 }
 
-absl::StatusOr<std::unique_ptr<FrameSource>> OpenAnimation(const std::string& path, size_t,
-                                                           double) {
+absl::StatusOr<std::unique_ptr<FrameSource>> OpenAnimation(const std::string& path, size_t, double,
+                                                           OtherFiles) {
   return NoImporter(path, "--animate");
 }
 

@@ -16,6 +16,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
 #include "tools/voxelctl/import/inflate.h"
 #include "tools/voxelctl/import/volume_samples.h"
 
@@ -107,6 +108,14 @@ std::optional<std::string> Beside(const std::string& path, absl::string_view ext
   return std::nullopt;
 }
 
+absl::StatusOr<SourceFile> ReadBeside(const SourceFile& file, const std::string& path) {
+  absl::StatusOr<SourceFile> read =
+      ReadOtherFile(file, std::filesystem::path(path).filename().string());
+  if (read.ok()) return read;
+  return FileError(file, absl::StrCat("needs ", EscapeForTerminal(path), " beside it"),
+                   read.status().message());
+}
+
 class Reader {
  public:
   explicit Reader(const SourceFile& file) : file_(file) {}
@@ -120,7 +129,7 @@ class Reader {
       return FileError(file_, "has its samples in another file, and there is none",
                        "the file of the same name with the extension .img is expected beside it");
     }
-    const absl::StatusOr<SourceFile> samples = ReadSourceFile(*beside);
+    const absl::StatusOr<SourceFile> samples = ReadBeside(file_, *beside);
     return samples.ok() ? ReadSamples(*samples) : samples.status();
   }
 
@@ -285,7 +294,7 @@ absl::StatusOr<Model> ReadNiftiVolume(const SourceFile& file) {
     return FileError(file, "has no header beside it",
                      "the file of the same name with the extension .hdr is expected");
   }
-  const absl::StatusOr<SourceFile> read = ReadSourceFile(*header);
+  const absl::StatusOr<SourceFile> read = ReadBeside(file, *header);
   return read.ok() ? Reader(*read).Read() : read.status();
 }
 

@@ -234,19 +234,12 @@ class Reader {
   absl::StatusOr<SourceFile> Beside() const {
     const absl::string_view name = Field("datafile");
     if (name.empty()) return SourceFile();
-    const std::filesystem::path path{std::string(name)};
     if (absl::StartsWith(name, "LIST") || absl::StrContains(name, '%')) {
       return WrongField("datafile", "samples in one file are read");
     }
-    if (path.is_absolute() || std::count(path.begin(), path.end(), "..") > 0) {
-      return WrongField("datafile", "a file in the header's folder is expected");
-    }
-    const std::string beside = (std::filesystem::path(file_.path).parent_path() / path).string();
-    absl::StatusOr<SourceFile> read = ReadSourceFile(beside);
+    absl::StatusOr<SourceFile> read = ReadOtherFile(file_, std::string(name));
     if (read.ok()) return read;
-    absl::string_view reason = read.status().message();
-    absl::ConsumePrefix(&reason, beside + ": ");
-    return WrongField("datafile", EscapeForTerminal(reason));
+    return WrongField("datafile", read.status().message());
   }
 
   absl::Status Skip(absl::string_view* data, uint64_t wanted) const {

@@ -1,6 +1,10 @@
 #include "tools/voxelctl/import/source_file.h"
 
+#include <fcntl.h>
+#include <linux/openat2.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -16,8 +20,58 @@
 #include "common/text/printable.h"
 
 namespace voxeld::voxelctl {
+namespace {
 
-absl::StatusOr<SourceFile> ReadSourceFile(const std::string& path) {
+std::string ExtensionOf(const std::string& path) {
+  const std::string extension = std::filesystem::path(path).extension().string();
+  return absl::AsciiStrToLower(extension.empty() ? extension : extension.substr(1));
+}
+
+class Descriptor {
+ public:
+  explicit Descriptor(int number) : number_(number) {}
+  ~Descriptor() {
+    if (number_ >= 0) ::close(number_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  int get() const { return number_; }
+
+ private:
+  const int number_;
+};
+
+// Opens `name` from the open folder on; with `beneath`, the kernel lets no "..", no absolute path and no link lead out of it.
+int OpenFrom(int folder, const std::string& name, bool beneath) {
+  open_how how = {};
+  how.flags =
+      O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK;  // a FIFO without a writer does not hold it up
+  how.resolve = RESOLVE_NO_MAGICLINKS;
+  if (beneath) how.resolve |= RESOLVE_BENEATH;
+  return static_cast<int>(::syscall(SYS_openat2, folder, name.c_str(), &how, sizeof(how)));
+}
+
+// Reads all of a regular file of 1 to kMaxFileBytes bytes.
+bool ReadWhole(int descriptor, std::string* bytes) {
+  struct stat info {};
+  if (::fstat(descriptor, &info) != 0 || !S_ISREG(info.st_mode) || info.st_size <= 0 ||
+      static_cast<uint64_t>(info.st_size) > kMaxFileBytes) {
+    return false;
+  }
+  bytes->resize(static_cast<size_t>(info.st_size));
+  size_t at = 0;
+  while (at < bytes->size()) {
+    const ssize_t got = ::read(descriptor, bytes->data() + at, bytes->size() - at);
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) return false;
+    at += static_cast<size_t>(got);
+  }
+  return true;
+}
+
+}  // namespace
+
+absl::StatusOr<SourceFile> ReadSourceFile(const std::string& path, OtherFiles other_files) {
   struct stat info {};
   if (::stat(path.c_str(), &info) != 0) {
     const int error = errno;
@@ -35,10 +89,8 @@ absl::StatusOr<SourceFile> ReadSourceFile(const std::string& path) {
     return absl::InvalidArgumentError(absl::StrCat(path, ": the file has ", size,
                                                    " bytes; at most ", kMaxFileBytes, " are read"));
   }
-  SourceFile file;
-  file.path = path;
-  const std::string extension = std::filesystem::path(path).extension().string();
-  file.extension = absl::AsciiStrToLower(extension.empty() ? extension : extension.substr(1));
+  SourceFile file{
+      .path = path, .extension = ExtensionOf(path), .bytes = {}, .other_files = other_files};
   std::ifstream in(path, std::ios::binary);
   file.bytes.resize(size);
   if (!in.read(file.bytes.data(), static_cast<std::streamsize>(size))) {
@@ -46,6 +98,26 @@ absl::StatusOr<SourceFile> ReadSourceFile(const std::string& path) {
                                                     in.gcount(), " of ", size, " bytes)"));
   }
   return file;
+}
+
+absl::StatusOr<SourceFile> ReadOtherFile(const SourceFile& file, const std::string& name) {
+  if (file.other_files == OtherFiles::kNone) {
+    return absl::FailedPreconditionError(
+        "files that others name are not read here; use one that holds everything, such as .glb");
+  }
+  const bool below = file.other_files == OtherFiles::kBelow;
+  const std::filesystem::path parent = std::filesystem::path(file.path).parent_path();
+  const Descriptor folder(
+      ::open(parent.empty() ? "." : parent.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
+  const Descriptor other(folder.get() < 0 ? -1 : OpenFrom(folder.get(), name, below));
+  SourceFile found{.path = (parent / name).string(),
+                   .extension = ExtensionOf(name),
+                   .bytes = {},
+                   .other_files = file.other_files};
+  if (other.get() >= 0 && ReadWhole(other.get(), &found.bytes)) return found;
+  return absl::FailedPreconditionError(
+      below ? "a regular file in its folder or below is expected (--other-files any allows others)"
+            : "a regular file that can be read is expected");
 }
 
 std::string DescribeContents(absl::string_view bytes) {

@@ -1,0 +1,32 @@
+// The files that assimp may open.
+#pragma once
+
+#include <assimp/IOSystem.hpp>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "tools/voxelctl/import/source_file.h"
+
+namespace voxeld::voxelctl {
+
+// Gives assimp the bytes of `file` as they were checked, and the files that it names as ReadOtherFile allows. Everything else is
+// missing, and nothing is written. Not thread-safe. `file` outlives it.
+class AssimpFiles final : public Assimp::IOSystem {
+ public:
+  explicit AssimpFiles(const SourceFile& file) : file_(file) {}
+
+  bool Exists(const char* path) const override { return Find(path) != nullptr; }
+  char getOsSeparator() const override { return '/'; }
+  Assimp::IOStream* Open(const char* path, const char* mode) override;
+  void Close(Assimp::IOStream* stream) override;
+
+ private:
+  const std::string* Find(const std::string& path) const;
+
+  const SourceFile& file_;
+  // By path; null: it may not be read.
+  mutable std::map<std::string, std::unique_ptr<std::string>> others_;
+};
+
+}  // namespace voxeld::voxelctl
