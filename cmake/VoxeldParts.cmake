@@ -1,12 +1,12 @@
-# The parts that a build may leave out. Packages have all of them. A library of a part that is OFF is not searched for, and
-# voxelctl answers for the part with the option that adds it (tools/voxelctl/not_built.h).
-option(VOXELD_IMPORTERS "File formats beside STL, PLY, VOX, text clouds and GeoJSON (assimp, gdcm, nifti, libxml2, GLU, lzf)" ON)
+# Optional parts of a build. Packages include all of them. The libraries of a disabled part are not required; voxelctl then reports
+# which option enables it (tools/voxelctl/text/not_built.h).
+option(VOXELD_IMPORTERS "More file formats than STL, PLY, VOX, GeoJSON, TopoJSON and points as text (assimp, gdcm, nifti, libxml2, GLU, lzf)" ON)
 option(VOXELD_RECORDING "Recordings and playlists: voxelctl record, replay, playlist (zstd)" ON)
-option(VOXELD_LIGHTS "LED protocols as inputs: voxelctl input, pipe" ON)
-option(VOXELD_MARKERS "Markers from Foxglove's protocol: voxelctl markers" ON)
-option(VOXELD_ROS "voxeld-ros, markers from ROS 1; skipped where roscpp is missing, and without VOXELD_MARKERS" ON)
+option(VOXELD_LIGHTS "LED protocols as input: voxelctl input and pipe" ON)
+option(VOXELD_MARKERS "Foxglove marker client: voxelctl markers" ON)
+option(VOXELD_ROS "voxeld-ros (ROS 1 markers); requires VOXELD_MARKERS; skipped if roscpp is missing" ON)
 option(VOXELD_BENCH "Build the benchmarks" ON)
-option(VOXELD_PAGE "The page that voxeld serves; skipped where node or its modules are missing" ON)
+option(VOXELD_PAGE "Web viewer served by voxeld; skipped if Node.js or its npm packages are missing" ON)
 
 # Tests that go through several parts run where all of these are built.
 set(VOXELD_ALL_PARTS OFF)

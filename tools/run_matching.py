@@ -22,7 +22,7 @@ def tests_of(build):
 
 
 def exactly(tests):
-    """A pattern of ctest's for these tests alone: its regular expressions are not Python's."""
+    """Returns: a ctest regular expression that matches exactly these tests; ctest's syntax differs from Python's."""
     return "^(" + "|".join(re.sub(r"([^A-Za-z0-9_])", r"[\1]", test["name"]) for test in tests) + ")$"
 
 
@@ -90,15 +90,15 @@ def main():
 
     programs = programs_with(arguments.build, pattern)
     if not programs:
-        print(f"tools/test: no test and no case matches '{arguments.pattern}'; tools/test --list prints the tests", file=sys.stderr)
+        print(f"tools/test: no ctest test and no GoogleTest case matches '{arguments.pattern}'; to list the tests: tools/test --list", file=sys.stderr)
         return 1
     # Cases of a library that several programs link are in none of its own.
     runnable = {test["command"][0] for test in tests_of(arguments.build) if test.get("command")}
     runnable = {os.path.basename(path): path for path in runnable}
     named = {name: cases for name, cases in programs.items() if name in runnable}
     if not named:
-        print(f"tools/test: '{arguments.pattern}' matches cases of {', '.join(sorted(programs))}, which several programs run;"
-              " name one of these: tools/test conformance", file=sys.stderr)
+        print(f"tools/test: '{arguments.pattern}' matches only GoogleTest cases in {', '.join(sorted(programs))}, which several test programs link;"
+              " run a program by name, for example: tools/test conformance", file=sys.stderr)
         return 1
     if make(sorted(named)) != 0:
         return 1

@@ -18,7 +18,7 @@ def main():
     arguments = parser.parse_args()
     listed = subprocess.run(["ctest", "--test-dir", arguments.build, "--show-only=json-v1"], capture_output=True, text=True, check=False)
     if listed.returncode != 0:
-        print(f"tiers: {arguments.build} is not a configured build; run cmake --preset test", file=sys.stderr)
+        print(f"tools/test: {arguments.build} is not configured; run: tools/setup --test && cmake --preset test", file=sys.stderr)
         return 1
     rows = []
     for test in json.loads(listed.stdout)["tests"]:

@@ -1,4 +1,4 @@
-// Parses JSON that others wrote. Whatever walks over a document afterwards may recurse, so its depth is bounded.
+// Parses untrusted JSON with a limit on its nesting depth, so that recursive code cannot overflow the stack.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -1,4 +1,4 @@
-// How deep JSON nests, before it is parsed: what nobody vouches for may be deeper than whoever walks through it bears.
+// Computes the nesting depth of JSON before it is parsed. Deeply nested, untrusted JSON can overflow the stack of recursive code.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@ namespace voxeld {
 
 inline constexpr int kMaxJsonDepth = 64;
 
-// How deep brackets nest outside strings; does not recurse. Of what is no JSON, some number.
+// Returns: the maximum nesting depth of brackets outside strings. Does not recurse. Unspecified if `text` is not valid JSON.
 inline int JsonDepth(std::string_view text) {
   int depth = 0, deepest = 0;
   bool in_string = false;

@@ -1,4 +1,4 @@
-// Escapes text that others chose, so that it is safe to print: on a terminal, between quotes in a message, in JSON.
+// Escapes untrusted text for output: on a terminal, between quotes in a message, in JSON.
 //
 // Harmful characters are C0 and C1 controls, DEL, line and paragraph separators (U+2028, U+2029), and the invisible marks that
 // change the direction of writing or have no width.
@@ -10,8 +10,8 @@
 
 namespace voxeld {
 
-// Returns: `text` with harmful characters as \u{N}, bytes that are not UTF-8 as \xNN, and each backslash doubled. What is left
-// cannot move a cursor or set a title.
+// Returns: `text` with harmful characters as \u{N}, bytes that are not UTF-8 as \xNN, and each backslash doubled. The result
+// cannot move the cursor or set the window title.
 std::string EscapeForTerminal(absl::string_view text);
 
 // Returns: `text` with C0 controls, DEL and bytes that are not UTF-8 as \xNN, and other harmful characters as \u{N}. Text that has

@@ -11,18 +11,18 @@
 namespace voxeld {
 namespace {
 
-struct Excess {
+struct LimitViolation {
   size_t line = 1, column = 1;
   std::string what;
 };
 
 // Walks over the text without recursion. It knows strings and comments, and otherwise only counts: dots between two delimiters
 // (of a number there is one at the most) and brackets that are open. Of text that is not TOML it may count too many, never too few.
-class ExcessFinder {
+class LimitChecker {
  public:
-  ExcessFinder(std::string_view text, const TomlLimits& limits) : text_(text), limits_(limits) {}
+  LimitChecker(std::string_view text, const TomlLimits& limits) : text_(text), limits_(limits) {}
 
-  std::optional<Excess> Find() {
+  std::optional<LimitViolation> Find() {
     while (at_ < text_.size()) {
       const char c = text_[at_];
       if (c == '#') {
@@ -32,10 +32,12 @@ class ExcessFinder {
       } else {
         Count(c);
         if (dots_ + 1 > limits_.max_key_parts) {
-          return Found(absl::StrCat("a key has more than ", limits_.max_key_parts, " parts"));
+          return Found(
+              absl::StrCat("a dotted key has more than ", limits_.max_key_parts, " parts"));
         }
         if (depth_ > limits_.max_depth) {
-          return Found(absl::StrCat("values are nested more than ", limits_.max_depth, " deep"));
+          return Found(absl::StrCat("arrays and tables are nested more than ", limits_.max_depth,
+                                    " levels deep"));
         }
         ++at_;
       }
@@ -92,13 +94,13 @@ class ExcessFinder {
     }
   }
 
-  Excess Found(std::string what) const {
-    Excess excess{.what = std::move(what)};
+  LimitViolation Found(std::string what) const {
+    LimitViolation violation{.what = std::move(what)};
     for (const char c : text_.substr(0, at_)) {
-      ++excess.column;
-      if (c == '\n') ++excess.line, excess.column = 1;
+      ++violation.column;
+      if (c == '\n') ++violation.line, violation.column = 1;
     }
-    return excess;
+    return violation;
   }
 
   const std::string_view text_;
@@ -112,12 +114,12 @@ absl::StatusOr<toml::table> ParseToml(std::string_view text, const std::string& 
                                       const TomlLimits& limits) {
   const std::string shown = EscapeControls(name);
   if (text.size() > limits.max_bytes) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(shown, ": has ", text.size(), " bytes; ", limits.max_bytes, " is the most"));
+    return absl::InvalidArgumentError(absl::StrCat(shown, ": the file has ", text.size(),
+                                                   " bytes; the maximum is ", limits.max_bytes));
   }
-  if (const std::optional<Excess> excess = ExcessFinder(text, limits).Find()) {
+  if (const std::optional<LimitViolation> violation = LimitChecker(text, limits).Find()) {
     return absl::InvalidArgumentError(
-        absl::StrCat(shown, ":", excess->line, ":", excess->column, ": ", excess->what));
+        absl::StrCat(shown, ":", violation->line, ":", violation->column, ": ", violation->what));
   }
   try {
     return toml::parse(text, name);

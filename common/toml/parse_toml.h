@@ -1,4 +1,4 @@
-// Parses TOML that others wrote. toml++ recurses once for each part of a dotted key and each level of nesting, so both are bounded
+// Parses untrusted TOML. toml++ recurses once for each part of a dotted key and each level of nesting, so both are bounded
 // before it sees the text.
 #pragma once
 
@@ -12,7 +12,7 @@
 
 namespace voxeld {
 
-// No file that a user writes comes near these.
+// Hand-written files stay far below these limits.
 struct TomlLimits {
   size_t max_bytes = size_t{16} << 20;
   size_t max_key_parts = 8;  // of a dotted key or a table's header

@@ -47,9 +47,9 @@ TEST(ParseToml, ReadsWhatIsWithinTheLimits) {
 
 TEST(ParseToml, NamesThePlaceOfWhatIsTooDeep) {
   EXPECT_EQ(ErrorOf(absl::StrCat("x = 1\n  ", Key(9), " = 1\n")),
-            "a.toml:2:18: a key has more than 8 parts");
+            "a.toml:2:18: a dotted key has more than 8 parts");
   EXPECT_EQ(ErrorOf(absl::StrCat("x = ", Repeated("[", 17), Repeated("]", 17), "\n")),
-            "a.toml:1:21: values are nested more than 16 deep");
+            "a.toml:1:21: arrays and tables are nested more than 16 levels deep");
 }
 
 TEST(ParseToml, NamesThePlaceOfWhatIsNotToml) {
@@ -58,7 +58,7 @@ TEST(ParseToml, NamesThePlaceOfWhatIsNotToml) {
 }
 
 TEST(ParseToml, RefusesATextThatIsTooLong) {
-  EXPECT_EQ(ErrorOf("a = 1", {.max_bytes = 4}), "a.toml: has 5 bytes; 4 is the most");
+  EXPECT_EQ(ErrorOf("a = 1", {.max_bytes = 4}), "a.toml: the file has 5 bytes; the maximum is 4");
   EXPECT_TRUE(ParseToml("a=1\n", "a.toml", {.max_bytes = 4}).ok());
 }
 

@@ -118,7 +118,8 @@ TEST_F(PlayerTest, RunsVoxelctlWithTheFileAndNothingOfTheDaemons) {
     for (std::string line; std::getline(in, line);) all.push_back(line);
     return all;
   };
-  EXPECT_THAT(lines("words"), ElementsAre("--server", "unix:/run/v.sock", "play", "--clear", "--other-files", "none", path));
+  EXPECT_THAT(lines("words"), ElementsAre("--server", "unix:/run/v.sock", "play", "--clear",
+                                          "--other-files", "none", path));
   EXPECT_THAT(lines("contents"), ElementsAre("solid"));
   EXPECT_THAT(lines("environment"), Not(::testing::Contains(HasSubstr("secret"))));
   EXPECT_THAT(lines("descriptors"), ElementsAre("0", "1", "2", "3")) << "3 is of ls itself";

@@ -29,7 +29,8 @@ TEST(NoCudaEngine, TheMessageSaysWhetherThereIsAGpu) {
 }
 
 TEST(GpuIsVisible, NotByOtherFilesOfTheDriver) {
-  const std::filesystem::path root = std::filesystem::path(testing::TempDir()) / "voxeld_gpu_no_gpu";
+  const std::filesystem::path root =
+      std::filesystem::path(testing::TempDir()) / "voxeld_gpu_no_gpu";
   std::filesystem::remove_all(root);
   for (const char* const folder : {"proc/driver/nvidia/gpus", "dev"}) {
     std::filesystem::create_directories(root / folder);
@@ -42,7 +43,8 @@ TEST(GpuIsVisible, NotByOtherFilesOfTheDriver) {
 }
 
 TEST(GpuIsVisible, ByTheDriverOrTheDevice) {
-  for (const char* const path : {"/proc/driver/nvidia/gpus/0000:01:00.0", "/dev/nvidia0", "/dev/nvidia3", "/dev/nvidia12"}) {
+  for (const char* const path :
+       {"/proc/driver/nvidia/gpus/0000:01:00.0", "/dev/nvidia0", "/dev/nvidia3", "/dev/nvidia12"}) {
     const std::filesystem::path root =
         std::filesystem::path(testing::TempDir()) / "voxeld_gpu_is_visible";
     std::filesystem::remove_all(root);

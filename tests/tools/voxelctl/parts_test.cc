@@ -17,10 +17,10 @@ using testing::HasSubstr;
 class PartsTest : public CommandsTest {};
 
 TEST_F(PartsTest, ACommandThatIsNotBuiltNamesItsOptionInOneLine) {
-  for (const char* line : {"VOXELD_RECORDING record a.mcap", "VOXELD_RECORDING replay a.mcap",
-                           "VOXELD_RECORDING playlist a.toml", "VOXELD_LIGHTS input opc",
-                           "VOXELD_LIGHTS pipe --size 2x2x2",
-                           "VOXELD_MARKERS markers ws://127.0.0.1:8765"}) {
+  for (const char* line :
+       {"VOXELD_RECORDING record a.mcap", "VOXELD_RECORDING replay a.mcap",
+        "VOXELD_RECORDING playlist a.toml", "VOXELD_LIGHTS input opc",
+        "VOXELD_LIGHTS pipe --size 2x2x2", "VOXELD_MARKERS markers ws://127.0.0.1:8765"}) {
     const std::vector<std::string> words = absl::StrSplit(line, ' ');
     // No server is needed for the answer.
     std::vector<std::string> arguments = {"--server", "127.0.0.1:1"};
