@@ -171,7 +171,8 @@ void Keeper::Run() {
 absl::Status Keeper::Write(const Target& target) {
   const SnapshotPtr view = KeptView(target.snapshot);
   OwnerRecords owners = KeptOwners(*view, *target.owners);
-  Collector collector({clock_.Now(), options_.unix_ns()});
+  const sync::TimeNs now = clock_.Now();
+  Collector collector({now, options_.unix_ns(now)});
   SceneChanges changes({.objects = true}, written_, view);
   bool owners_told = false, told = false;
   // Nothing is known of the file: it is emptied first.

@@ -24,8 +24,9 @@ struct KeeperOptions {
   sync::TimeNs interval_ns = 100 * sync::kMillisecond;
   // After a failure it is tried again this often.
   sync::TimeNs retry_ns = sync::kSecond;
-  std::function<int64_t()> unix_ns;  // the wall clock
-  Logger* log = nullptr;             // outlives the keeper; may be none
+  // The wall clock at `now` of the keeper's clock, which has just been read.
+  std::function<int64_t(sync::TimeNs now)> unix_ns;
+  Logger* log = nullptr;  // outlives the keeper; may be none
 };
 
 // Thread-safe. One thread of its own.

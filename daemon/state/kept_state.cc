@@ -59,9 +59,11 @@ absl::Status KeptState::Restore(Core& core) {
                          {"entities", absl::StrCat(restored->entities)},
                          {"objects", absl::StrCat(restored->objects)},
                          {"owners", absl::StrCat(owners.size())}});
-  keeper_ = std::make_unique<Keeper>(
-      std::move(file_),
-      KeeperOptions{.interval_ns = interval_ns_, .unix_ns = &UnixNs, .log = &log_}, clock_);
+  keeper_ = std::make_unique<Keeper>(std::move(file_),
+                                     KeeperOptions{.interval_ns = interval_ns_,
+                                                   .unix_ns = [](sync::TimeNs) { return UnixNs(); },
+                                                   .log = &log_},
+                                     clock_);
   if (restored->left_out + restored->expired + issues.size() == 0) {
     keeper_->Knows(core.scene_watch().newest(), owners);
   }

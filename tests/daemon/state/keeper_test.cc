@@ -35,11 +35,12 @@ class KeeperTest : public ::testing::Test {
   void Begin(sync::TimeNs interval = 0) {
     auto file = StateFile::Open({.path = path_, .vfs = vfs_, .now = [] { return int64_t{1}; }});
     ASSERT_TRUE(file.ok()) << file.status();
-    keeper_ = std::make_unique<Keeper>(*std::move(file),
-                                       KeeperOptions{.interval_ns = interval,
-                                                     .retry_ns = sync::kMillisecond,
-                                                     .unix_ns = [] { return int64_t{1}; }},
-                                       clock_);
+    keeper_ =
+        std::make_unique<Keeper>(*std::move(file),
+                                 KeeperOptions{.interval_ns = interval,
+                                               .retry_ns = sync::kMillisecond,
+                                               .unix_ns = [](sync::TimeNs) { return int64_t{1}; }},
+                                 clock_);
     keeper_->SetOnDurable([this](uint64_t snapshot) {
       sync::MutexLock lock(mutex_);
       durable_ = snapshot;

@@ -84,7 +84,8 @@ class KeptScene : public ::testing::Test {
   }
   std::unique_ptr<Keeper> MakeKeeper() {
     return std::make_unique<Keeper>(
-        OpenFile(), KeeperOptions{.interval_ns = 0, .unix_ns = [this] { return UnixNs(); }},
+        OpenFile(),
+        KeeperOptions{.interval_ns = 0, .unix_ns = [](sync::TimeNs now) { return kUnixNs + now; }},
         clock_);
   }
   // Into a core of its own, which lives as long as the answer's snapshot is looked at.
