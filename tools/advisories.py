@@ -81,7 +81,7 @@ def faults(source):
         for word in re.findall(r"`([A-Za-z0-9_]+\.[A-Z]\w+(?:\.test_\w+)?|e2e\.\w+|hil\.[\w.]+)`", text):
             if word not in tests():
                 wrong.append(f"{where}: there is no test {word}")
-        for path in re.findall(r"`((?:daemon|display|gpu|tools|client|packaging|cmake|docs|tests)/[\w./@-]+)`", text):
+        for path in re.findall(r"`((?:common|daemon|display|gpu|tools|client|packaging|cmake|docs|tests)/[\w./@-]+)`", text):
             if not (ROOT / path).exists():
                 wrong.append(f"{where}: there is no file {path}")
     return wrong
