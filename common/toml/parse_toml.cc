@@ -75,23 +75,31 @@ class LimitChecker {
     while (at_ < text_.size() && text_[at_] != '\n') ++at_;
   }
 
-  // A string of one line ends at the line's end at the latest, since the parser takes it for an error there.
   void SkipString(char quote) {
-    const std::string three(3, quote);
-    const bool long_string = text_.substr(at_, 3) == three;
+    const bool long_string = Quotes(quote, 3) == 3;
     at_ += long_string ? 3 : 1;
     while (at_ < text_.size()) {
       if (quote == '"' && text_[at_] == '\\') {
         at_ += 2;
-      } else if (long_string ? text_.substr(at_, 3) == three : text_[at_] == quote) {
-        at_ += long_string ? 3 : 1;
+      } else if (!long_string && (text_[at_] == quote || text_[at_] == '\n')) {
+        // The parser stops at a string that its line does not close, so whatever follows is not parsed.
+        ++at_;
         return;
-      } else if (!long_string && text_[at_] == '\n') {
+      } else if (long_string && Quotes(quote, 3) == 3) {
+        // The last three quotes close it; up to two before them belong to the string.
+        at_ += Quotes(quote, 5);
         return;
       } else {
         ++at_;
       }
     }
+  }
+
+  // Returns: how many times `quote` follows from here on, at most `most`.
+  size_t Quotes(char quote, size_t most) const {
+    size_t count = 0;
+    while (count < most && at_ + count < text_.size() && text_[at_ + count] == quote) ++count;
+    return count;
   }
 
   LimitViolation Found(std::string what) const {

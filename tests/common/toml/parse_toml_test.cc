@@ -98,6 +98,23 @@ const Construct kConstructs[] = {
        return absl::StrCat("x = ", Repeated("[{a = ", n), "1", Repeated("}]", n), "\n");
      },
      8},
+    // A long string may end with one or two quotes of its own before the three that close it.
+    {"KeyAfterFourQuotes",
+     [](size_t n) { return absl::StrCat("x = {s = \"\"\"a\"\"\"\", ", Key(n), " = 1}\n"); }, 8},
+    {"KeyAfterFiveQuotes",
+     [](size_t n) { return absl::StrCat("x = {s = \"\"\"a\"\"\"\"\", ", Key(n), " = 1}\n"); }, 8},
+    {"KeyAfterFiveApostrophes",
+     [](size_t n) { return absl::StrCat("x = {s = '''a''''', ", Key(n), " = 1}\n"); }, 8},
+    {"KeyAfterEmptyStrings",
+     [](size_t n) {
+       return absl::StrCat("x = {s = \"\", t = '', u = \"\"\"\"\"\", ", Key(n), " = 1}\n");
+     },
+     8},
+    {"ArrayAfterFourQuotes",
+     [](size_t n) {
+       return absl::StrCat("x = [\"\"\"a\"\"\"\", ", Repeated("[", n), Repeated("]", n), "]\n");
+     },
+     15},
     {"BracketsNeverClosed", [](size_t n) { return absl::StrCat("x = ", Repeated("[", n)); }, 0},
 };
 
