@@ -13,6 +13,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "common/json/bounded_json.h"
+#include "common/json/json_depth.h"
 #include "display/geometry/footprint.h"
 
 namespace voxeld::display::wiring {
@@ -62,16 +63,8 @@ Vec3 PointOf(const CubeWiring& wiring, std::array<int32_t, 3> place, double pitc
   return {at[0], at[1], at[2]};
 }
 
-// An entry may be nested as deep as its file is long.
-bool Shallow(const Json& value, int depth) {
-  return !value.is_structured() ||
-         (depth > 0 && std::all_of(value.begin(), value.end(),
-                                   [&](const Json& inner) { return Shallow(inner, depth - 1); }));
-}
-
 absl::Status BadEntry(size_t index, const Json& entry, const std::string& what) {
-  std::string text =
-      Shallow(entry, 3) ? entry.dump(-1, ' ', true, Json::error_handler_t::replace) : "nested";
+  std::string text = entry.dump(-1, ' ', true, Json::error_handler_t::replace);
   if (text.size() > 60) text = text.substr(0, 60) + "…";
   return absl::InvalidArgumentError(absl::StrCat("entry ", index, " is ", text, "; ", what));
 }
@@ -201,12 +194,16 @@ absl::StatusOr<Lattice> CubeLattice(const CubeWiring& wiring, const PixelNumbers
 
 absl::StatusOr<Lattice> ParseLayout(std::string_view json, const PixelNumbers& numbers,
                                     double pitch_mm) {
+  if (const int depth = JsonDepth(json); depth > kMaxJsonDepth) {
+    return absl::InvalidArgumentError(absl::StrCat("its arrays and objects are nested ", depth,
+                                                   " levels deep; at most ", kMaxJsonDepth,
+                                                   " are allowed"));
+  }
   const Json entries = ParseBoundedJson(json);
   if (!entries.is_array()) {
     return absl::InvalidArgumentError(
-        entries.is_discarded()
-            ? "it is not JSON, is nested too deep, or has a number beyond all bounds"
-            : "it is not an array; it must be one, with an entry a pixel");
+        entries.is_discarded() ? "it is not JSON, or has a number beyond all bounds"
+                               : "it is not an array; it must be one, with an entry a pixel");
   }
   Lattice lattice = EmptyLattice(numbers, pitch_mm);
   if (entries.size() > lattice.points_mm.size()) {

@@ -234,7 +234,11 @@ TEST(FadecandyLayout, BadFilesAreToldWhatIsRight) {
   for (int i = 0; i < 512; ++i) many += ",null";
   EXPECT_EQ(Wrong(many + "]"), "it has 513 entries; there are 512 pixels, 512 a board");
   const std::string deep = std::string(100'000, '[') + std::string(100'000, ']');
-  EXPECT_NE(Wrong("[" + deep + "]").find("entry 0 is nested"), std::string::npos);
+  EXPECT_EQ(Wrong("[" + deep + "]"),
+            "its arrays and objects are nested 100001 levels deep; at most 64 are allowed");
+  EXPECT_NE(Wrong(R"([{"point": )" + std::string(62, '[') + std::string(62, ']') + "}]")
+                .find("entry 0 is"),
+            std::string::npos);
 }
 
 TEST(FadecandyLayout, ReadsTheFile) {
