@@ -10,8 +10,8 @@
 
 namespace voxeld::voxelctl {
 
-// Gives assimp the bytes of `file` as they were checked, and the files that it names as ReadOtherFile allows. Everything else is
-// missing, and nothing is written. Not thread-safe. `file` outlives it.
+// Gives assimp the bytes of `file` that were checked, and the files that ReadOtherFile allows. Assimp finds no other files and
+// cannot write. Not thread-safe. `file` outlives it.
 class AssimpFiles final : public Assimp::IOSystem {
  public:
   explicit AssimpFiles(const SourceFile& file) : file_(file) {}

@@ -18,6 +18,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "common/text/printable.h"
+#include "daemon/address/descriptor.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -27,34 +28,25 @@ std::string ExtensionOf(const std::string& path) {
   return absl::AsciiStrToLower(extension.empty() ? extension : extension.substr(1));
 }
 
-class Descriptor {
- public:
-  explicit Descriptor(int number) : number_(number) {}
-  ~Descriptor() {
-    if (number_ >= 0) ::close(number_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return number_; }
-
- private:
-  const int number_;
-};
-
-// Opens `name` from the open folder on; with `beneath`, the kernel lets no "..", no absolute path and no link lead out of it.
-int OpenFrom(int folder, const std::string& name, bool beneath) {
+// Opens a regular file relative to `folder`. With `beneath`, the kernel refuses "..", absolute paths and links that lead out of it.
+// First only looks the file up (O_PATH), because opening a device or a FIFO can have side effects.
+daemon::Descriptor OpenRegularFile(int folder, const std::string& name, bool beneath) {
   open_how how = {};
-  how.flags =
-      O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK;  // a FIFO without a writer does not hold it up
+  how.flags = O_PATH | O_CLOEXEC;
   how.resolve = RESOLVE_NO_MAGICLINKS;
   if (beneath) how.resolve |= RESOLVE_BENEATH;
-  return static_cast<int>(::syscall(SYS_openat2, folder, name.c_str(), &how, sizeof(how)));
+  const daemon::Descriptor found(
+      static_cast<int>(::syscall(SYS_openat2, folder, name.c_str(), &how, sizeof(how))));
+  struct stat info {};
+  if (!found.ok() || ::fstat(found.get(), &info) != 0 || !S_ISREG(info.st_mode)) return {};
+  return daemon::Descriptor(
+      ::open(absl::StrCat("/proc/self/fd/", found.get()).c_str(), O_RDONLY | O_CLOEXEC));
 }
 
-// Reads all of a regular file of 1 to kMaxFileBytes bytes.
+// Reads a file of 1 to kMaxFileBytes bytes.
 bool ReadWhole(int descriptor, std::string* bytes) {
   struct stat info {};
-  if (::fstat(descriptor, &info) != 0 || !S_ISREG(info.st_mode) || info.st_size <= 0 ||
+  if (::fstat(descriptor, &info) != 0 || info.st_size <= 0 ||
       static_cast<uint64_t>(info.st_size) > kMaxFileBytes) {
     return false;
   }
@@ -103,18 +95,20 @@ absl::StatusOr<SourceFile> ReadSourceFile(const std::string& path, OtherFiles ot
 absl::StatusOr<SourceFile> ReadOtherFile(const SourceFile& file, const std::string& name) {
   if (file.other_files == OtherFiles::kNone) {
     return absl::FailedPreconditionError(
-        "files that others name are not read here; use one that holds everything, such as .glb");
+        "files that a file names are not read here; use one file that holds everything, such as "
+        ".glb");
   }
   const bool below = file.other_files == OtherFiles::kBelow;
   const std::filesystem::path parent = std::filesystem::path(file.path).parent_path();
-  const Descriptor folder(
+  const daemon::Descriptor folder(
       ::open(parent.empty() ? "." : parent.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
-  const Descriptor other(folder.get() < 0 ? -1 : OpenFrom(folder.get(), name, below));
+  const daemon::Descriptor other =
+      folder.ok() ? OpenRegularFile(folder.get(), name, below) : daemon::Descriptor();
   SourceFile found{.path = (parent / name).string(),
                    .extension = ExtensionOf(name),
                    .bytes = {},
                    .other_files = file.other_files};
-  if (other.get() >= 0 && ReadWhole(other.get(), &found.bytes)) return found;
+  if (other.ok() && ReadWhole(other.get(), &found.bytes)) return found;
   return absl::FailedPreconditionError(
       below ? "a regular file in its folder or below is expected (--other-files any allows others)"
             : "a regular file that can be read is expected");

@@ -1,4 +1,4 @@
-// A file read whole, the files that it names, and the words to say what is in it.
+// Reads a file and the files that it names, and describes contents in messages.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,8 @@ namespace voxeld::voxelctl {
 
 inline constexpr uint64_t kMaxFileBytes = uint64_t{2} << 30;
 
-// Which of the files that a file names, or that a library looks for beside it, may be read: whoever wrote the file may be a
-// stranger, who must not have files of this user drawn.
+// The files that may be read because a file names them, or because a library looks for them beside it. A stranger may have written
+// the file, and must not be able to have other files of this user drawn.
 enum class OtherFiles : uint8_t {
   kNone,
   kBelow,  // regular files in the file's own folder and below it, by no link that leads out
@@ -32,10 +32,9 @@ struct SourceFile {
 absl::StatusOr<SourceFile> ReadSourceFile(const std::string& path,
                                           OtherFiles other_files = OtherFiles::kBelow);
 
-// Reads the file that `file` refers to as `name`, from its own folder on. Never blocks on a FIFO and opens no device.
-// Errors: FailedPrecondition if file.other_files does not allow it, or if it is missing, is no regular file, is empty or has more than
-// kMaxFileBytes. The message is a clause for FileError: it says what may be read, and not which of these was the case, so that
-// nobody learns from it which files there are.
+// Reads the file that `file` calls `name`; a relative name starts at the folder of `file`. Opens neither FIFOs nor devices.
+// Errors: FailedPrecondition if file.other_files forbids it, or if it is missing, not a regular file, empty or larger than
+// kMaxFileBytes. The message is a clause for FileError. It is the same in all these cases, so that it does not reveal which files exist.
 absl::StatusOr<SourceFile> ReadOtherFile(const SourceFile& file, const std::string& name);
 
 // What the bytes look like: "a PNG picture", "JSON text",
