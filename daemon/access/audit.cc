@@ -78,10 +78,11 @@ void Audit::Record(const std::string& who, const std::string& peer, const std::s
   std::string line =
       entry.dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace) + "\n";
   sync::MutexLock lock(mutex_);
-  if (!pending_.empty()) WritePending();
+  if (pending_bytes_ + line.size() > options_.max_pending_bytes) WritePending();
   if (!pending_.empty() && pending_bytes_ + line.size() > options_.max_pending_bytes) {
-    if (lost_++ == 0 && log_ != nullptr) {
-      log_->Error("the audit log loses entries, its buffer is full", {{"file", options_.path}});
+    ++lost_;
+    if (!std::exchange(losing_, true) && log_ != nullptr) {
+      log_->Error("audit entries are lost: the buffer is full", {{"file", options_.path}});
     }
     return;
   }
@@ -113,6 +114,7 @@ void Audit::WritePending() {
                {{"file", options_.path}, {"entries_lost", absl::StrCat(lost_)}});
   }
   error_.clear();
+  losing_ = false;
 }
 
 void Audit::Retry() {

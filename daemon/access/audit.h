@@ -28,28 +28,27 @@ struct AuditOptions {
 };
 
 struct AuditStats {
-  uint64_t pending = 0;  // entries that wait until the file can be written
-  uint64_t lost = 0;     // entries that the buffer had no room for
-  std::string error;     // why the file cannot be written; empty: it can
+  uint64_t pending = 0;  // entries that are not written yet
+  uint64_t lost = 0;     // entries that did not fit into the buffer
+  std::string error;     // of the last write; empty: it succeeded
 };
 
 // Thread-safe. Arguments may hold any bytes: those that are not text are escaped.
 //
-// Entries that cannot be written wait in a bounded buffer, in their order, and are written by the next Record, Retry or Reopen that
-// succeeds. Those that the buffer has no room for are counted as lost.
+// If the file cannot be written, entries are kept in a bounded buffer and written in order by a later Record, Retry or Reopen. Entries
+// that do not fit into the buffer are counted as lost.
 class Audit {
  public:
   // The file is created with mode 0640. `log` may be null, and outlives this.
   static absl::StatusOr<std::unique_ptr<Audit>> Open(AuditOptions options, Logger* log);
 
-  // Returns: Unavailable, with the reason and the remedy, if entries are required and cannot be written now. Call it before a control
-  // action is carried out.
+  // Call before each control action. Returns: Unavailable with the reason if entries are required and the file cannot be written.
   absl::Status MayAct();
 
   void Record(const std::string& who, const std::string& peer, const std::string& method,
               const std::string& what, const absl::Status& result);
 
-  // Writes what is pending. Call it now and then.
+  // Writes pending entries. Call periodically.
   void Retry();
 
   // Opens the file again, after it was moved away (logrotate). If that fails, the log says so and the old file stays open.
@@ -70,6 +69,8 @@ class Audit {
   std::deque<std::string> pending_ VOXELD_GUARDED_BY(mutex_);
   size_t pending_bytes_ VOXELD_GUARDED_BY(mutex_) = 0;
   uint64_t lost_ VOXELD_GUARDED_BY(mutex_) = 0;
+  bool losing_ VOXELD_GUARDED_BY(mutex_) =
+      false;  // entries were lost since the file could last be written
   std::string error_ VOXELD_GUARDED_BY(mutex_);  // of the last write; empty: it succeeded
   bool cut_ VOXELD_GUARDED_BY(mutex_) = false;   // the file ends in the middle of a line
 };

@@ -41,7 +41,8 @@ std::string Security::trouble() const {
   std::vector<std::string> wrong = {access_->trouble(), tls_ == nullptr ? "" : tls_->trouble()};
   if (const AuditStats audit = audit_->stats(); !audit.error.empty()) {
     wrong.push_back(absl::StrCat("the audit log cannot be written (", audit.error,
-                                 "): ", audit.pending, " entries wait, ", audit.lost, " are lost"));
+                                 "): ", audit.pending, " entries are pending, ", audit.lost,
+                                 " were lost"));
   }
   std::erase(wrong, "");
   return absl::StrJoin(wrong, "; ");

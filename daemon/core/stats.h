@@ -81,10 +81,9 @@ struct ListenFigures {
   // Calls whose callers may not make them; those ended since their callers may not any more.
   uint64_t calls_turned_away = 0, calls_revoked = 0;
   uint64_t tls_taken = 0,
-           tls_refused = 0;    // certificate and key: times that they were read, and were wrong
-  uint64_t audit_pending = 0,  // entries of the audit log that wait to be written, that are lost
-      audit_lost = 0;
-  std::string unreachable;     // empty: they work; else why they do not
+           tls_refused = 0;  // certificate and key: times that they were read, and were wrong
+  uint64_t audit_pending = 0, audit_lost = 0;  // entries of the audit log, not written yet and lost
+  std::string unreachable;                     // empty: they work; else why they do not
   std::string accept_trouble;  // that none could be accepted just now, and why; empty: all is well
   std::string access_trouble;  // what is wrong with grants, certificate or key; empty: nothing
   std::string config_trouble;  // why the configuration was not taken when it was read again

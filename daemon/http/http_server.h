@@ -32,7 +32,7 @@ struct Request {
   std::string_view query;  // behind '?'
   // Headers; empty: it has none.
   std::string_view host, origin, cookie, accept_encoding;
-  bool head = false;  // by HEAD: whoever asks gets no body
+  bool head = false;  // the method is HEAD: the response is sent without its body
 };
 
 // Answers a path by calling `done` once, from any thread, at once or later. False: there is no such

@@ -102,9 +102,10 @@ constexpr Row<ListenFigures> kConnectionRows[] = {
     {"voxeld_probe_failures_total", &ListenFigures::probe_failures, MetricType::Counter,
      "Connections of the daemon to itself that failed"},
     {"voxeld_audit_entries_pending", &ListenFigures::audit_pending, MetricType::Gauge,
-     "Entries of the audit log that could not be written yet"},
+     "Audit entries that are not written yet"},
     {"voxeld_audit_entries_lost_total", &ListenFigures::audit_lost, MetricType::Counter,
-     "Entries of the audit log that were dropped: it could not be written and its buffer was full"},
+     "Audit entries that were dropped because the file could not be written and the buffer was "
+     "full"},
     {"voxeld_tls_files_taken_total", &ListenFigures::tls_taken, MetricType::Counter,
      "Times that certificate, key and clients' authority were read and taken, at the start too"},
     {"voxeld_tls_files_refused_total", &ListenFigures::tls_refused, MetricType::Counter,

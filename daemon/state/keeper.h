@@ -24,7 +24,7 @@ struct KeeperOptions {
   sync::TimeNs interval_ns = 100 * sync::kMillisecond;
   // After a failure it is tried again this often.
   sync::TimeNs retry_ns = sync::kSecond;
-  // The wall clock at `now` of the keeper's clock, which has just been read.
+  // Returns: the wall clock in Unix nanoseconds at `now`, which was just read from the keeper's clock.
   std::function<int64_t(sync::TimeNs now)> unix_ns;
   Logger* log = nullptr;  // outlives the keeper; may be none
 };

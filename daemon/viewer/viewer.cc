@@ -186,8 +186,8 @@ class Viewer::Impl {
 
  private:
   http::Response TakeControl(const http::Request& request) {
-    if (request.head) {  // what previews links must not use the address up
-      http::Response wrong = Plain(405, "an address for control is opened by GET");
+    if (request.head) {  // sent by programs that preview links, which must not use up the address
+      http::Response wrong = Plain(405, "the address for control requires GET");
       wrong.headers = {{"Allow", "GET"}};
       return wrong;
     }

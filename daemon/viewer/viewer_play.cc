@@ -143,8 +143,10 @@ class ViewerPlay::Upload final : public http::BodyReceiver {
   void Whole(http::Done done) override {
     if (held_ == nullptr) return done(Said(400, "the file is empty"));
     if (play_->audit_ != nullptr) {
-      if (const absl::Status may = play_->audit_->MayAct(); !may.ok())
+      if (const absl::Status may = play_->audit_->MayAct(); !may.ok()) {
+        play_->Record("Play", absl::StrCat("name=\"", absl::CHexEscape(name_), "\""), may);
         return done(Said(503, may.message()));
+      }
     }
     // Every piece has been taken, so there is a file, and a thread.
     (void)play_->worker_.Post([held = held_, play = play_.get(), done] {
@@ -214,8 +216,9 @@ void ViewerPlay::Stop() {
   options_.player->Stop();
 }
 
-void ViewerPlay::Record(const char* method, const std::string& what) const {
-  if (audit_ != nullptr) audit_->Record("page", "http", method, what, absl::OkStatus());
+void ViewerPlay::Record(const char* method, const std::string& what,
+                        const absl::Status& result) const {
+  if (audit_ != nullptr) audit_->Record("page", "http", method, what, result);
 }
 
 }  // namespace voxeld::daemon::viewer

@@ -41,7 +41,9 @@ class ViewerPlay {
   class Pages;
   class Upload;
   ViewerPlay(ViewerPlayOptions options, access::Audit* audit);
-  void Record(const char* method, const std::string& what) const;  // any thread
+  // Thread-safe.
+  void Record(const char* method, const std::string& what,
+              const absl::Status& result = absl::OkStatus()) const;
 
   const ViewerPlayOptions options_;
   access::Audit* const audit_;

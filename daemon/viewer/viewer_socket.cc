@@ -288,7 +288,7 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     };
   }
 
-  // Whether a control action may be carried out; if not, the page is told why.
+  // Returns: whether a control action is allowed. If not, reports the reason to the page.
   bool MayAct(const char* method, const std::string& what) {
     access::Audit* const audit = shared_->options.audit;
     const absl::Status may = audit == nullptr ? absl::OkStatus() : audit->MayAct();

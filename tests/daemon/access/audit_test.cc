@@ -176,7 +176,7 @@ TEST_F(AuditTest, ABufferThatIsFullCountsWhatItLoses) {
     EXPECT_GE(stats.pending, 1u);
     EXPECT_EQ(stats.pending + stats.lost, 20u);
     EXPECT_GT(stats.lost, 0u);
-    EXPECT_THAT(Logged(), HasSubstr("loses entries"));
+    EXPECT_THAT(Logged(), HasSubstr("audit entries are lost"));
     lost = stats.lost;
   }
   // An entry that is larger than the buffer is written all the same where it can be.
@@ -187,6 +187,12 @@ TEST_F(AuditTest, ABufferThatIsFullCountsWhatItLoses) {
     EXPECT_EQ(lines[i]["method"], absl::StrCat("Entry", i));
   EXPECT_EQ(lines.back()["method"], "Large");
   EXPECT_EQ((*audit)->stats().lost, lost);
+  Logged();
+  // The next failure is logged again, and counted on.
+  const SmallFiles full(std::filesystem::file_size(path_));
+  for (int i = 0; i < 20; ++i) (*audit)->Record("a", "", "Again", "", absl::OkStatus());
+  EXPECT_THAT(Logged(), HasSubstr("audit entries are lost"));
+  EXPECT_GT((*audit)->stats().lost, lost);
 }
 
 TEST_F(AuditTest, WhereItIsRequiredNobodyMayActWhileItCannotBeWritten) {

@@ -156,13 +156,14 @@ TEST_F(PlayerTest, StopsAndIsReplaced) {
 
 TEST_F(PlayerTest, TellsWhatWasWrong) {
   Start(
-      "echo 'a note' >&2; echo \"voxelctl: first\" >&2; echo \"voxelctl: $7: is no model;\" >&2; "
+      "echo 'a note' >&2; echo \"voxelctl: first\" >&2; echo \"voxelctl: $7: is not a model;\" "
+      ">&2; "
       "echo "
       "'  models begin otherwise' >&2; exit 1");
   Play("bad.obj");
   const Playing state = AwaitFailed("bad.obj");
   EXPECT_EQ(state.name, "");
-  EXPECT_EQ(state.why, "bad.obj: is no model; models begin otherwise");
+  EXPECT_EQ(state.why, "bad.obj: is not a model; models begin otherwise");
 }
 
 TEST_F(PlayerTest, TellsWhatWasWrongWithWhoeverSaysNothing) {

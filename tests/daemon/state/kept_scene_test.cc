@@ -1,7 +1,6 @@
 // What is kept comes back the same: random scenes through the file into another core.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <pthread.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -22,6 +21,7 @@
 #include "tests/daemon/scene/random_scene.h"
 #include "tests/daemon/wire/random_primitive.h"
 #include "tests/daemon/wire/watched_scene.h"
+#include "tests/small_stack.h"
 #include "voxeld/v1/state.pb.h"
 
 namespace voxeld::daemon::state {
@@ -109,21 +109,6 @@ class KeptScene : public ::testing::Test {
   sync::FakeClock clock_;
 };
 
-// `what` on a thread with a stack of 512 KiB.
-void OnSmallStack(std::function<void()> what) {
-  pthread_attr_t attributes;
-  ASSERT_EQ(pthread_attr_init(&attributes), 0);
-  ASSERT_EQ(pthread_attr_setstacksize(&attributes, 512 << 10), 0);
-  pthread_t thread;
-  const auto run = [](void* call) -> void* {
-    (*static_cast<std::function<void()>*>(call))();
-    return nullptr;
-  };
-  ASSERT_EQ(pthread_create(&thread, &attributes, run, &what), 0);
-  pthread_attr_destroy(&attributes);
-  pthread_join(thread, nullptr);
-}
-
 // As a file that somebody wrote may have them; the stack does not grow with it.
 TEST_F(KeptScene, ObjectsInALongChainAreRead) {
   constexpr int kObjects = 50'000;
@@ -146,7 +131,11 @@ TEST_F(KeptScene, ObjectsInALongChainAreRead) {
   });
   ASSERT_TRUE(put.ok()) << put;
   absl::StatusOr<RestoredState> state = absl::UnknownError("not read");
-  OnSmallStack([&] { state = ReadState(*file, {0, kUnixNs}, Limits(), nullptr, nullptr); });
+  OnSmallStack(
+      [&] {
+        state = ReadState(*file, {0, kUnixNs}, Limits(), nullptr, nullptr);
+      },
+      512 << 10);
   ASSERT_TRUE(state.ok()) << state.status();
   EXPECT_EQ(state->objects, uint64_t{kObjects});
   ASSERT_FALSE(state->scene.steps.empty());

@@ -202,7 +202,7 @@ TEST_F(ViewerPlayTest, PagesWithControlAreToldWhatPlays) {
 }
 
 TEST_F(ViewerPlayTest, TheyAreToldWhyItDoesNotPlay) {
-  Start("echo \"voxelctl: $7: is no model\" >&2; exit 1");
+  Start("echo \"voxelctl: $7: is not a model\" >&2; exit 1");
   const auto page = Open(true);
   HearOf(*page, "play");
   EXPECT_EQ(Post("/play?name=bad.obj").result_int(), 202u);
@@ -211,7 +211,18 @@ TEST_F(ViewerPlayTest, TheyAreToldWhyItDoesNotPlay) {
     failed = HearOf(*page, "play");  // it may be told before that it plays
   EXPECT_FALSE(failed.contains("playing"));
   EXPECT_EQ(failed["failed"], "bad.obj");
-  EXPECT_EQ(failed["why"], "bad.obj: is no model");
+  EXPECT_EQ(failed["why"], "bad.obj: is not a model");
+}
+
+TEST_F(ViewerPlayTest, NothingIsPlayedWhileARequiredAuditLogCannotBeWritten) {
+  audit_ = *access::Audit::Open({.path = "/dev/full", .required = true}, nullptr);
+  audit_->Record("a", "", "First", "", absl::OkStatus());
+  Start(kPlays);
+  const Answer answer = Post("/play?name=a.obj");
+  EXPECT_EQ(answer.result_int(), 503u);
+  EXPECT_THAT(answer.body(), HasSubstr("No space left on device"));
+  EXPECT_EQ(player_->state(), play::Playing());
+  EXPECT_EQ(audit_->stats().pending, 2u) << "what was refused is recorded as well";
 }
 
 TEST_F(ViewerPlayTest, IsForPagesOfThisOriginWithControl) {

@@ -88,17 +88,22 @@ class ViewerSocketTest : public ::testing::Test {
         sim_.core->AddDisplay(std::make_unique<testing::ScriptedDisplay>(lights, sim_.clock), {})
             .ok());
     sim_.Start();
-    shared_ = std::make_shared<ViewerShared>(
-        ViewerShared{*sim_.core,
-                     sim_.clock,
-                     {.version = "1.2", .audit = audit_.get()},
-                     ViewerPlay::Make({.why_not = "nothing is played"}, audit_.get()),
-                     {}});
+    UseAudit(audit_.get());
     page_ = Open();
   }
   ~ViewerSocketTest() override {
     std::error_code ignored;
     std::filesystem::remove_all(folder_, ignored);
+  }
+
+  // Pages that are opened from now on record their actions in `audit`.
+  void UseAudit(access::Audit* audit) {
+    shared_ = std::make_shared<ViewerShared>(
+        ViewerShared{*sim_.core,
+                     sim_.clock,
+                     {.version = "1.2", .audit = audit},
+                     ViewerPlay::Make({.why_not = "nothing is played"}, audit),
+                     {}});
   }
 
   Page Open(bool control = false) {
@@ -372,6 +377,23 @@ TEST_F(ViewerSocketTest, WhatIsChangedIsInTheAuditLogThoughThePageIsGone) {
   EXPECT_THAT(AuditLines(), HasSubstr("\"method\":\"UpdateDisplay\""));
   EXPECT_THAT(AuditLines(), HasSubstr("\"method\":\"ClearLayer\""));
   EXPECT_THAT(AuditLines(), HasSubstr("brightness"));
+}
+
+TEST_F(ViewerSocketTest, ControlIsRefusedWhileARequiredAuditLogCannotBeWritten) {
+  const auto audit = *access::Audit::Open({.path = "/dev/full", .required = true}, nullptr);
+  audit->Record("a", "", "First", "", absl::OkStatus());
+  UseAudit(audit.get());
+  Page page = Open(true);
+  for (const Json& action :
+       {Json{{"update", {{"name", "main"}, {"brightness", 0.5}}}},
+        Json{{"clear", {{"owner", 7}, {"layer", "none"}}}}, Json{{"stop", true}}}) {
+    page.Say(action);
+    Answer(page);
+    const std::vector<Json> errors = page.Heard("error");
+    ASSERT_EQ(errors.size(), 1u) << action;
+    EXPECT_THAT(errors[0].get<std::string>(), HasSubstr("No space left on device")) << action;
+  }
+  EXPECT_EQ(audit->stats().pending, 4u) << "what was refused is recorded as well";
 }
 
 TEST_F(ViewerSocketTest, AClearedLayerIsFollowedByThoseThatAreLeft) {
