@@ -25,11 +25,11 @@ inline constexpr size_t kSmallStack = size_t{512} << 10;
 inline constexpr size_t kSmallStack = size_t{64} << 10;
 #endif
 
-// Runs `work` to its end. A stack that overflows ends the process by SIGSEGV, at the thread's guard page.
-inline void OnSmallStack(std::function<void()> work) {
+// Runs `work` and waits for it. A stack overflow terminates the process by SIGSEGV at the thread's guard page.
+inline void OnSmallStack(std::function<void()> work, size_t stack_bytes = kSmallStack) {
   pthread_attr_t attributes;
   ASSERT_EQ(pthread_attr_init(&attributes), 0);
-  ASSERT_EQ(pthread_attr_setstacksize(&attributes, kSmallStack), 0);
+  ASSERT_EQ(pthread_attr_setstacksize(&attributes, stack_bytes), 0);
   pthread_t thread;
   const int started = pthread_create(
       &thread, &attributes,

@@ -14,8 +14,8 @@ namespace voxeld {
 // cannot move the cursor or set the window title.
 std::string EscapeForTerminal(absl::string_view text);
 
-// Returns: `text` with C0 controls, DEL and bytes that are not UTF-8 as \xNN, and other harmful characters as \u{N}. Text that has
-// been escaped stays as it is, so whatever puts messages together or prints them can make sure of them.
+// Returns: `text` with C0 controls, DEL and bytes that are not UTF-8 as \xNN, and other harmful characters as \u{N}. Idempotent:
+// code that builds or prints a message may apply it again.
 std::string EscapeControls(absl::string_view text);
 
 // Returns: as EscapeControls, but line feeds stay: for text of several lines.

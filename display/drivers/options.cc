@@ -194,9 +194,9 @@ absl::Status OptionReader::Finish() const {
   if (!status_.ok()) return status_;
   for (const auto& [key, value] : options_.options) {
     if (known_.contains(key)) continue;
-    return absl::InvalidArgumentError(absl::StrCat(
-        "display \"", options_.name, "\": there is no option ", EscapeQuoted(key), " (\"",
-        EscapeQuoted(value), "\") here; there are ", absl::StrJoin(known_, ", ")));
+    return absl::InvalidArgumentError(
+        absl::StrCat("display \"", options_.name, "\": unknown option ", EscapeQuoted(key), " (\"",
+                     EscapeQuoted(value), "\"); known options: ", absl::StrJoin(known_, ", ")));
   }
   return absl::OkStatus();
 }

@@ -125,7 +125,7 @@ class Lights(unittest.TestCase):
             Path(config, f"ola-{name}.conf").write_text(text, encoding="utf-8")
         http = free_port()
         user: dict[str, Any] = {"user": "nobody", "group": "nogroup", "extra_groups": []} if os.geteuid() == 0 else {}
-        self.assertIsNotNone(shutil.which("olad"), "there is no olad; run tools/setup --test")
+        self.assertIsNotNone(shutil.which("olad"), "olad not found; run tools/setup --test")
         with Path(self.folder, "olad.log").open("wb") as log:
             olad = subprocess.Popen(["olad", "--config-dir", str(config), "--http-port", f"{http}", "--rpc-port", f"{free_port()}", "--no-http-quit",
                                      "--no-register-with-dns-sd", "--log-level", "3"], stdout=log, stderr=log, **user)

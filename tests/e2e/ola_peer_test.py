@@ -53,7 +53,7 @@ class Olad:
                                          "does another olad run, or a service of that name?") from error
         for name, text in CONFIG.items():
             Path(folder, f"ola-{name}.conf").write_text(text, encoding="utf-8")
-        assert shutil.which("olad"), "there is no olad; run tools/setup --test"
+        assert shutil.which("olad"), "olad not found; run tools/setup --test"
         user: dict[str, Any] = {}
         if os.geteuid() == 0:  # which olad does not run as
             nobody = pwd.getpwnam("nobody")

@@ -98,7 +98,7 @@ class Completions(unittest.TestCase):
         for shell in ("zsh", "fish"):
             with self.subTest(shell):
                 if shutil.which(shell) is None:
-                    self.fail(f"there is no {shell}: run tools/setup --test")
+                    self.fail(f"{shell} not found; run tools/setup --test")
                 path = self.daemon.folder / f"script.{shell}"
                 path.write_text(written("completion", shell), encoding="utf-8")
                 made = subprocess.run([shell, "-n", str(path)], capture_output=True, text=True, timeout=LONG)
@@ -112,7 +112,7 @@ class Completions(unittest.TestCase):
 
     def test_zsh_completes(self) -> None:
         if shutil.which("zsh") is None:
-            self.fail("there is no zsh: run tools/setup --test")
+            self.fail("zsh not found; run tools/setup --test")
         master, slave = os.openpty()
         self.addCleanup(os.close, master)
         environment = {**self.daemon.environment, "TERM": "vt100", "PATH": f"{Path(VOXELCTL).parent}:{os.environ['PATH']}"}
@@ -167,14 +167,14 @@ class Manual(unittest.TestCase):
 
     def test_mandoc_finds_nothing(self) -> None:
         if shutil.which("mandoc") is None:
-            self.fail("there is no mandoc: run tools/setup --test")
+            self.fail("mandoc not found; run tools/setup --test")
         for path in sorted(self.folder.iterdir()):
             made = subprocess.run(["mandoc", "-T", "lint", str(path)], capture_output=True, text=True, timeout=LONG)
             self.assertEqual(made.stdout + made.stderr, "", path.name)
 
     def test_man_shows_them(self) -> None:
         if shutil.which("man") is None:
-            self.fail("there is no man: run tools/setup --test")
+            self.fail("man not found; run tools/setup --test")
         for path in sorted(self.folder.iterdir()):
             made = subprocess.run(["man", "--warnings", "-l", str(path)], env={**os.environ, "MANWIDTH": "100", "LC_ALL": "C.UTF-8"},
                                   capture_output=True, text=True, timeout=LONG)

@@ -1,4 +1,4 @@
-// The files that a file names: which of them are read, and that nobody learns of the others.
+// Which of the files that a file names are read, and that messages do not reveal the others.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -79,7 +79,7 @@ class OtherFilesTest : public ::testing::Test {
     return ImportFile(folder_.Write(absl::StrCat("own/", name), text), {.other_files = allowed});
   }
 
-  // Names without their extension: those in the folder or below, those that lead out, and those that are no regular files.
+  // Names without their extension: in the folder or below; outside of it; not regular files.
   const std::vector<std::string> below_ = {"a", "below/b", "./a", "below/../a", "inside"};
   std::vector<std::string> outside() const {
     return {"../private/key",

@@ -88,7 +88,7 @@ TEST(Profile, WhatIsWrongIsSaid) {
   EXPECT_THAT(std::string(wrong.message()), HasSubstr("panels[0].tilt_deg is 90"));
   const absl::Status unknown =
       Show({.profile = folder.Write("b.toml", "geometri = \"rotor\"\n")}).status;
-  EXPECT_THAT(std::string(unknown.message()), HasSubstr("there is no option geometri"));
+  EXPECT_THAT(std::string(unknown.message()), HasSubstr("unknown option geometri"));
   const absl::Status other =
       Show({.profile = folder.Write("c.toml", "driver = \"fadecandy\"\n")}).status;
   EXPECT_THAT(std::string(other.message()), HasSubstr("simulated or voxlink"));

@@ -140,7 +140,7 @@ def main() -> int:
     if not (100 <= options.messages and 1 <= options.lights <= 170 and options.runs >= 1):
         parser.error("--messages is at least 100, --lights 1 to 170, --runs at least 1")
     if shutil.which("olad") is None:
-        parser.error("there is no olad; run tools/setup --test")
+        parser.error("olad not found; run tools/setup --test")
     blocks = options.messages // 100
     count = options.lights * 3
     block = (struct.pack(">BBH", 0, 0, count) + bytes(index % 256 for index in range(count))) * 100

@@ -35,10 +35,10 @@ struct PlayOptions {
   std::optional<RawLayout> raw;
   VolumeLook volume;
   MoleculeStyle style = MoleculeStyle::kBalls;
-  OtherFiles other_files = OtherFiles::kBelow;  // that the files name
+  OtherFiles other_files = OtherFiles::kBelow;  // the files that they name
   bool sequence = false;                        // the files one after another, at `fps`
   std::optional<uint32_t> animation;            // from 1 on: of the only file
-  bool loop = false;                            // a sequence or animation begins again at its end
+  bool loop = false;                            // repeats a sequence or an animation
 };
 
 struct DemoOptions {

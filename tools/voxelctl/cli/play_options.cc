@@ -63,8 +63,8 @@ void PlayArguments::Add(CLI::App* c) {
       ->type_name("NAME");
   c->add_option(
        "--other-files", other_files_,
-       "Files that a FILE names, such as buffers and materials: none, those in its folder and "
-       "below, or any")
+       "Read the files that a FILE names, such as buffers and materials: none, those in its "
+       "folder and below, or any")
       ->type_name("none|below|any")
       ->capture_default_str();
   c->add_flag("--clear", options_.clear, "Take the scene down at the end");

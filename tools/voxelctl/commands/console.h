@@ -8,8 +8,8 @@
 
 namespace voxeld::voxelctl {
 
-// Data go to `out`, words to `err`. What others chose cannot control a terminal: characters that could are escaped in words and in
-// JSON. Not thread-safe.
+// Writes data to `out` and messages to `err`. Escapes control characters in messages and in JSON, so that untrusted text cannot
+// control the terminal. Not thread-safe.
 class Console {
  public:
   // `live`: err is a terminal, so a line may be drawn again and again.

@@ -19,7 +19,7 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr int32_t kModelSide = 256;
-constexpr int kVoxColors = 255;  // a voxel's 0 means that there is none
+constexpr int kVoxColors = 255;  // 0 marks an empty voxel
 constexpr uint32_t kVoxVersion = 150;
 
 using Cell = std::array<int32_t, 3>;

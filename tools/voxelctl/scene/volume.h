@@ -21,7 +21,7 @@ struct VolumeLook {
   std::optional<double> level;  // the surface there instead
 };
 
-// Bytes of a message that are kept for all beside its bulk.
+// Bytes of a message that are reserved for everything but its bulk data.
 inline constexpr uint64_t kMessageOverhead = 4096;
 
 // Brings bytes to the server as an asset.

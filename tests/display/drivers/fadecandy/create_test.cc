@@ -75,7 +75,7 @@ TEST(FadecandyOptions, RefusalsNameKeyValueAndWhatIsRight) {
   EXPECT_EQ(Refusal({{"layout", "/nonexistent"}}),
             "display \"d\": layout \"/nonexistent\": it cannot be opened");
   EXPECT_NE(Refusal({{"pitch_mm", "100000"}}).find("cell_mm.x"), std::string::npos);
-  EXPECT_NE(Refusal({{"size", "8x8x8"}}).find("there is no option size"), std::string::npos);
+  EXPECT_NE(Refusal({{"size", "8x8x8"}}).find("unknown option size"), std::string::npos);
 }
 
 TEST(FadecandyOptions, ReachTheBoards) {

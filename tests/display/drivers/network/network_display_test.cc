@@ -273,7 +273,7 @@ TEST_F(Network, SaysWhatIsWrongWithOptions) {
   EXPECT_NE(Refusal({{"address", "wled.local"}}).find("an address in numbers"), std::string::npos);
   EXPECT_NE(Refusal({{"protocol", "dmx"}}).find("one of ddp, e131, artnet, opc"),
             std::string::npos);
-  EXPECT_NE(Refusal({{"priority", "10"}}).find("there is no option priority"), std::string::npos);
+  EXPECT_NE(Refusal({{"priority", "10"}}).find("unknown option priority"), std::string::npos);
   EXPECT_NE(Refusal({{"color_order", "rgbw"}}).find("one of rgb, rbg"), std::string::npos);
   EXPECT_NE(Refusal({{"protocol", "opc"}, {"cube", "64x64x64"}}).find("16384 a channel"),
             std::string::npos);
