@@ -248,7 +248,7 @@ TEST(FadecandyLayout, ReadsTheFile) {
   ASSERT_TRUE(lattice.ok()) << lattice.status();
   EXPECT_EQ(Points(*lattice, 0, 3), "0,0,2 0,0,-2 -");
   EXPECT_NE(Refusal({{"layout", path}, {"cube", "2x2x2"}}).find("left out"), std::string::npos);
-  EXPECT_NE(Refusal({{"layout", path}, {"order", "xyz"}}).find("no option order"),
+  EXPECT_NE(Refusal({{"layout", path}, {"order", "xyz"}}).find("unknown option order"),
             std::string::npos);
   EXPECT_EQ(Refusal({{"layout", "/nonexistent/file"}}),
             "layout \"/nonexistent/file\": it cannot be opened");
