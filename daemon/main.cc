@@ -19,6 +19,7 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
+#include "common/memory/out_of_memory.h"
 #include "common/text/printable.h"
 #include "daemon/access/security.h"
 #include "daemon/access/ticker.h"
@@ -38,7 +39,6 @@
 #include "daemon/process/end_limit.h"
 #include "daemon/process/process.h"
 #include "daemon/process/process_watch.h"
-#include "daemon/process/spare_threads.h"
 #include "daemon/process/supervisor.h"
 #include "daemon/reload/reloader.h"
 #include "daemon/services/health_watch.h"
@@ -59,7 +59,6 @@ constexpr int kUsageError = 2;
 constexpr sync::TimeNs kServerLimit = 2 * sync::kSecond;
 constexpr sync::TimeNs kCoreLimit = 2 * sync::kSecond;
 constexpr sync::TimeNs kEndLimit = 5 * sync::kSecond;
-constexpr int kSpareThreads = 8;
 
 int Fail(int code, const absl::Status& status) {
   std::fprintf(stderr, "voxeld: %s\n", EscapeLines(status.message()).c_str());
@@ -221,7 +220,7 @@ void FeedWatchdog(Core& core, const Supervisor& supervisor) {
 int Serve(const Config& config, const CommandLine& command_line, Displays displays,
           const sigset_t& signals, sync::Clock& clock, Supervisor& supervisor, Logger& log) {
   std::optional<EndLimit> end_limit;  // of all that is below, to its last destructor
-  ProcessWatch process(config.server.memory_reserve_bytes, clock, log);
+  ProcessWatch process(clock, log);
   access::Ticker turns(clock, TimeWatch::kTurn, [&process] { process.LookAtTime(); });
   const absl::StatusOr<access::AccessOptions> access_options = AccessOf(config.security);
   if (!access_options.ok()) return Fail(1, access_options.status());
@@ -466,9 +465,6 @@ int Main(int argc, char** argv) {
   sigaddset(&signals, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // before displays make threads: main alone waits
 
-  if (absl::Status status = SpareThreads::Begin(kSpareThreads); !status.ok()) {
-    return Fail(1, status);
-  }
   sync::SystemClock clock;
   std::unique_ptr<display::LibusbBus> usb;  // made for the first display that asks for it
   const auto shared_usb = [&]() -> absl::StatusOr<display::UsbBus*> {
@@ -497,6 +493,7 @@ int Main(int argc, char** argv) {
 }  // namespace voxeld::daemon
 
 int main(int argc, char** argv) {
+  voxeld::ExitWhenOutOfMemory();
   try {
     return voxeld::daemon::Main(argc, argv);
   } catch (const std::exception& error) {

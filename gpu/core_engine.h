@@ -13,7 +13,6 @@
 #include "gpu/call_queue.h"
 #include "gpu/engine.h"
 #include "gpu/staging.h"
-#include "gpu/want_of_memory.h"
 
 namespace voxeld::gpu {
 
@@ -78,7 +77,6 @@ class CoreEngine final : public Engine {
   template <typename Work>
   auto Guarded(Work& work) -> decltype(work()) {
     try {
-      const WantOfMemory caught;
       auto result = work();
       if (absl::IsDataLoss(StatusOf(result))) lost_ = StatusOf(result);
       return result;

@@ -8,7 +8,6 @@
 #include "absl/strings/str_cat.h"
 #include "gpu/cpu/cpu_engine.h"
 #include "gpu/ranks/ranked_engine.h"
-#include "gpu/want_of_memory.h"
 #include "gpu/worker/worker_engine.h"
 
 namespace voxeld::gpu {
@@ -36,7 +35,6 @@ absl::StatusOr<std::unique_ptr<Engine>> InWorkers(EngineOptions options, std::st
 absl::StatusOr<std::unique_ptr<Engine>> OnCpu(const EngineOptions& options, std::string reason) {
   if (options.in_worker) return InWorkers(options, std::move(reason));
   try {
-    const WantOfMemory caught;
     return CreateCpuEngine(options, std::move(reason));
   } catch (const std::exception& error) {
     return absl::ResourceExhaustedError(

@@ -68,8 +68,6 @@ struct ServerConfig {
   bool http_control = true;  // a browser may be given control, by an address that serves once
   bool http_play = true;     // with control it may send files to be played
   uint64_t http_max_upload_bytes = 256u << 20;  // of one of them
-  // Kept for when the system has none left (process/memory_reserve.h); 0: none is.
-  uint64_t memory_reserve_bytes = 4u << 20;
 };
 
 struct EngineConfig {

@@ -74,7 +74,6 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Flag("http_control", config.server.http_control);
   visitor.Flag("http_play", config.server.http_play);
   visitor.Integer("http_max_upload_bytes", config.server.http_max_upload_bytes, 1, 2 * kGiB);
-  visitor.Integer("memory_reserve_bytes", config.server.memory_reserve_bytes, 0, 1 << 27);
 
   visitor.Section("engine");
   visitor.Engine("kind", config.engine.kind);

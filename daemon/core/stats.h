@@ -106,10 +106,7 @@ struct AssetFigures {
 
 // The process as a whole.
 struct ProcessFigures {
-  uint64_t heap_bytes = 0;           // allocated, as the C library counts; the reserve among them
-  uint64_t allocations_failed = 0;   // that the system had no memory for, at first
-  uint64_t allocations_refused = 0;  // of them those that the reserve did not help either
-  uint64_t reserve_bytes = 0, reserve_held_bytes = 0;  // that it is to have, and has
+  uint64_t heap_bytes = 0;        // allocated, as the C library counts
   uint64_t segments_refused = 0;  // memory for arrays and engines that the system did not have
   std::string trouble;            // that there was no memory just now; empty: all is well
   uint64_t pauses = 0;            // times that the process did not run for a second or more

@@ -145,15 +145,7 @@ constexpr Row<AssetFigures> kAssetRows[] = {
 
 constexpr Row<ProcessFigures> kProcessRows[] = {
     {"voxeld_process_heap_bytes", &ProcessFigures::heap_bytes, MetricType::Gauge,
-     "Bytes that are allocated, the reserve of memory among them"},
-    {"voxeld_process_allocations_failed_total", &ProcessFigures::allocations_failed,
-     MetricType::Counter, "Allocations that the system had no memory for, at first"},
-    {"voxeld_process_allocations_refused_total", &ProcessFigures::allocations_refused,
-     MetricType::Counter, "Of them those that the reserve of memory did not help either"},
-    {"voxeld_process_reserve_bytes", &ProcessFigures::reserve_bytes, MetricType::Gauge,
-     "That the reserve of memory is to have"},
-    {"voxeld_process_reserve_held_bytes", &ProcessFigures::reserve_held_bytes, MetricType::Gauge,
-     "That it has"},
+     "Bytes that are allocated"},
     {"voxeld_process_segments_refused_total", &ProcessFigures::segments_refused,
      MetricType::Counter, "Times that the system had no memory for arrays or engines"},
     {"voxeld_process_pauses_total", &ProcessFigures::pauses, MetricType::Counter,

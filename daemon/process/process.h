@@ -17,7 +17,7 @@ void TuneProcess();
 // places are free, and others who want memory of that arena wait for it; what is wanted again is faulted in again.
 void GiveBackFreeMemory();
 
-// Bytes that are allocated, as the allocator counts: the reserve among them, and what it keeps for each thread. 0: it does
+// Bytes that are allocated, as the allocator counts, and what it keeps for each thread. 0: it does
 // not tell.
 uint64_t HeapBytes();
 

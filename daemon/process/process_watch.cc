@@ -2,17 +2,10 @@
 
 #include <algorithm>
 
-#include "absl/strings/str_cat.h"
-#include "daemon/process/spare_threads.h"
-
 namespace voxeld::daemon {
 
 void ProcessWatch::Look() {
-  if (const uint64_t taken = SpareThreads::Refill(); taken > 0) {
-    log_.Warn("the system gave no thread: spare ones were taken",
-              {{"threads", absl::StrCat(taken)}});
-  }
-  reserve_.Look();
+  segments_.Look();
   if (const sync::TimeNs begun = clock_.Now(); begun >= give_back_at_) {
     allocator_.give_back();
     give_back_at_ = Next(begun, kGiveBack);
@@ -28,7 +21,8 @@ sync::TimeNs ProcessWatch::Next(sync::TimeNs begun, sync::TimeNs period) const {
 }
 
 ProcessFigures ProcessWatch::figures() const {
-  ProcessFigures figures = reserve_.figures();
+  ProcessFigures figures;
+  segments_.AddTo(figures);
   time_.AddTo(figures);
   figures.heap_bytes = heap_bytes_;
   return figures;

@@ -1,14 +1,13 @@
-// Looks after the process as a whole: its reserves of memory and threads, and whether it runs and by which time.
+// Looks after the process as a whole: its memory, and whether it runs and by which time.
 #pragma once
 
 #include <atomic>
-#include <cstddef>
 #include <cstdint>
 
 #include "daemon/core/stats.h"
 #include "daemon/log/logger.h"
 #include "daemon/process/process.h"
-#include "daemon/process/reserve_watch.h"
+#include "daemon/process/segment_watch.h"
 #include "daemon/process/time_watch.h"
 #include "display/sync/clock.h"
 
@@ -27,13 +26,11 @@ class ProcessWatch {
     uint64_t (*count)() = &HeapBytes;
   };
 
-  ProcessWatch(size_t reserve_bytes, sync::Clock& clock, Logger& log)
-      : ProcessWatch(reserve_bytes, clock, log, Allocator{}) {}
-  ProcessWatch(size_t reserve_bytes, sync::Clock& clock, Logger& log, Allocator allocator)
+  ProcessWatch(sync::Clock& clock, Logger& log) : ProcessWatch(clock, log, Allocator{}) {}
+  ProcessWatch(sync::Clock& clock, Logger& log, Allocator allocator)
       : clock_(clock),
-        log_(log),
         allocator_(allocator),
-        reserve_(reserve_bytes, clock, log),
+        segments_(clock, log),
         time_(log),
         heap_bytes_(allocator.count()),
         give_back_at_(clock.Now() + kGiveBack),
@@ -48,9 +45,8 @@ class ProcessWatch {
   sync::TimeNs Next(sync::TimeNs begun, sync::TimeNs period) const;
 
   sync::Clock& clock_;
-  Logger& log_;
   const Allocator allocator_;
-  ReserveWatch reserve_;
+  SegmentWatch segments_;
   TimeWatch time_;
   std::atomic<uint64_t> heap_bytes_;
   sync::TimeNs give_back_at_, count_at_;  // of the thread that looks

@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <new>
 #include <system_error>
 #include <utility>
 
@@ -12,7 +11,6 @@
 #include "daemon/viewer/volume_message.h"
 #include "gpu/delta.h"
 #include "gpu/engine.h"
-#include "gpu/want_of_memory.h"
 
 namespace voxeld::daemon::viewer {
 namespace {
@@ -223,15 +221,9 @@ void Comparer::Run() {
 
 absl::StatusOr<Comparison> Comparer::Serve(const Task& task, References& references) const {
   if (absl::Status may = CheckComparable(task.info->geometry.grid); !may.ok()) return may;
-  absl::StatusOr<Comparison> comparison = absl::UnknownError("");
-  try {
-    const gpu::WantOfMemory caught;
-    Reference& reference = references[task.display];
-    comparison = Hold(task, reference);
-    reference.used = clock_.Now();
-  } catch (const std::bad_alloc&) {
-    comparison = absl::ResourceExhaustedError("there is no memory for it now");
-  }
+  Reference& reference = references[task.display];
+  absl::StatusOr<Comparison> comparison = Hold(task, reference);
+  reference.used = clock_.Now();
   if (!comparison.ok()) references.erase(task.display);
   return comparison;
 }

@@ -160,10 +160,6 @@ void Encode(const Stats& in, v1::Stats* out) {
   assets->set_bytes_in(in.assets.bytes_in);
   assets->set_trouble(in.assets.trouble);
   v1::ProcessStats* process = out->mutable_process();
-  process->set_allocations_failed(in.process.allocations_failed);
-  process->set_allocations_refused(in.process.allocations_refused);
-  process->set_reserve_bytes(in.process.reserve_bytes);
-  process->set_reserve_held_bytes(in.process.reserve_held_bytes);
   process->set_trouble(in.process.trouble);
   process->set_segments_refused(in.process.segments_refused);
   process->set_pauses(in.process.pauses);

@@ -4,8 +4,8 @@
 #include <optional>
 #include <utility>
 
+#include "absl/container/flat_hash_map.h"
 #include "absl/strings/str_cat.h"
-#include "gpu/hash_map.h"
 
 namespace voxeld::gpu {
 namespace {
@@ -67,7 +67,7 @@ class Planner final : public DeltaVisitor {
 
   absl::StatusOr<DeltaPlan> Finish() {
     // Changes to the scene's counts.
-    HashMap<uint64_t, int64_t> geometry_uses, layer_uses;
+    absl::flat_hash_map<uint64_t, int64_t> geometry_uses, layer_uses;
     for (const auto& [id, links] : drawables_) {
       if (const Drawable* before = forgotten_ ? nullptr : scene_.FindDrawable(id)) {
         --geometry_uses[before->record.geometry];
@@ -132,8 +132,8 @@ class Planner final : public DeltaVisitor {
   DeltaPlan plan_;
   bool forgotten_ = false;  // by a reset
   // What the delta says of an id, over what the scene holds.
-  HashMap<uint64_t, bool> geometries_, layers_;
-  HashMap<uint64_t, std::optional<Links>> drawables_;
+  absl::flat_hash_map<uint64_t, bool> geometries_, layers_;
+  absl::flat_hash_map<uint64_t, std::optional<Links>> drawables_;
 };
 
 }  // namespace

@@ -14,10 +14,10 @@
 #include <span>
 #include <vector>
 
+#include "absl/container/flat_hash_map.h"
 #include "gpu/assemble/scene.h"
 #include "gpu/assemble/tile_rows.h"
 #include "gpu/cpu/executor.h"
-#include "gpu/hash_map.h"
 #include "gpu/primitives/grid.h"
 
 namespace voxeld::gpu {
@@ -95,7 +95,7 @@ class PassBins {
   Box3 box_;                     // around them
   bool by_ranges_ = false;
   uint64_t limit_ = 0, held_ = 0, most_ = 0;
-  HashMap<const Drawable*, size_t> slot_of_;
+  absl::flat_hash_map<const Drawable*, size_t> slot_of_;
   std::vector<Bins> slots_;  // used again
   BinScratch scratch_;
 };

@@ -8,13 +8,14 @@
 #include <span>
 #include <vector>
 
+#include "absl/container/flat_hash_map.h"
+#include "absl/container/flat_hash_set.h"
 #include "absl/status/status.h"
 #include "gpu/assemble/bins.h"
 #include "gpu/clip.h"
 #include "gpu/curves/cut.h"
 #include "gpu/delta.h"
 #include "gpu/engine.h"
-#include "gpu/hash_map.h"
 
 namespace voxeld::gpu {
 
@@ -50,7 +51,7 @@ struct Drawable {
 struct Layer {
   LayerRecord record;
   std::optional<VoxelClip> clip;  // derived, in voxel space; none: to be mapped anew
-  HashSet<Drawable*> drawables;
+  absl::flat_hash_set<Drawable*> drawables;
   int rank = 0;                 // in the order of combination
   const Layer* mask = nullptr;  // if it has one that is there
   bool drawn = false;           // it is seen, or the mask of one that is; as of the last delta
@@ -90,8 +91,10 @@ class Scene {
   absl::Status Apply(std::span<const std::byte> delta, BulkSource* bulk, SceneObserver& observer,
                      std::vector<std::unique_ptr<Drawable>>& gone);
 
-  const HashMap<uint64_t, std::unique_ptr<Drawable>>& drawables() const { return drawables_; }
-  const HashMap<uint64_t, std::unique_ptr<Layer>>& layers() const { return layers_; }
+  const absl::flat_hash_map<uint64_t, std::unique_ptr<Drawable>>& drawables() const {
+    return drawables_;
+  }
+  const absl::flat_hash_map<uint64_t, std::unique_ptr<Layer>>& layers() const { return layers_; }
   // Sees to it that every layer has its `clip`. `anew`: the view has changed.
   void MapClips(const Affine& view, bool anew);
   // How many drawables use it; −1 if there is no such id.
@@ -102,7 +105,7 @@ class Scene {
  private:
   struct GeometryEntry {
     std::shared_ptr<const RetainedGeometry> geometry;
-    HashSet<Drawable*> users;
+    absl::flat_hash_set<Drawable*> users;
   };
 
   void PutGeometry(const GeometryView& view, SceneObserver& observer);
@@ -112,9 +115,9 @@ class Scene {
   void RankLayers();
   void LinkMasks();
 
-  HashMap<uint64_t, GeometryEntry> geometries_;
-  HashMap<uint64_t, std::unique_ptr<Layer>> layers_;
-  HashMap<uint64_t, std::unique_ptr<Drawable>> drawables_;
+  absl::flat_hash_map<uint64_t, GeometryEntry> geometries_;
+  absl::flat_hash_map<uint64_t, std::unique_ptr<Layer>> layers_;
+  absl::flat_hash_map<uint64_t, std::unique_ptr<Drawable>> drawables_;
 };
 
 }  // namespace voxeld::gpu

@@ -5,10 +5,10 @@
 #include <new>
 #include <utility>
 
+#include "absl/container/flat_hash_set.h"
 #include "gpu/assemble/blend.h"
 #include "gpu/assemble/draw.h"
 #include "gpu/assemble/tile_clip.h"
-#include "gpu/hash_map.h"
 
 namespace voxeld::gpu {
 namespace {
@@ -428,7 +428,7 @@ bool Volume::SeenCounted(const Entry& e) const {
 // With the items of its counted drawables; what these do not fit into is cut in halves, down to a tile.
 void Volume::DrawPass(TileRun run, TileObserver* observer, std::span<Drawn> drawn) {
   const std::span<const uint32_t> tiles = std::span(dirty_).subspan(run.begin, run.end - run.begin);
-  HashSet<const Drawable*> seen;
+  absl::flat_hash_set<const Drawable*> seen;
   for (uint32_t tile : tiles) {
     for (const Entry& e : index_[tile].entries) {
       if (SeenCounted(e)) seen.insert(e.drawable);

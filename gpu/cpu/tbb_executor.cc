@@ -4,7 +4,6 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include "gpu/cpu/executor.h"
-#include "gpu/want_of_memory.h"
 
 namespace voxeld::gpu {
 namespace {
@@ -23,7 +22,6 @@ class TbbExecutor final : public Executor {
     using Range = oneapi::tbb::blocked_range<size_t>;
     arena_.execute([&] {
       oneapi::tbb::parallel_for(Range(0, count, grain < 1 ? 1 : grain), [&](const Range& range) {
-        const WantOfMemory caught;  // by parallel_for, which throws it where it was called
         const int worker = oneapi::tbb::this_task_arena::current_thread_index();
         for (size_t i = range.begin(); i != range.end(); ++i) body(i, worker);
       });

@@ -6,7 +6,6 @@
 
 #include "display/sync/mutex.h"
 #include "gpu/cpu/executor.h"
-#include "gpu/want_of_memory.h"
 
 namespace voxeld::gpu {
 namespace {
@@ -69,7 +68,6 @@ class ThreadExecutor final : public Executor {
 
   void Work(const Body& body, size_t count, size_t grain, int worker) {
     try {
-      const WantOfMemory caught;
       for (size_t first = next_.fetch_add(grain); first < count; first = next_.fetch_add(grain)) {
         const size_t last = first + grain < count ? first + grain : count;
         for (size_t i = first; i < last; ++i) body(i, worker);

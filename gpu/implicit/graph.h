@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "absl/container/flat_hash_map.h"
 #include "absl/status/statusor.h"
-#include "gpu/hash_map.h"
 #include "gpu/implicit/program.h"
 
 namespace voxeld::gpu::implicit {
@@ -81,7 +81,7 @@ class Graph {
   bool IsConstant(Node a, float* value) const;
 
   std::vector<Content> nodes_;
-  HashMap<Content, Node> made_;
+  absl::flat_hash_map<Content, Node> made_;
 };
 
 // What a program is compiled from.

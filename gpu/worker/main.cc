@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "absl/status/status.h"
+#include "common/memory/out_of_memory.h"
 #include "gpu/cpu/cpu_engine.h"
 #include "gpu/worker/no_cuda_engine.h"
 #include "gpu/worker/process.h"
@@ -47,4 +48,7 @@ int Main() {
 }  // namespace
 }  // namespace voxeld::gpu
 
-int main() { return voxeld::gpu::Main(); }
+int main() {
+  voxeld::ExitWhenOutOfMemory();
+  return voxeld::gpu::Main();
+}

@@ -1,5 +1,13 @@
+// Makes allocations fail, for tests: a library that is preloaded (LD_PRELOAD) and stands before the C library's allocator. The
+// environment says which allocation fails:
+//   FAIL_MALLOC_SITE=HEX  the first one from this site; a site is the four calls that led to the allocation
+//   FAIL_MALLOC_SKIP=N    not the first one from the site, but the one after N others (0)
+//   FAIL_MALLOC_N=N       the N-th one of the process
+//   FAIL_MALLOC_TIMES=T   how many attempts of that thread fail in a row (1); 0: from then on, all allocations of all threads
+//   FAIL_MALLOC_LIST=FILE at exit, writes every site to FILE: "HEX COUNT OBJECT+OFFSET …", innermost first
+//   FAIL_MALLOC_TOLD=FILE writes the site of the allocation that failed
+// It starts when its constructor runs, before most others.
 #define _GNU_SOURCE
-#include "tests/faults/fail_malloc.h"
 
 #include <dlfcn.h>
 #include <errno.h>
@@ -9,6 +17,7 @@
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,7 +26,6 @@
 
 #define kFrames 4
 #define kSites (1u << 16)
-#define kNames 6
 
 typedef struct {
   atomic_uint_fast64_t key;  // of the addresses; 0: free
@@ -29,14 +37,11 @@ typedef struct {
 static Site sites[kSites];
 static atomic_bool counts;    // whether anything is counted
 static atomic_bool by_sites;  // whether it is known where they come from
-static atomic_uint_fast64_t counted, fails_at, fails_each, each_from, times;
+static atomic_uint_fast64_t counted, fails_at, times;
 static uint64_t site_wanted, site_skip;
 static atomic_bool all_fail, has_failed;
-static bool (*only_when)(void);
-static atomic_int_fast64_t held;
 static const char *list_path, *told_path;
-static const void* ours[kNames];  // the program's own malloc and its like, which lead to every site
-static _Thread_local __attribute__((tls_model("initial-exec"))) bool inside, last_failed;
+static _Thread_local __attribute__((tls_model("initial-exec"))) bool inside;
 static _Thread_local __attribute__((tls_model("initial-exec"))) uint64_t to_fail;
 
 // ---- where it comes from
@@ -61,10 +66,6 @@ static _Unwind_Reason_Code OnFrame(struct _Unwind_Context* context, void* to) {
   if (stack->count == 0) {
     // What every allocation has in common says nothing.
     if (++stack->skipped > 24) return _URC_END_OF_STACK;
-    const void* const function = (const void*)_Unwind_GetRegionStart(context);
-    for (int i = 0; i < kNames; ++i) {
-      if (function == ours[i]) return _URC_NO_REASON;
-    }
     const struct link_map* object = ObjectOf(at);
     if (IsNamed(object, "fail_malloc") || IsNamed(object, "libstdc++")) return _URC_NO_REASON;
   }
@@ -145,17 +146,10 @@ static bool Fails(void) {
     return true;
   }
   if (atomic_load_explicit(&all_fail, memory_order_relaxed)) return true;
-  if (only_when != NULL && !only_when()) return false;
-  const uint64_t each = atomic_load_explicit(&fails_each, memory_order_relaxed);
-  if (each > 0 && last_failed) {  // the second attempt of what has failed
-    last_failed = false;
-    return false;
-  }
   inside = true;
   const int before = errno;
   const uint64_t n = atomic_fetch_add(&counted, 1) + 1;
-  bool fails = n == atomic_load_explicit(&fails_at, memory_order_relaxed) ||
-               (each > 0 && n >= each_from && (n - each_from) % each == 0);
+  bool fails = n == atomic_load_explicit(&fails_at, memory_order_relaxed);
   Site* site = NULL;
   if (atomic_load_explicit(&by_sites, memory_order_relaxed)) {
     site = Here();
@@ -164,7 +158,7 @@ static bool Fails(void) {
       if (site_wanted != 0 && site->id == site_wanted && from_here == site_skip) fails = true;
     }
   }
-  if (fails && each == 0) {
+  if (fails) {
     if (atomic_exchange(&has_failed, true)) {
       fails = false;  // it was once
     } else {
@@ -177,38 +171,9 @@ static bool Fails(void) {
       }
     }
   }
-  if (each > 0) last_failed = fails;
   inside = false;
   errno = fails ? ENOMEM : before;
   return fails;
-}
-
-void fail_malloc_begin(uint64_t n, uint64_t how_often) {
-  atomic_store(&counted, 0);
-  atomic_store(&fails_each, 0);
-  atomic_store(&fails_at, n);
-  atomic_store(&times, how_often);
-  atomic_store(&has_failed, false);
-  atomic_store(&all_fail, false);
-  atomic_store(&counts, true);
-}
-
-void fail_malloc_begin_each(uint64_t first, uint64_t k) {
-  fail_malloc_begin(0, 1);
-  last_failed = false;
-  atomic_store(&each_from, first);
-  atomic_store(&fails_each, k);
-}
-
-void fail_malloc_only(bool (*when)(void)) { only_when = when; }
-
-int64_t fail_malloc_held(void) { return atomic_load(&held); }
-
-uint64_t fail_malloc_end(void) {
-  atomic_store(&counts, false);
-  atomic_store(&all_fail, false);
-  to_fail = 0;
-  return atomic_load(&counted);
 }
 
 static uint64_t Number(const char* name, int base, uint64_t otherwise) {
@@ -223,11 +188,10 @@ __attribute__((constructor(101))) static void Begin(void) {
   site_skip = Number("FAIL_MALLOC_SKIP", 10, 0);
   const uint64_t n = Number("FAIL_MALLOC_N", 10, 0);
   if (list_path == NULL && site_wanted == 0 && n == 0) return;
-  static const char* const names[kNames] = {"malloc",   "calloc",        "realloc",
-                                            "memalign", "aligned_alloc", "posix_memalign"};
-  for (int i = 0; i < kNames; ++i) ours[i] = dlsym(RTLD_DEFAULT, names[i]);
   atomic_store(&by_sites, list_path != NULL || site_wanted != 0);
-  fail_malloc_begin(n, Number("FAIL_MALLOC_TIMES", 10, 1));
+  atomic_store(&fails_at, n);
+  atomic_store(&times, Number("FAIL_MALLOC_TIMES", 10, 1));
+  atomic_store(&counts, true);
 }
 
 __attribute__((destructor(101))) static void List(void) {
@@ -246,66 +210,26 @@ __attribute__((destructor(101))) static void List(void) {
 
 // ---- in the C library's place
 
-static void* Next(const char* name, _Atomic(void*)* found) {
-  void* function = atomic_load_explicit(found, memory_order_acquire);
-  if (function == NULL) {
-    function = dlsym(RTLD_NEXT, name);
-    if (function == NULL) abort();
-    atomic_store_explicit(found, function, memory_order_release);
-  }
-  return function;
-}
+// NOLINTBEGIN(bugprone-reserved-identifier): the C library's own names.
+void* __libc_malloc(size_t bytes);
+void* __libc_calloc(size_t count, size_t bytes);
+void* __libc_realloc(void* memory, size_t bytes);
+void* __libc_memalign(size_t alignment, size_t bytes);
+// NOLINTEND(bugprone-reserved-identifier)
 
-static void* Held(void* memory) {
-  if (memory != NULL) atomic_fetch_add_explicit(&held, 1, memory_order_relaxed);
-  return memory;
+void* malloc(size_t bytes) { return Fails() ? NULL : __libc_malloc(bytes); }
+void* calloc(size_t count, size_t bytes) { return Fails() ? NULL : __libc_calloc(count, bytes); }
+void* realloc(void* memory, size_t bytes) {
+  const bool frees = memory != NULL && bytes == 0;
+  return !frees && Fails() ? NULL : __libc_realloc(memory, bytes);
 }
-
-void* __libc_malloc(size_t bytes) {
-  static _Atomic(void*) next;
-  void* (*const real)(size_t) = (void* (*)(size_t))Next("__libc_malloc", &next);
-  return Fails() ? NULL : Held(real(bytes));
+void* memalign(size_t alignment, size_t bytes) {
+  return Fails() ? NULL : __libc_memalign(alignment, bytes);
 }
-
-void* __libc_calloc(size_t count, size_t bytes) {
-  static _Atomic(void*) next;
-  void* (*const real)(size_t, size_t) = (void* (*)(size_t, size_t))Next("__libc_calloc", &next);
-  return Fails() ? NULL : Held(real(count, bytes));
-}
-
-void* __libc_realloc(void* memory, size_t bytes) {
-  static _Atomic(void*) next;
-  void* (*const real)(void*, size_t) = (void* (*)(void*, size_t))Next("__libc_realloc", &next);
-  if (memory == NULL) return Fails() ? NULL : Held(real(memory, bytes));
-  if (bytes == 0) {  // it frees
-    atomic_fetch_sub_explicit(&held, 1, memory_order_relaxed);
-    return real(memory, 0);
-  }
-  return Fails() ? NULL : real(memory, bytes);
-}
-
-void* __libc_memalign(size_t alignment, size_t bytes) {
-  static _Atomic(void*) next;
-  void* (*const real)(size_t, size_t) = (void* (*)(size_t, size_t))Next("__libc_memalign", &next);
-  return Fails() ? NULL : Held(real(alignment, bytes));
-}
-
-void free(void* memory) {
-  static _Atomic(void*) next;
-  void (*const real)(void*) = (void (*)(void*))Next("free", &next);
-  if (memory != NULL) atomic_fetch_sub_explicit(&held, 1, memory_order_relaxed);
-  real(memory);
-}
-
-// For programs that leave these to the C library.
-void* malloc(size_t bytes) { return __libc_malloc(bytes); }
-void* calloc(size_t count, size_t bytes) { return __libc_calloc(count, bytes); }
-void* realloc(void* memory, size_t bytes) { return __libc_realloc(memory, bytes); }
-void* memalign(size_t alignment, size_t bytes) { return __libc_memalign(alignment, bytes); }
-void* aligned_alloc(size_t alignment, size_t bytes) { return __libc_memalign(alignment, bytes); }
+void* aligned_alloc(size_t alignment, size_t bytes) { return memalign(alignment, bytes); }
 int posix_memalign(void** memory, size_t alignment, size_t bytes) {
   if (alignment % sizeof(void*) != 0 || (alignment & (alignment - 1)) != 0) return EINVAL;
-  void* const found = __libc_memalign(alignment, bytes);
+  void* const found = memalign(alignment, bytes);
   if (found == NULL) return ENOMEM;
   *memory = found;
   return 0;

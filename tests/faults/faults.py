@@ -168,7 +168,7 @@ class Refused(Fault):
 class Memory(Fault):
     log = "the system had no memory"
     health = '"what":"memory"'
-    moved: tuple[str, ...] = ("voxeld_process_(segments_refused|allocations_failed)_total",)
+    moved: tuple[str, ...] = ("voxeld_process_segments_refused_total",)
     deadly = clients_are_cut = True
     refused = False
 
@@ -186,7 +186,7 @@ class Memory(Fault):
             self.clients_are_cut = False
         else:
             assert cell.daemon.returncode == 1, f"ended with {cell.daemon.returncode}: {cell.said()[-2000:]}"
-            self.log, self.health, self.moved = "cannot go on|bad_alloc|out of memory", "", ()
+            self.log, self.health, self.moved = "cannot go on|out of memory", "", ()
             self.cannot_know = {"health": "it has ended", "moved": "it has ended"}
 
     def refuse(self, issue: voxel.Issue) -> None:

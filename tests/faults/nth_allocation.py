@@ -1,19 +1,18 @@
 #!/usr/bin/env python3
 """Every allocation of the daemon failed once: from each place that asks for memory, in the process and in the libraries of others, one allocation fails
-in one of ten scenarios (scenarios.py) of the real voxeld, and then it is started again on the same state, unharmed. A place is the four calls that
+in one of ten scenarios (scenarios.py) of the real voxeld, which is then started again on the same state, unharmed. A place is the four calls that
 led to it; what there is comes from lives in which nothing fails, and each place fails in the first scenario that comes by it.
 
-usage: nth_allocation.py [--scenarios NAME,…] [--way reserve|bare|forever] [--sample N] [--seed N] [--part K/N] [--within S] [--sites HEX,…] [--jobs N] [--list] [--json]
+usage: nth_allocation.py [--scenarios NAME,…] [--way once|forever] [--sample N] [--seed N] [--part K/N] [--within S] [--sites HEX,…] [--jobs N] [--list] [--json]
 
 The way that it fails:
-  reserve   once: the daemon has its reserve, and nobody is to notice (the default)
-  bare      once, and what the daemon then tries fails too, and it has no reserve: whoever asked gets nothing
-  forever   from then on every allocation fails, for ever: it uses the reserve up, and ends
+  once      one allocation fails (the default)
+  forever   from then on every allocation fails
 
-What must hold: with the reserve the daemon lives, refuses nothing, and counts the failure; otherwise it lives, or ends with 1 and a line that says
-why, or by the abort of a library of others that gives up where it asked itself. In each case nothing hangs, what was told to be shown is shown, what
-was told to be durable is there after the next start, and in the end it has no more descriptors and memory than unharmed. Paths are in VOXELD, FAIL_MALLOC (the
-preloaded library) and PYTHONPATH; ends with 1 if one did not.
+What must hold: where operator new asked, the daemon exits with 1 and one line that says why; where a C library asked, the daemon lives, or exits so, or
+ends by the abort of a library that gives up. In each case nothing hangs, what was told to be shown is shown, what was told to be durable is there
+after the next start, and a daemon that lives has no more descriptors and memory than unharmed. Paths are in VOXELD, FAIL_MALLOC (the preloaded
+library) and PYTHONPATH; exits with 1 if one did not.
 
 What came of them, by the way that they fail: lived, refused, ended, late, known, wrong as nth_syscall.py says; missed: nobody came by that place; once:
 something was wrong, and not when it was made again, as on a machine that is busy with other things."""
@@ -29,13 +28,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from apart import add_options, chosen, each, verdict
-from life import Ending, Life, Rest, again, at_rest, descriptors, end, judge, leaks, metric, sockets
+from life import Ending, Life, Rest, again, at_rest, descriptors, end, judge, leaks, sockets
 from programs import program
 from scenarios import SCENARIOS
 
 # Who may end the process where it asked for memory itself: by an abort, or since it does not look at what it got (fontconfig, OpenSSL).
 GIVES_UP = re.compile(r"^(libfontconfig|libcrypto|libssl|libgrpc|libgrpc\+\+|libgpr|libabsl_\w+|libprotobuf|libupb|libtbb|libstdc\+\+|ld-linux-x86-64)[^ ]*\.so")
-ENDED = "voxeld: out of memory: there are no"
+ENDED = "voxeld: out of memory, exiting"
 
 
 @dataclass
@@ -64,42 +63,33 @@ def place_of(line: str) -> Place:
 
 def run(scenario: str, way: str, place: Place, rest: Rest) -> Result:
     with tempfile.TemporaryDirectory(prefix="voxeld-nth-") as name:
-        life = SCENARIOS[scenario](Path(name), "memory_reserve_bytes = 0" if way == "bare" else "")
+        life = SCENARIOS[scenario](Path(name))
         life.prepare()
         ours = sockets()
         told = Path(name, "told")
         process = life.start(environment={
             "LD_PRELOAD": os.environ["FAIL_MALLOC"], "FAIL_MALLOC_SITE": place.site, "FAIL_MALLOC_TOLD": str(told),
-            "FAIL_MALLOC_TIMES": {"reserve": "1", "bare": "2", "forever": "0"}[way]})
+            "FAIL_MALLOC_TIMES": {"once": "1", "forever": "0"}[way]})
         is_ready, wrong = life.lived(process, lambda: process.pid)
         alive = process.poll() is None
         left = descriptors(process.pid, rest.descriptors, ours=ours)
         leak = leaks(life, rest) if alive and is_ready else ""
-        counted = metric(life.port, "voxeld_process_allocations_failed_total") if alive and told.exists() else -1  # it may come with the end
         status = end(process, process.pid)
         said = life.said()
         met = told.exists()
         stack = place_of(told.read_text(encoding="ascii")).stack if met else place.stack
-        # What the reserve could not help either is told, whoever gives up then.
         others = next((frame for frame in stack if not frame.startswith("libc.so")), "")
-        gives_up = GIVES_UP.match(others) if way != "reserve" and ENDED in said else None
+        gives_up = GIVES_UP.match(others)
         if way == "forever" and ENDED in said:
             gives_up = re.match("(anybody)", "anybody")  # who asks next is chance
         ending = judge(life, status, is_ready, alive, f"{gives_up[1]} asked, and gives up" if gives_up else "")
-        if way != "reserve" and is_ready and status == 1 and ENDED in said:
+        if is_ready and status == 1 and ENDED in said:
             ending = Ending("ended")  # be it on its way to the end
         after = again(life)
         wrong = wrong or ending.wrong or after
         if not met:
             return Result(scenario, way, place.site, "missed", stack, wrong, failed=life.told.failed)
-        if way == "reserve":
-            if ending.how != "lived":
-                wrong = wrong or f"{ending.how}: {said.strip().splitlines()[-1:]}"
-            elif life.told.failed:
-                wrong = wrong or f"it refused what it could do: {life.told.failed}"
-            elif counted == 0:
-                wrong = wrong or "it did not count the failure"
-        elif ending.how in ("ended", "refused") and status != 1:
+        if ending.how in ("ended", "refused") and status != 1:
             wrong = wrong or f"it ended with {status}"
         elif ending.how == "ended" and ENDED not in said:
             wrong = wrong or "it ended, and did not say that there was no memory"
@@ -146,7 +136,7 @@ def say(last: Result, at: int, of: int) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenarios", default=",".join(SCENARIOS), help="only these, by comma (default: all ten: %(default)s)")
-    parser.add_argument("--way", choices=["reserve", "bare", "forever"], action="append", help="how it fails, as above; may be given more than once (default: reserve)")
+    parser.add_argument("--way", choices=["once", "forever"], action="append", help="how it fails, as above; may be given more than once (default: once)")
     parser.add_argument("--sites", help="only these, by comma")
     add_options(parser)
     parser.add_argument("--list", action="store_true", help="say where memory is asked for, and end")
@@ -170,7 +160,7 @@ def main() -> int:
         return 0
     wanted = [found[site] for site in sorted(found) if not options.sites or site in options.sites.split(",")]
     cases = []
-    for way in options.way or ["reserve"]:
+    for way in options.way or ["once"]:
         cases += [(scenario, way, place, rest) for scenario, place, rest in chosen(wanted, lambda each: each[1].site, options)]
     done = 0
 

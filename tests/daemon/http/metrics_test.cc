@@ -31,10 +31,6 @@ TEST(Metrics, EveryFigureStandsThereOnce) {
   stats.assets = {
       .count = 4, .bytes = 55, .uploaded = 6, .evicted = 7, .damaged = 1, .bytes_in = 66};
   stats.process = {.heap_bytes = 15 << 20,
-                   .allocations_failed = 9,
-                   .allocations_refused = 2,
-                   .reserve_bytes = 4 << 20,
-                   .reserve_held_bytes = 2 << 20,
                    .segments_refused = 3,
                    .trouble = "",
                    .pauses = 5,
@@ -44,11 +40,6 @@ TEST(Metrics, EveryFigureStandsThereOnce) {
   const std::string text = MetricsText(stats);
   EXPECT_THAT(text, HasSubstr("# TYPE voxeld_process_heap_bytes gauge\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_process_heap_bytes 15728640\n"));
-  EXPECT_THAT(text, HasSubstr("# TYPE voxeld_process_allocations_failed_total counter\n"));
-  EXPECT_THAT(text, HasSubstr("voxeld_process_allocations_failed_total 9\n"));
-  EXPECT_THAT(text, HasSubstr("voxeld_process_allocations_refused_total 2\n"));
-  EXPECT_THAT(text, HasSubstr("voxeld_process_reserve_bytes 4194304\n"));
-  EXPECT_THAT(text, HasSubstr("voxeld_process_reserve_held_bytes 2097152\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_process_segments_refused_total 3\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_process_pauses_total 5\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_process_clock_steps_total 6\n"));

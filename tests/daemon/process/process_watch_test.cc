@@ -18,7 +18,7 @@ namespace {
 TEST(ProcessWatch, HasTheFiguresOfAll) {
   sync::FakeClock clock;
   Logger log(Logger::Level::kOff, Logger::Format::kText);
-  ProcessWatch watch(0, clock, log);
+  ProcessWatch watch(clock, log);
   clock.Advance(sync::kSecond);
   watch.Look();
   watch.LookAtTime();
@@ -48,8 +48,7 @@ class SlowAllocator : public ::testing::Test {
   static inline int given_back_ = 0;
   static inline uint64_t counted_ = 0;
   Logger log_{Logger::Level::kOff, Logger::Format::kText};
-  ProcessWatch watch_{0,
-                      clock_,
+  ProcessWatch watch_{clock_,
                       log_,
                       {.give_back =
                            [] {
@@ -92,7 +91,7 @@ TEST_F(SlowAllocator, HasAThousandthOfTheTime) {
 TEST(ProcessWatch, TellsWhatIsAllocated) {
   sync::FakeClock clock;
   Logger log(Logger::Level::kOff, Logger::Format::kText);
-  ProcessWatch watch(0, clock, log);
+  ProcessWatch watch(clock, log);
   const auto told = [&] {
     clock.Advance(ProcessWatch::kCount);
     watch.Look();

@@ -1,0 +1,11 @@
+// Terminates the process when memory runs out. The service manager or the owner restarts it.
+#pragma once
+
+namespace voxeld {
+
+// From now on, an allocation by operator new that fails writes one line to standard error and exits with status 1: code that is
+// interrupted halfway cannot be trusted to go on. C libraries allocate by malloc and handle failures themselves; some abort.
+// Call once, before other threads exist.
+void ExitWhenOutOfMemory();
+
+}  // namespace voxeld
