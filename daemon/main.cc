@@ -57,7 +57,7 @@ namespace {
 constexpr int kUsageError = 2;
 // With half a second for what plays a file together below the 5 s that we promise.
 constexpr sync::TimeNs kServerLimit = 2 * sync::kSecond;
-constexpr sync::TimeNs kCoreLimit = 2 * sync::kSecond;
+constexpr sync::TimeNs kCoreLimit = 2500 * sync::kMillisecond;
 constexpr sync::TimeNs kEndLimit = 5 * sync::kSecond;
 
 int Fail(int code, const absl::Status& status) {
@@ -123,6 +123,7 @@ absl::StatusOr<std::unique_ptr<http::Server>> StartHttp(
   absl::StatusOr<std::unique_ptr<http::Server>> server =
       http::Server::Start({.listen = *config.http,
                            .max_connections = config.max_http_connections,
+                           .reserved_paths = {"/healthz", "/metrics"},
                            .idle_limit_ns = config.http_idle_limit_ns,
                            .accept_failed = std::move(accept_failed)},
                           viewer.Handler(http::MonitorHandler(core, std::move(phase))),

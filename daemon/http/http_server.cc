@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <boost/asio/basic_socket_acceptor.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
@@ -40,6 +41,7 @@ using Parser = wire::request_parser<wire::string_body>;
 using boost::system::error_code;
 
 constexpr auto kAcceptRetry = std::chrono::milliseconds(100);
+constexpr auto kAcceptSoon = std::chrono::milliseconds(20);
 constexpr uint64_t kGreatestBody = 4096;  // read and thrown away
 constexpr mode_t kSocketMode = 0660;
 
@@ -48,10 +50,14 @@ Response Plain(unsigned status, std::string text) { return PlainResponse(status,
 std::string_view View(boost::beast::string_view text) { return {text.data(), text.size()}; }
 
 // Who answers, and who takes over what a connection here does not serve itself.
+class Connection;
+
 struct Served {
   const Handler handler;
   const Upgrade upgrade;
   const Receive receive;
+  // Whether the connection, of which a request for the path has come, has a place. Closes another one if need be.
+  std::function<bool(Connection&, std::string_view path)> admit;
   std::function<void(Stream, const RequestMessage&, const ServeWebSocket&)> upgraded;
   std::function<void(Stream, beast::flat_buffer, std::unique_ptr<BodyParser>, Reception)> received;
 };
@@ -69,6 +75,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
         closed_(std::move(closed)) {}
 
   void Read() {
+    waits_ = true;
+    since_ = std::chrono::steady_clock::now();
     parser_ = std::make_unique<Parser>();
     parser_->header_limit(options_.max_header_bytes);
     parser_->body_limit(std::numeric_limits<uint64_t>::max());  // until it is known whose it is
@@ -77,6 +85,13 @@ class Connection : public std::enable_shared_from_this<Connection> {
         stream_, buffer_, *parser_,
         [self = shared_from_this()](error_code error, size_t) { self->OnHeader(error); });
   }
+
+  // Whether it waits for a request, and since when.
+  bool waits() const { return waits_; }
+  std::chrono::steady_clock::time_point since() const { return since_; }
+  // Whether it has a place.
+  bool placed() const { return placed_; }
+  void Place() { placed_ = true; }
 
   void Close() {
     error_code ignored;
@@ -88,7 +103,14 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
  private:
   void OnHeader(const error_code& error) {
+    waits_ = false;
     if (error || !closed_) return OnRead(error);
+    if (!served_.admit(*this, Asked().path)) {
+      return Write(Plain(503, absl::StrCat(options_.max_connections,
+                                           " requests and WebSockets are being served, which is "
+                                           "max_http_connections; try again later")),
+                   true);
+    }
     head_ = parser_->get().method() == wire::verb::head;
     if (parser_->get().count(wire::field::host) > 1) {
       return Write(Plain(400, "bad request: there is more than one Host header"), true);
@@ -206,7 +228,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
   beast::flat_buffer buffer_;
   std::unique_ptr<Parser> parser_;
   std::optional<ResponseMessage> response_;
-  bool head_ = false;
+  bool head_ = false, waits_ = false, placed_ = false;
+  std::chrono::steady_clock::time_point since_;
   uint64_t number_ = 0;  // of the request that waits for its answer
 };
 
@@ -232,7 +255,10 @@ class Server::Impl {
  public:
   Impl(ServerOptions options, Handler handler, Upgrade upgrade, Receive receive)
       : options_(std::move(options)),
-        served_{std::move(handler), Bounded(std::move(upgrade)), std::move(receive),
+        served_{std::move(handler),
+                Bounded(std::move(upgrade)),
+                std::move(receive),
+                [this](Connection& asking, std::string_view path) { return Admit(asking, path); },
                 [this](Stream stream, const RequestMessage& request, const ServeWebSocket& serve) {
                   OnUpgraded(std::move(stream), request, serve);
                 },
@@ -303,9 +329,15 @@ class Server::Impl {
 
  private:
   void Accept() {
-    const size_t open = connections_.size() + sockets_.size() + bodies_.size();
-    if (accepting_ || stopping_ || open >= options_.max_connections) return;
+    if (accepting_ || stopping_) return;
     accepting_ = true;
+    const auto waiting = static_cast<size_t>(
+        std::count_if(connections_.begin(), connections_.end(),
+                      [](const auto& connection) { return !connection->placed(); }));
+    if (waiting >= kMostWaiting && !CloseLongestIdle(false)) {
+      accepting_ = false;
+      return AcceptAfter(kAcceptSoon);
+    }
     acceptor_.async_accept([this](error_code error, Stream::socket_type socket) {
       accepting_ = false;
       if (stopping_) return;
@@ -318,6 +350,41 @@ class Server::Impl {
       connection->Read();
       Accept();
     });
+  }
+
+  size_t Placed() const {
+    return sockets_.size() + bodies_.size() +
+           static_cast<size_t>(
+               std::count_if(connections_.begin(), connections_.end(),
+                             [](const auto& connection) { return connection->placed(); }));
+  }
+
+  bool Admit(Connection& asking, std::string_view path) {
+    if (asking.placed()) return true;
+    const auto& reserved = options_.reserved_paths;
+    const size_t places =
+        options_.max_connections +
+        (std::find(reserved.begin(), reserved.end(), path) == reserved.end() ? 0 : kReservedPlaces);
+    if (Placed() >= options_.max_connections && !CloseLongestIdle(true) && Placed() >= places) {
+      return false;
+    }
+    asking.Place();
+    return true;
+  }
+
+  // Of those that wait for a request, with a place or without; these have kFirstRequest. False: there is none.
+  bool CloseLongestIdle(bool placed) {
+    const auto before =
+        std::chrono::steady_clock::now() - std::chrono::nanoseconds(placed ? 0 : kFirstRequest);
+    std::shared_ptr<Connection> longest;
+    for (const auto& connection : connections_) {
+      if (!connection->waits() || connection->placed() != placed) continue;
+      if (connection->since() > before) continue;
+      if (longest == nullptr || connection->since() < longest->since()) longest = connection;
+    }
+    if (longest == nullptr) return false;
+    longest->Close();
+    return true;
   }
 
   // A part of the connections is for those that come and go.
@@ -337,7 +404,11 @@ class Server::Impl {
     if (!std::exchange(accept_failed_, true) && options_.accept_failed) {
       options_.accept_failed(why.message());
     }
-    retry_.expires_after(kAcceptRetry);
+    AcceptAfter(kAcceptRetry);
+  }
+
+  void AcceptAfter(std::chrono::milliseconds pause) {
+    retry_.expires_after(pause);
     retry_.async_wait([this](error_code error) {
       if (!error) Accept();
     });

@@ -71,7 +71,11 @@ using Upgrade = std::function<absl::StatusOr<ServeWebSocket>(const Request& requ
 
 struct ServerOptions {
   Address listen;
-  uint32_t max_connections = 64;     // further ones wait to be accepted
+  // Places: for requests, for connections that are kept open after one, and for WebSockets. A request for which there is none
+  // takes that of the connection that has been idle longest; where all are at work it is answered with 503.
+  uint32_t max_connections = 64;
+  // Paths with kReservedPlaces of their own beside those, so that health is known whoever else asks.
+  std::vector<std::string> reserved_paths;
   uint32_t max_header_bytes = 8192;  // 431 beyond
   // For a request to come in, and for an answer to be read.
   sync::TimeNs idle_limit_ns = 10 * sync::kSecond;
@@ -87,6 +91,12 @@ struct ServerOptions {
 // Times are the system's: sockets know no other.
 class Server {
  public:
+  static constexpr size_t kReservedPlaces = 8;
+  // Connections of which no request has come yet are in no place. Where there are so many, the one that has waited longest is
+  // closed for the next; not before it has had the time for its first request.
+  static constexpr size_t kMostWaiting = 1024;
+  static constexpr sync::TimeNs kFirstRequest = 200 * sync::kMillisecond;
+
   // AlreadyExists if somebody listens there.
   static absl::StatusOr<std::unique_ptr<Server>> Start(ServerOptions options, Handler handler,
                                                        Upgrade upgrade = nullptr,

@@ -95,6 +95,8 @@ constexpr Row<ListenFigures> kConnectionRows[] = {
      MetricType::Counter, "Connections cut: what came was not the beginning of a call"},
     {"voxeld_connections_cut_for_flooding_total", &ListenFigures::cut_for_flooding,
      MetricType::Counter, "Connections cut: bytes without end that no call or message came of"},
+    {"voxeld_connections_cut_for_room_total", &ListenFigures::cut_for_room, MetricType::Counter,
+     "Connections cut: unauthorised and idle, when another one needed the place"},
     {"voxeld_connections_refused_after_cut_total", &ListenFigures::refused_after_cut,
      MetricType::Counter, "Connections closed at once: one of the address was cut shortly before"},
     {"voxeld_accept_failures_total", &ListenFigures::accept_failures, MetricType::Counter,

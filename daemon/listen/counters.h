@@ -26,7 +26,7 @@ class Counters {
   Count accepted = 0;
   Count refused_in_all = 0, refused_by_address = 0, refused_after_cut = 0;
   Count cut_for_bytes = 0, cut_for_time = 0, cut_for_cancelling = 0;
-  Count cut_for_greeting = 0, cut_for_flooding = 0;
+  Count cut_for_greeting = 0, cut_for_flooding = 0, cut_for_room = 0;
   Count accept_failures = 0;
   Count probe_failures = 0;
   Count calls_turned_away = 0, calls_revoked = 0;
@@ -68,6 +68,7 @@ class Counters {
                       .cut_for_cancelling = cut_for_cancelling,
                       .cut_for_greeting = cut_for_greeting,
                       .cut_for_flooding = cut_for_flooding,
+                      .cut_for_room = cut_for_room,
                       .accept_failures = accept_failures,
                       .probe_failures = probe_failures,
                       .calls_turned_away = calls_turned_away,

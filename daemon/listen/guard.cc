@@ -16,11 +16,11 @@ constexpr int kTimeLeft = 1, kBytesLeft = 3;
 
 absl::Status Guard::MayEnter(const Peer& peer) {
   absl::Status status;
+  std::vector<Doomed> doomed;
   {
     sync::MutexLock lock(mutex_);
     const sync::TimeNs now = clock_.Now();
-    const auto at = by_address_.find(peer.address);
-    const uint32_t of_address = at == by_address_.end() ? 0 : at->second;
+    const Counted of_address = CountOf(peer.address);
     const auto penalty = penalties_.find(peer.address);
     if (penalty != penalties_.end() && now < penalty->second.until) {
       ++counters_.refused_after_cut;
@@ -28,17 +28,18 @@ absl::Status Guard::MayEnter(const Peer& peer) {
           "a connection from ", peer.address, " was cut; further ones are refused for ",
           (penalty->second.until - now) / sync::kMillisecond,
           " ms, which cut_penalty_ns and the times before come to"));
-    } else if (of_address >= limits_.max_connections_per_address) {
+    } else if (IsFull(of_address, limits_.max_connections_per_address, peer.address, doomed)) {
       ++counters_.refused_by_address;
       status = absl::ResourceExhaustedError(
-          absl::StrCat(of_address, " connections from ", peer.address,
+          absl::StrCat(of_address.open, " connections from ", peer.address,
                        " are open, which is max_connections_per_address"));
-    } else if (counted_ >= limits_.max_connections) {
+    } else if (IsFull(counted_, limits_.max_connections, "", doomed)) {
       ++counters_.refused_in_all;
       status = absl::ResourceExhaustedError(
-          absl::StrCat(counted_, " connections are open, which is max_connections"));
+          absl::StrCat(counted_.open, " connections are open, which is max_connections"));
     }
   }
+  Cut(doomed);
   if (!status.ok()) {
     gate_.Log(Logger::Level::kWarn, "connection refused", peer.name, std::string(status.message()));
   }
@@ -56,9 +57,13 @@ ConnectionId Guard::Enter(const Peer& peer, bool own, std::unique_ptr<Wire> wire
   connection.unix_socket = peer.unix_socket;
   connection.wire = std::move(wire);
   connection.entered = connection.since = clock_.Now();
+  connection.authorised = peer.unix_socket;
   if (!own) {
-    ++by_address_[peer.address];
-    ++counted_;
+    connection.counted = true;
+    for (Counted* counted : {&by_address_[peer.address], &counted_}) {
+      ++counted->open;
+      counted->authorised += peer.unix_socket;  // the kernel says whose they are
+    }
     ++counters_.accepted;
     ++counters_.open;
   }
@@ -99,12 +104,8 @@ void Guard::Leave(ConnectionId id) {
         named != by_name_.end() && named->second == id) {
       by_name_.erase(named);
     }
-    if (!connection.own) {
-      --counted_;
-      --counters_.open;
-      const auto at = by_address_.find(connection.address);
-      if (--at->second == 0) by_address_.erase(at);
-    }
+    if (!connection.own) --counters_.open;
+    Uncount(connection);
     connections_.erase(it);
   }
   Cut(doomed);
@@ -143,6 +144,7 @@ sync::TimeNs Guard::Look() {
                         " ms, and no call of it that authorises has been answered"),
            false, doomed);
     }
+    MakeAllRoom(doomed);
     if (!watched_.empty()) next = now + kLookInterval;
   }
   Cut(doomed);
@@ -170,12 +172,27 @@ void Guard::OnAnswer(const std::string& peer, bool authorises) {
     Connection* connection = Find(peer);
     if (connection == nullptr || !connection->watched) return;
     if (!BytesAreMany(*connection, false, doomed)) {
-      if (authorises) {
+      const bool full =
+          authorises && connection->counted &&
+          (CountOf(connection->address).authorised >= limits_.max_connections_per_address ||
+           counted_.authorised >= limits_.max_connections);
+      if (full) {
+        Doom(*connection, counters_.refused_in_all,
+             "as many authorised connections are open as max_connections or "
+             "max_connections_per_address allow",
+             false, doomed);
+      } else if (authorises) {
         connection->watched = false;
         watched_.erase(connection->id);
+        if (connection->counted) {
+          connection->authorised = true;
+          ++by_address_[connection->address].authorised;
+          ++counted_.authorised;
+        }
         trusted = connection->wire;
         armed = on_busy_ != nullptr;
       } else {
+        connection->answered = true;
         connection->since = clock_.Now();
         connection->base = connection->wire->BytesReceived();
         connection->many_since = sync::kNever;
@@ -285,6 +302,64 @@ void Guard::MarkBusy(const Connection& connection) {
   const bool first = busy_.empty();
   busy_.insert(connection.id);
   if (first) on_busy_();
+}
+
+void Guard::Uncount(Connection& connection) {
+  if (!std::exchange(connection.counted, false)) return;
+  const auto at = by_address_.find(connection.address);
+  for (Counted* counted : {&at->second, &counted_}) {
+    --counted->open;
+    counted->authorised -= connection.authorised;
+  }
+  if (at->second.open == 0) by_address_.erase(at);
+}
+
+Guard::Counted Guard::CountOf(const std::string& address) const {
+  const auto at = by_address_.find(address);
+  return at == by_address_.end() ? Counted() : at->second;
+}
+
+bool Guard::IsFull(const Counted& counted, uint32_t limit, const std::string& address,
+                   std::vector<Doomed>& doomed) {
+  if (counted.open < limit) return false;
+  if (counted.authorised >= limit) return true;
+  return !MakeRoom(address, doomed) && counted.open >= kYoungBeyond * limit;
+}
+
+bool Guard::MakeRoom(const std::string& address, std::vector<Doomed>& doomed) {
+  const sync::TimeNs now = clock_.Now();
+  Connection *longest = nullptr, *answered = nullptr;
+  for (const auto& [id, connection] : watched_) {
+    if (!connection->counted || now - connection->entered < kFirstCall) continue;
+    if (!address.empty() && connection->address != address) continue;
+    // A call that goes on though it was answered, as one that watches health does, comes after those that are idle.
+    if (connection->waiting > 0 && !connection->answered) continue;
+    Connection*& found = connection->waiting > 0 ? answered : longest;
+    if (found == nullptr || connection->since < found->since) found = connection;
+  }
+  if (longest == nullptr) longest = answered;
+  if (longest == nullptr) return false;
+  Doom(*longest, counters_.cut_for_room,
+       absl::StrCat("it was idle for ", (now - longest->since) / sync::kMillisecond,
+                    " ms, no call of it that authorises has been answered, and another one needs "
+                    "its place; see max_connections and max_connections_per_address"),
+       false, doomed);
+  Uncount(*longest);
+  return true;
+}
+
+void Guard::MakeAllRoom(std::vector<Doomed>& doomed) {
+  while (counted_.open > limits_.max_connections && MakeRoom("", doomed)) {
+  }
+  std::vector<std::string> crowded;
+  for (const auto& [address, count] : by_address_) {
+    if (count.open > limits_.max_connections_per_address) crowded.push_back(address);
+  }
+  for (const std::string& address : crowded) {
+    while (CountOf(address).open > limits_.max_connections_per_address &&
+           MakeRoom(address, doomed)) {
+    }
+  }
 }
 
 void Guard::Doom(Connection& connection, Counters::Count& counter, std::string why, bool punished,

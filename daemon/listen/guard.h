@@ -17,8 +17,12 @@
 // and where less than three sixteenths of the bytes are left for kGrace. Until it is authorised a
 // connection's receive buffer is small (Wire::Trust), so that little comes between a limit and the cut.
 //
-// The address of a connection that was cut, but for time, is refused for a while: cut_penalty_ns, and
+// The address of a connection that was cut, but for time or for room, is refused for a while: cut_penalty_ns, and
 // twice as long each time that it comes back and is cut again.
+//
+// Where max_connections or max_connections_per_address are open, the unauthorised connection that has been idle longest is cut,
+// so that strangers who say nothing keep nobody away. Each has kFirstCall, in which to make its first call; meanwhile twice
+// as many may be open. Only where all are authorised or at work is a further one refused.
 //
 // Unix sockets, whose users the kernel names, are free of all this but the limits on connections:
 // gRPC has no names for them by which their calls could be told apart. Times are the clock's.
@@ -75,6 +79,9 @@ class Guard {
   // on before it is answered waits in its own system, and is not cut if the answer comes within it.
   static constexpr sync::TimeNs kGrace = 100 * sync::kMillisecond;
   static constexpr int64_t kLongestPenalty = 64;  // of cut_penalty_ns
+  static constexpr sync::TimeNs kFirstCall = 200 * sync::kMillisecond;
+  static constexpr uint32_t kYoungBeyond =
+      2;  // so many times a limit may be open while some are younger
   // Addresses that are refused at once; further ones replace those whose time is over first.
   static constexpr size_t kMostPenalties = 4096;
 
@@ -88,7 +95,7 @@ class Guard {
   // ---- from the listener
 
   // Whether another connection of `peer` may be had, counted and logged: ResourceExhausted says
-  // which limit it would go beyond, or that its address is refused.
+  // which limit it would go beyond, or that its address is refused. May cut another one to make room.
   absl::Status MayEnter(const Peer& peer);
   // From accept on. `own`: the daemon's own, which counts against no limit but those of bytes and
   // time.
@@ -134,7 +141,10 @@ class Guard {
     uint64_t base = 0;       // bytes that had come by then, if it was answered
     uint32_t waiting = 0;    // calls that the daemon has yet to answer
     bool watched = false;    // not authorised yet
+    bool answered = false;   // a call of it was, without authorising it
     bool cut = false;
+    bool counted = false;  // against the limits
+    bool authorised = false;
     sync::TimeNs many_since = sync::kNever;  // few of the bytes are left
     // The second in which cancelled calls are counted, and those before it.
     sync::TimeNs cancelled_since = 0;
@@ -144,6 +154,10 @@ class Guard {
   };
   struct Penalty {
     sync::TimeNs length = 0, until = 0;
+  };
+  // That count against a limit.
+  struct Counted {
+    uint32_t open = 0, authorised = 0;
   };
   // A connection that is to be cut when the lock is free.
   struct Doomed {
@@ -156,6 +170,16 @@ class Guard {
   bool BytesAreMany(Connection& connection, bool ended, std::vector<Doomed>& doomed)
       VOXELD_REQUIRES(mutex_);
   void MarkBusy(const Connection& connection) VOXELD_REQUIRES(mutex_);
+  void Uncount(Connection& connection) VOXELD_REQUIRES(mutex_);
+  Counted CountOf(const std::string& address) const VOXELD_REQUIRES(mutex_);
+  // Whether there is no place for another connection, of `address` or (if that is empty) of all.
+  bool IsFull(const Counted& counted, uint32_t limit, const std::string& address,
+              std::vector<Doomed>& doomed) VOXELD_REQUIRES(mutex_);
+  // Cuts the unauthorised connection, of `address` or (if that is empty) of all, that has been idle longest. False: there is none
+  // that has had its time.
+  bool MakeRoom(const std::string& address, std::vector<Doomed>& doomed) VOXELD_REQUIRES(mutex_);
+  // So that no more connections are open than limits allow, as soon as that is possible.
+  void MakeAllRoom(std::vector<Doomed>& doomed) VOXELD_REQUIRES(mutex_);
   void Doom(Connection& connection, Counters::Count& counter, std::string why, bool punished,
             std::vector<Doomed>& doomed) VOXELD_REQUIRES(mutex_);
   void Punish(const Connection& connection) VOXELD_REQUIRES(mutex_);
@@ -173,9 +197,9 @@ class Guard {
   std::function<void()> on_busy_ VOXELD_GUARDED_BY(mutex_);
   std::unordered_map<std::string, ConnectionId> by_name_ VOXELD_GUARDED_BY(mutex_);
   // Of those that count against limits.
-  std::unordered_map<std::string, uint32_t> by_address_ VOXELD_GUARDED_BY(mutex_);
+  std::unordered_map<std::string, Counted> by_address_ VOXELD_GUARDED_BY(mutex_);
   std::map<std::string, Penalty> penalties_ VOXELD_GUARDED_BY(mutex_);
-  uint32_t counted_ VOXELD_GUARDED_BY(mutex_) = 0;
+  Counted counted_ VOXELD_GUARDED_BY(mutex_);
 };
 
 }  // namespace voxeld::daemon::listen

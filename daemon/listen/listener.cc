@@ -212,6 +212,10 @@ class Listener::Impl {
       }
     }
     if (!own && !guard_.MayEnter(peer).ok()) {
+      if (!accepted.tls) {
+        const std::string frames = Greeting::RefusalFrames();
+        send(connection.get(), frames.data(), frames.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+      }
       if (refusals_++ == 0) refusing_since_ = clock_.Now();
       return true;
     }

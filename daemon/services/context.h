@@ -16,6 +16,7 @@
 #include "daemon/local/local_socket.h"
 #include "daemon/log/logger.h"
 #include "daemon/services/active_calls.h"
+#include "daemon/services/watch_slots.h"
 #include "daemon/text/fonts.h"
 #include "display/sync/clock.h"
 #include "gpu/call_queue.h"
@@ -45,9 +46,9 @@ struct ServiceContext {
   std::string version;
   Logger* log = nullptr;  // may be none
   StreamLimits limits;
-  uint32_t max_scene_watches = 64;
-  uint32_t max_stats_watches = 64;
-  uint32_t max_volume_watches = 16;
+  WatchSlots scene_watches{"the scene", "max_scene_watches", 64};
+  WatchSlots stats_watches{"the statistics", "max_stats_watches", 64};
+  WatchSlots volume_watches{"volumes", "max_volume_watches", 16};
   const access::Access* access = nullptr;  // none: everybody may do everything
   access::Audit* audit = nullptr;          // none: nobody asks
   assets::AssetStore* assets = nullptr;    // none: none are kept
@@ -55,9 +56,6 @@ struct ServiceContext {
   listen::LogGate turned_away_gate{clock, log};
   ActiveCalls calls;        // streams, watches, captures
   ActiveCalls short_calls;  // all others
-  std::atomic<uint32_t> scene_watches = 0;
-  std::atomic<uint32_t> stats_watches = 0;
-  std::atomic<uint32_t> volume_watches = 0;
   static constexpr uint32_t kMostUploads =
       32;  // calls; the assets say how many of them have something under way
   std::atomic<uint32_t> uploads = 0;

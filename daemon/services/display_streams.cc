@@ -102,14 +102,9 @@ class StatsWatch final : public Sender<v1::Stats> {
 
   void Start(const v1::WatchStatsRequest& request) {
     Begin();
-    counted_ = ++context_.stats_watches <= context_.max_stats_watches;
-    if (!counted_) {
-      --context_.stats_watches;
-      return End(absl::ResourceExhaustedError(
-          absl::StrCat(context_.max_stats_watches,
-                       " watches of the statistics are open, which is max_stats_watches; try again "
-                       "when one has ended")));
-    }
+    absl::StatusOr<WatchSlots::Slot> slot = context_.stats_watches.Take(caller().who);
+    if (!slot.ok()) return End(slot.status());
+    slot_ = *std::move(slot);
     interval_ns_ = request.interval_ns() == 0 ? kDefaultNs : request.interval_ns();
     once_ = request.once();
     if (interval_ns_ < kLeastNs || interval_ns_ > kGreatestNs) {
@@ -141,11 +136,9 @@ class StatsWatch final : public Sender<v1::Stats> {
 
   void OnAlarm() override { Ask(); }
 
-  void OnEnded() override {
-    if (counted_) --context_.stats_watches;
-  }
+  void OnEnded() override { slot_.Release(); }
 
-  bool counted_ = false;
+  WatchSlots::Slot slot_;
   int64_t interval_ns_ = kDefaultNs;
   bool once_ = false;
 };
@@ -173,12 +166,9 @@ class VolumeWatch final : public Sender<v1::VolumeChunk> {
 
   void Start(const v1::WatchVolumeRequest& request) {
     Begin();
-    if (++context_.volume_watches > context_.max_volume_watches) {
-      return End(absl::ResourceExhaustedError(
-          absl::StrCat(context_.max_volume_watches,
-                       " watches of volumes are open, which is max_volume_watches; try again when "
-                       "one has ended")));
-    }
+    absl::StatusOr<WatchSlots::Slot> slot = context_.volume_watches.Take(caller().who);
+    if (!slot.ok()) return End(slot.status());
+    slot_ = *std::move(slot);
     context_.core.GetDisplay(
         request.name(), [self = Self()](absl::StatusOr<DisplayDescription> display) {
           if (!display.ok()) return self->End(display.status());
@@ -245,13 +235,14 @@ class VolumeWatch final : public Sender<v1::VolumeChunk> {
   }
 
   void OnEnded() override {
-    --context_.volume_watches;
+    slot_.Release();
     sync::MutexLock lock(feeding_);
     over_ = true;
     feed_ = nullptr;
   }
 
   // Set before the feed is there, then touched by one reaction after another.
+  WatchSlots::Slot slot_;
   DisplayDescription display_;
   VolumeFeed::Change change_;
   size_t next_ = 0;  // of change_.slices

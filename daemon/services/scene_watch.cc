@@ -32,12 +32,11 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   void Start() {
     self_ = shared_from_this();
     context_.calls.Add(self_);
-    counted_ = Count();
-    if (!counted_) {
-      return End(absl::ResourceExhaustedError(
-          absl::StrCat(context_.max_scene_watches,
-                       " watches of the scene are open, which is max_scene_watches; try again when "
-                       "one has ended")));
+    absl::StatusOr<WatchSlots::Slot> slot = context_.scene_watches.Take(caller().who);
+    if (!slot.ok()) return End(slot.status());
+    {
+      sync::MutexLock lock(mutex_);
+      slot_ = *std::move(slot);
     }
     TakeTurn();
   }
@@ -72,9 +71,9 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
       alarm = std::move(alarm_);
       stall_alarm = std::move(stall_alarm_);
       Release();
+      slot_.Release();
     }
     scene_.Cancel(waiting);
-    if (counted_) --context_.scene_watches;
     context_.calls.Remove(this);
     alarm.reset();
     stall_alarm.reset();
@@ -84,14 +83,6 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
  private:
   void Release() VOXELD_REQUIRES(mutex_) {
     context_.core.budget()->Release(Budget::Use::kAnswers, std::exchange(charged_, 0));
-  }
-
-  bool Count() {
-    uint32_t open = context_.scene_watches;
-    while (open < context_.max_scene_watches) {
-      if (context_.scene_watches.compare_exchange_weak(open, open + 1)) return true;
-    }
-    return false;
   }
 
   void TakeTurn() {
@@ -147,6 +138,7 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
         "the client took no message for ", context_.limits.watch_write_limit_ns / 1'000'000,
         " ms, which is watch_write_limit_ns: the scene is no longer held for it; read on while "
         "watching, or watch anew"));
+    slot_.Release();                  // others may watch, whenever its client reads on
     messages_.LetGo(&told, &target);  // nobody has the turn while a message is written, nor after
   }
 
@@ -175,10 +167,10 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   ServiceContext& context_;
   SceneWatch& scene_;  // the core's
   std::shared_ptr<SceneWatchCall> self_;
-  bool counted_ = false;
   wire::WatchMessages messages_;  // of whoever has the turn
 
   sync::Mutex mutex_;
+  WatchSlots::Slot slot_ VOXELD_GUARDED_BY(mutex_);
   grpc::ByteBuffer outgoing_ VOXELD_GUARDED_BY(mutex_);
   uint64_t charged_ VOXELD_GUARDED_BY(mutex_) = 0;  // for `outgoing_`
   bool writing_ VOXELD_GUARDED_BY(mutex_) = false;

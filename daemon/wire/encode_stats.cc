@@ -102,6 +102,7 @@ void EncodeConnections(const ListenFigures& in, v1::ConnectionStats* out) {
   out->set_unreachable(in.unreachable);
   out->set_refused_after_cut(in.refused_after_cut);
   out->set_cut_for_greeting(in.cut_for_greeting);
+  out->set_cut_for_room(in.cut_for_room);
   out->set_cut_for_flooding(in.cut_for_flooding);
   out->set_calls_turned_away(in.calls_turned_away);
   out->set_calls_revoked(in.calls_revoked);

@@ -352,14 +352,19 @@ TEST_F(GuardTest, UnixSocketsAreFreeOfBytesAndTime) {
   EXPECT_EQ(line_.cuts, 0);
 }
 
-TEST_F(GuardTest, LimitsConnectionsByAddressAndInAll) {
-  for (int i = 0; i < 3; ++i) Enter(Tcp(i), lines_[i]);
+TEST_F(GuardTest, LimitsAuthorisedConnectionsByAddressAndInAll) {
+  const auto authorised = [this](const Peer& peer, Line& line) {
+    const ConnectionId id = Enter(peer, line);
+    guard_.OnAnswer(peer.name, true);
+    return id;
+  };
+  for (int i = 0; i < 3; ++i) authorised(Tcp(i), lines_[i]);
   const absl::Status same = guard_.MayEnter(Tcp(9));
   EXPECT_TRUE(absl::IsResourceExhausted(same));
   EXPECT_THAT(std::string(same.message()), HasSubstr("max_connections_per_address"));
   EXPECT_TRUE(guard_.MayEnter(Tcp(9, "192.0.2.2")).ok());
   ConnectionId last = 0;
-  for (int i = 3; i < 5; ++i) last = Enter(Tcp(i, "192.0.2.2"), lines_[i]);
+  for (int i = 3; i < 5; ++i) last = authorised(Tcp(i, "192.0.2.2"), lines_[i]);
   const absl::Status all = guard_.MayEnter(Tcp(9, "192.0.2.3"));
   EXPECT_TRUE(absl::IsResourceExhausted(all));
   EXPECT_EQ(all.message(), "5 connections are open, which is max_connections");
@@ -370,6 +375,74 @@ TEST_F(GuardTest, LimitsConnectionsByAddressAndInAll) {
   EXPECT_EQ(figures.accepted, 5u);
   EXPECT_EQ(figures.refused_by_address, 1u);
   EXPECT_EQ(figures.refused_in_all, 1u);
+}
+
+TEST_F(GuardTest, TheStrangerThatIsIdleLongestMakesRoom) {
+  for (int i = 0; i < 3; ++i) {
+    Enter(Tcp(i), lines_[i]);
+    Pass(100 * sync::kMillisecond);
+  }
+  guard_.OnMessage(Tcp(0).name);  // at work, so not idle
+  EXPECT_TRUE(guard_.MayEnter(Tcp(9)).ok());
+  EXPECT_EQ(lines_[0].cuts, 0);
+  EXPECT_EQ(lines_[1].cuts, 1);
+  EXPECT_EQ(lines_[2].cuts, 0);
+  EXPECT_EQ(counters_.Read().cut_for_room, 1u);
+  EXPECT_EQ(counters_.Read().refused_by_address, 0u);
+  EXPECT_TRUE(guard_.MayEnter(Tcp(10)).ok()) << "its address is not punished";
+}
+
+TEST_F(GuardTest, TheStrangerThatIsIdleLongestMakesRoomForAnotherAddress) {
+  const std::vector<std::string> addresses = {"192.0.2.1", "192.0.2.2"};
+  for (int i = 0; i < 5; ++i) Enter(Tcp(i, addresses[i / 3]), lines_[i]);
+  Pass(Guard::kFirstCall);
+  EXPECT_TRUE(guard_.MayEnter(Tcp(9, "192.0.2.3")).ok());
+  EXPECT_EQ(lines_[0].cuts, 1);
+}
+
+TEST_F(GuardTest, EachConnectionHasTimeForItsFirstCall) {
+  for (int i = 0; i < 6; ++i) {
+    ASSERT_TRUE(guard_.MayEnter(Tcp(i)).ok()) << i << ": others are young, and it may be beyond";
+    Enter(Tcp(i), lines_[i]);
+  }
+  for (int i = 0; i < 6; ++i) EXPECT_EQ(lines_[i].cuts, 0) << i;
+  EXPECT_FALSE(guard_.MayEnter(Tcp(9)).ok()) << "twice the limit";
+  Pass(Guard::kFirstCall + Guard::kLookInterval);
+  int cuts = 0;
+  for (int i = 0; i < 6; ++i) cuts += lines_[i].cuts;
+  EXPECT_EQ(cuts, 3) << "no more than the limit have stayed";
+  EXPECT_EQ(lines_[5].cuts, 0) << "the youngest";
+}
+
+TEST_F(GuardTest, ThoseBeyondTheLimitMayNotAllBeAuthorised) {
+  for (int i = 0; i < 4; ++i) {
+    ASSERT_TRUE(guard_.MayEnter(Tcp(i)).ok());
+    Enter(Tcp(i), lines_[i]);
+  }
+  for (int i = 0; i < 4; ++i) guard_.OnAnswer(Tcp(i).name, true);
+  EXPECT_EQ(lines_[2].cuts, 0);
+  EXPECT_EQ(lines_[3].cuts, 1);
+  EXPECT_TRUE(lines_[2].trusted);
+  EXPECT_FALSE(lines_[3].trusted);
+}
+
+TEST_F(GuardTest, ACallThatGoesOnAfterItsAnswerKeepsNobodyAway) {
+  for (int i = 0; i < 3; ++i) {
+    Enter(Tcp(i), lines_[i]);
+    guard_.OnMessage(Tcp(i).name);
+    guard_.OnAnswer(Tcp(i).name, false);  // of health, which goes on
+  }
+  Pass(Guard::kFirstCall);
+  EXPECT_TRUE(guard_.MayEnter(Tcp(9)).ok());
+  EXPECT_EQ(lines_[0].cuts, 1);
+}
+
+TEST_F(GuardTest, UsersOfUnixSocketsAreLimitedAsTheyAre) {
+  const Peer user{"unix:", "user 1000", true};
+  for (int i = 0; i < 3; ++i) Enter(user, lines_[i]);
+  Pass(Guard::kFirstCall);
+  EXPECT_FALSE(guard_.MayEnter(user).ok());
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(lines_[i].cuts, 0);
 }
 
 TEST_F(GuardTest, TheDaemonsOwnCountAgainstNothingAndAreGuarded) {

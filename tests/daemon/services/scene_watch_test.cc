@@ -206,6 +206,7 @@ std::unique_ptr<v1::SceneService::Stub> StubOfFixedWindow(const Daemon& daemon) 
 TEST(WatchScene, WhoTakesNothingForTooLongHoldsNothing) {
   DaemonOptions options;
   options.watch_write_limit_ns = sync::kSecond;  // the busy one is held up as well, and shorter
+  options.max_scene_watches = 2;
   Daemon daemon(options);
   Client client(daemon.scene());
   client.Open(NoOutcomes());
@@ -222,6 +223,9 @@ TEST(WatchScene, WhoTakesNothingForTooLongHoldsNothing) {
   // Held for the idle one, until its time is over.
   for (int tries = 0; !first.expired() && tries < 1'000'000; ++tries) daemon.Stats();
   EXPECT_TRUE(first.expired());
+  Watcher third(daemon.scene());
+  EXPECT_TRUE(third.Read()) << "its place is another's, though it has not read that it ended";
+  third.Cancel();
   const grpc::Status ended = idle.Finish();
   EXPECT_EQ(ended.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
   EXPECT_THAT(ended.error_message(), HasSubstr("took no message for 1000 ms"));

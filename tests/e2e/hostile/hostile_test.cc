@@ -34,6 +34,7 @@ using std::chrono::steady_clock;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::StartsWith;
 
 // Another machine's, as it were: after an attack others are served at once.
 constexpr char kAttacker[] = "127.0.0.2";
@@ -375,21 +376,37 @@ class Limited {
   std::unique_ptr<v1::DisplayService::Stub> stub_;
 };
 
-TEST(Limits, TooManyConnectionsFromOneAddressAreClosedAndOthersAreServed) {
+TEST(Limits, TooManyConnectionsFromOneAddressMakeRoomOldestFirst) {
   Limited limited("max_connections_per_address = 2\nprobe_interval_ns = 20_000_000\n");
   std::vector<int> held;
   for (int i = 0; i < 3; ++i) held.push_back(BeginToConnect(limited.daemon().tcp_target()));
   EXPECT_TRUE(AwaitStats(limited.stub(), [](const v1::Stats& stats) {
-                return stats.connections().refused_by_address() == 1;
+                return stats.connections().cut_for_room() == 1;
               }).has_value());
   // The daemon's own probe is not among them.
   const auto stats = AwaitStats(
       limited.stub(), [](const v1::Stats& stats) { return stats.uptime_ns() > 500'000'000; });
   ASSERT_TRUE(stats.has_value());
   EXPECT_EQ(stats->connections().probe_failures(), 0u);
-  EXPECT_EQ(stats->connections().accepted(), 3u) << "two over TCP, and the figures' own";
+  EXPECT_EQ(stats->connections().accepted(), 4u) << "three over TCP, and the figures' own";
   for (const int descriptor : held) close(descriptor);
   ExpectServes(limited.daemon().unix_target());
+}
+
+TEST(Limits, StrangersThatSayNothingKeepNobodyAway) {
+  // They are not closed for their time.
+  Limited limited(
+      "max_http_connections = 4\nhttp_idle_limit_ns = 3_600_000_000_000\n"
+      "unauthorised_limit_ns = 60_000_000_000\n");
+  std::vector<int> strangers;
+  const std::string http = absl::StrCat("tcp:", limited.daemon().http());
+  for (int i = 0; i < 300; ++i) {
+    strangers.push_back(BeginToConnect(limited.daemon().tcp_target()));
+    strangers.push_back(BeginToConnect(http));
+  }
+  EXPECT_THAT(HttpGet(limited.daemon().http(), "/healthz"), StartsWith("HTTP/1.1 200 "));
+  ExpectServes(limited.daemon().tcp_target());
+  for (const int stranger : strangers) close(stranger);
 }
 
 class TrustedFloods : public ::testing::TestWithParam<Attack> {};

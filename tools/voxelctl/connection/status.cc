@@ -31,6 +31,10 @@ std::string WhyUnreachable(absl::string_view grpc_says, const std::string& addre
     return "its host's name is not known to this machine";
   }
   if (says("connection refused")) return "nobody listens there";
+  if (says("no room for another connection")) {
+    return "it has no room for another connection; max_connections and "
+           "max_connections_per_address are its limits";
+  }
   if (!absl::StartsWith(address, "tls:")) return "nobody listens there, or what does is no voxeld";
   if (says("is not in peer certificate")) {
     return absl::StrCat("its certificate is not for ",

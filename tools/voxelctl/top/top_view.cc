@@ -125,7 +125,7 @@ uint64_t Refused(const v1::ConnectionStats& c) {
 
 uint64_t CutOff(const v1::ConnectionStats& c) {
   return c.cut_for_bytes() + c.cut_for_time() + c.cut_for_cancelling() + c.cut_for_greeting() +
-         c.cut_for_flooding();
+         c.cut_for_flooding() + c.cut_for_room();
 }
 
 std::string ConnectionText(const v1::ConnectionStats& c) {
