@@ -26,6 +26,7 @@
 // - Thread-safe.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -97,6 +98,8 @@ struct EngineOptions {
   // Called once, from a thread of the engine's, when an engine in a process of its own is lost, also
   // between calls. It must only post.
   std::function<void(const absl::Status&)> lost;
+  // Once it is true, what the CPU engine is drawing is given up, in DataLoss: nobody will see it. Null: never.
+  std::shared_ptr<const std::atomic<bool>> abandoned;
   SlicePart part;
   uint64_t staging_limit_bytes = uint64_t{4} << 30;  // of blocks at once, until they are applied
   // Bounds what an engine derives of items by tile (CPU), or by tile and region (CUDA, of the device's

@@ -41,12 +41,19 @@ class Budget {
   // For uses that are measured, not charged. One thread a use.
   void Set(Use use, uint64_t bytes);
 
+  // What engines have drawn was expected to take `bytes` at most (OwnerTally::derived); it is measured now, and in kEngines.
+  // Each engine replaces what it said before.
+  void ReplaceDerived(uint64_t before, uint64_t bytes) {
+    derived_.fetch_add(bytes - before, std::memory_order_relaxed);  // modulo 2⁶⁴, so less too
+  }
+  uint64_t derived_bytes() const { return derived_.load(std::memory_order_relaxed); }
+
  private:
   std::atomic<uint64_t>& Of(Use use) { return uses_[static_cast<size_t>(use)]; }
   const std::atomic<uint64_t>& Of(Use use) const { return uses_[static_cast<size_t>(use)]; }
 
   const uint64_t limit_;
-  std::atomic<uint64_t> total_ = 0;
+  std::atomic<uint64_t> total_ = 0, derived_ = 0;
   std::array<std::atomic<uint64_t>, kUses> uses_ = {};
 };
 

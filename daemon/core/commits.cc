@@ -215,6 +215,19 @@ void Core::Impl::RefuseCommit(Session& session, const WaitingCommit& commit, uin
       {commit.commit.frame_id, commit.sequence, Refused{refused, std::move(message)}});
 }
 
+MemoryRoom Core::Impl::RoomFor(const WaitingCommit& commit) const {
+  const uint64_t engines = displays_.size();
+  // What engines have yet to derive is not measured yet.
+  const uint64_t expected = store_.snapshot()->total.derived * engines;
+  const uint64_t drawn = budget_->derived_bytes();
+  // Messages that are being read are bounded by themselves, and what comes of them is charged for next.
+  const uint64_t used = budget_->used_bytes() - budget_->used_bytes(Budget::Use::kArriving) +
+                        (expected > drawn ? expected - drawn : 0);
+  // What the commit holds now, the scene will hold.
+  const uint64_t limit = budget_->limit_bytes() + commit.bytes;
+  return {.bytes = limit > used ? limit - used : 0, .engines = engines};
+}
+
 void Core::Impl::Apply(Session& session, WaitingCommit commit) {
   const Limits& limits = options_.limits;
   const sync::TimeNs now = clock_.Now();
@@ -224,6 +237,7 @@ void Core::Impl::Apply(Session& session, WaitingCommit commit) {
   const Author author{session.owner,   session.writer,    owner.hidden, session.options.may_erase,
                       owner.max_bytes, owner.max_entities};
   RefusalTally& refusals = commit.refusals;
+  store_.SetMemoryRoom(RoomFor(commit));
   CommitResult result = store_.Apply(author, std::move(commit.operations), now,
                                      session.options.strict, refusals.refused());
   std::string first = refusals.first();

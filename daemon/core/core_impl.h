@@ -217,6 +217,8 @@ class Core::Impl {
   // apply it now.
   bool PutAside(Session& session, WaitingCommit& commit);
   sync::TimeNs DueTime(sync::TimeNs present_at) const;
+  // By how much the scene may grow with it.
+  MemoryRoom RoomFor(const WaitingCommit& commit) const;
   void Apply(Session& session, WaitingCommit commit);
   void RefuseCommit(Session& session, const WaitingCommit& commit, uint64_t refused,
                     std::string message);
@@ -268,6 +270,7 @@ class Core::Impl {
   std::map<std::string, std::shared_ptr<Genlock>> genlocks_;  // by name
 
   const std::shared_ptr<Budget> budget_;
+  const std::shared_ptr<std::atomic<bool>> abandoned_ = std::make_shared<std::atomic<bool>>(false);
   SceneWatch scene_watch_;
   std::map<SessionId, Session> sessions_;
   std::map<SessionId, Dormant> dormant_;

@@ -64,6 +64,7 @@ absl::Status Core::Impl::AddDisplay(std::unique_ptr<display::Display> display,
   options.display = std::move(display);
   options.make_engine = options_.make_engine ? options_.make_engine : gpu::CreateEngine;
   options.engine = engine;
+  options.engine.abandoned = abandoned_;
   options.setup = setup;
   if (!setup.genlock.empty()) {
     absl::StatusOr<std::shared_ptr<Genlock>> genlock = JoinGenlock(*options.display, setup.genlock);

@@ -149,12 +149,13 @@ absl::Status Core::Impl::Stop(sync::TimeNs limit) {
   }
 
   // Displays first: the core's thread hands on what they still owe.
-  // It gets the last quarter for itself.
+  // It gets the last quarter for itself. What takes longer than a quarter to draw is given up.
   const sync::TimeNs now = clock_.Now();
   std::set<std::string> displays;
   for (const NamedThread& t : threads_) {
     if (t.name != "core") displays.insert(t.name);
   }
+  if (!AwaitEnd(displays, now + limit / 4).empty()) *abandoned_ = true;
   std::set<std::string> left = AwaitEnd(displays, now + limit / 4 * 3);
   store_.Abandon();
   loop_->Close();

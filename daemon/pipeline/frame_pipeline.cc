@@ -74,7 +74,7 @@ void FramePipeline::Stop() {
   alive_ = nullptr;
   if (care_ != nullptr) care_->Stop();
   made_.engine = nullptr;
-  SetEngineBytes(0);
+  SetEngineBytes(0, 0);
   drawing_.reset();
   ServeCaptures();
 }
@@ -264,7 +264,8 @@ void FramePipeline::OnFrame(const absl::StatusOr<gpu::FrameResult>& result) {
   drawing.lease.frame->volume = drawing.volume;
   ++volumes_drawn_;
   lit_voxels_ = result->lit_voxels;
-  SetEngineBytes(result->memory_bytes);
+  SetEngineBytes(result->memory_bytes + scene_->memory_bytes(),
+                 scene_->held() == nullptr ? 0 : scene_->held()->total.derived);
   singular_drawables_ = result->singular_drawables;
   const sync::TimeNs now = clock_.Now();
   draw_ns_ = std::max(now - drawing.began, draw_ns_ - draw_ns_ / 8);

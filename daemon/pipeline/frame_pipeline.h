@@ -197,7 +197,8 @@ class FramePipeline final : private display::Display::Listener {
   gpu::Target CurrentTarget() const;
   absl::Status ApplyDelta(size_t size);
   void OnCallDone(const absl::Status& status);
-  void SetEngineBytes(uint64_t bytes);
+  // `derived`: what was expected of the scene that it has drawn (OwnerTally::derived).
+  void SetEngineBytes(uint64_t bytes, uint64_t derived);
   void OnFrame(const absl::StatusOr<gpu::FrameResult>& result);
   void OnEngineFailure(const absl::Status& status, sync::TimeNs since);
   void OnEngineLost(uint64_t id, const absl::Status& status);
@@ -287,7 +288,8 @@ class FramePipeline final : private display::Display::Listener {
   uint64_t lit_voxels_ = 0, singular_drawables_ = 0;
   sync::TimeNs draw_from_ = 0, draw_ns_ = 0;  // what a frame takes: the most of late
   const std::shared_ptr<Budget> budget_;
-  uint64_t engine_bytes_ = 0;  // charged
+  uint64_t engine_bytes_ = 0;   // charged
+  uint64_t derived_bytes_ = 0;  // told to the budget
   uint64_t volumes_drawn_ = 0, volumes_unchanged_ = 0;
   SlidingLatency commit_to_last_byte_, commit_to_presented_, assemble_, slice_, copy_;
   bool packed_as_drawn_ = false;  // the last volume

@@ -80,12 +80,13 @@ void FramePipeline::TakeReturned() {
   engine_is_new_ = true;
 }
 
-void FramePipeline::SetEngineBytes(uint64_t bytes) {
+void FramePipeline::SetEngineBytes(uint64_t bytes, uint64_t derived) {
   if (budget_ == nullptr) return;
   using Use = Budget::Use;
   if (bytes > engine_bytes_) budget_->ChargeAnyway(Use::kEngines, bytes - engine_bytes_);
   if (bytes < engine_bytes_) budget_->Release(Use::kEngines, engine_bytes_ - bytes);
   engine_bytes_ = bytes;
+  budget_->ReplaceDerived(std::exchange(derived_bytes_, derived), derived);
 }
 
 void FramePipeline::OnEngineLost(uint64_t id, const absl::Status& status) {

@@ -33,9 +33,9 @@ const char* MostOf(uint64_t by_operator, uint64_t limit, const char* name) {
 }  // namespace
 
 CommitApplier::CommitApplier(Draft& draft, const Limits& limits,
-                             const std::vector<DisplayView>& views, const Author& author,
-                             sync::TimeNs now)
-    : draft_(draft), limits_(limits), views_(views), author_(author), now_(now) {}
+                             const std::vector<DisplayView>& views, const MemoryRoom& room,
+                             const Author& author, sync::TimeNs now)
+    : draft_(draft), limits_(limits), views_(views), room_(room), author_(author), now_(now) {}
 
 void CommitApplier::Apply(Operation& operation) {
   if (Frame* frame = FrameOf(operation)) {
@@ -135,13 +135,16 @@ bool CommitApplier::RefusedNewLayer(const Operation& operation, const std::strin
                         "owners share; orphaned layers can be cleared",
                         Quoted(layer), limits_.max_layers));
   }
-  if (auto over = OverQuota(tally.drawables, tally.bytes + Draft::LayerBytes(Key(layer)))) {
+  OwnerTally wanted = tally;
+  wanted.bytes += Draft::LayerBytes(Key(layer));
+  if (auto over = OverQuota(wanted)) {
     return refuse(*std::move(over));
   }
   return false;
 }
 
-std::optional<std::string> CommitApplier::OverQuota(uint64_t drawables, uint64_t bytes) const {
+std::optional<std::string> CommitApplier::OverQuota(const OwnerTally& wanted) const {
+  const auto [drawables, layers, bytes, derived] = wanted;
   const OwnerTally& tally = draft_.tally(author_.owner);
   if (drawables > tally.drawables) {
     if (drawables > limits_.max_entities_per_owner || drawables > author_.max_entities) {
@@ -174,7 +177,25 @@ std::optional<std::string> CommitApplier::OverQuota(uint64_t drawables, uint64_t
           all, limits_.max_scene_bytes);
     }
   }
-  return std::nullopt;
+  return OverMemory(wanted);
+}
+
+std::optional<std::string> CommitApplier::OverMemory(const OwnerTally& wanted) const {
+  const OwnerTally& tally = draft_.tally(author_.owner);
+  if (wanted.bytes <= tally.bytes && wanted.derived <= tally.derived) return std::nullopt;
+  // Of all owners, from the commit before to what is wanted; less than 0 if more has gone in this commit than has come.
+  const auto growth = [&](uint64_t OwnerTally::*of) {
+    return static_cast<double>(draft_.total().*of) - static_cast<double>(draft_.base().total.*of) +
+           static_cast<double>(wanted.*of) - static_cast<double>(tally.*of);
+  };
+  const double bytes = growth(&OwnerTally::bytes) +
+                       growth(&OwnerTally::derived) * static_cast<double>(room_.engines);
+  if (bytes <= static_cast<double>(room_.bytes)) return std::nullopt;
+  return absl::StrFormat(
+      "%.0f bytes more would be held for the scene and what %d %s derive from it, and "
+      "max_memory_bytes leaves %d; make it smaller, or try again when others have taken something "
+      "away",
+      bytes, room_.engines, room_.engines == 1 ? "engine would" : "engines would", room_.bytes);
 }
 
 void CommitApplier::Do(Operation& operation, Upsert& upsert) {
@@ -199,13 +220,19 @@ void CommitApplier::Do(Operation& operation, Upsert& upsert) {
 
   const EntityPtr* old = layer == nullptr ? nullptr : layer->entities.Find(upsert.id);
   const OwnerTally& tally = draft_.tally(author_.owner);
-  const uint64_t drawables = AddSaturating(
-      tally.drawables - (old ? draft_.DrawablesOf(author_.owner, (*old)->data.content) : 0),
-      draft_.DrawablesOf(author_.owner, upsert.entity.content));
-  const uint64_t bytes = tally.bytes - (old ? (*old)->bytes : 0) +
-                         (layer == nullptr ? Draft::LayerBytes(key) : 0) +
-                         Draft::EntityBytes(key, upsert.id, upsert.entity);
-  if (auto over = OverQuota(drawables, bytes)) {
+  OwnerTally wanted = tally;
+  if (old != nullptr) {
+    const Content& before = (*old)->data.content;
+    wanted.drawables -= draft_.DrawablesOf(author_.owner, before);
+    wanted.derived -= draft_.DerivedBytesOf(author_.owner, before);
+    wanted.bytes -= (*old)->bytes;
+  }
+  const Content& content = upsert.entity.content;
+  wanted.drawables = AddSaturating(wanted.drawables, draft_.DrawablesOf(author_.owner, content));
+  wanted.derived = AddSaturating(wanted.derived, draft_.DerivedBytesOf(author_.owner, content));
+  wanted.bytes += (layer == nullptr ? Draft::LayerBytes(key) : 0) +
+                  Draft::EntityBytes(key, upsert.id, upsert.entity);
+  if (auto over = OverQuota(wanted)) {
     return refuse("upsert", Reason::kQuotaExceeded, *std::move(over));
   }
 

@@ -29,6 +29,12 @@ struct Author {
   uint64_t max_bytes = UINT64_MAX, max_entities = UINT64_MAX;
 };
 
+// What there is for a scene that grows.
+struct MemoryRoom {
+  uint64_t bytes = UINT64_MAX;  // that the scene, and what engines derive from it, may grow by
+  uint64_t engines = 0;         // each of which derives all of it
+};
+
 // A display's map from the scene to its voxels, for range checks.
 struct DisplayView {
   std::string display;
@@ -39,7 +45,7 @@ class CommitApplier {
  public:
   // All are borrowed.
   CommitApplier(Draft& draft, const Limits& limits, const std::vector<DisplayView>& views,
-                const Author& author, sync::TimeNs now);
+                const MemoryRoom& room, const Author& author, sync::TimeNs now);
 
   // Operations must have passed CheckAlone, be no Commit, and live until End.
   void Apply(Operation& operation);
@@ -99,9 +105,9 @@ class CommitApplier {
   void TellOfCoarseIn(const Operation& operation, const std::string& name, const Layer& layer,
                       const char* field);
 
-  // What is wrong if the author came to draw `drawables` and hold `bytes`;
-  // nothing if quotas allow it.
-  std::optional<std::string> OverQuota(uint64_t drawables, uint64_t bytes) const;
+  // What is wrong if the author came to `wanted` (layers aside); nothing if quotas and memory allow it.
+  std::optional<std::string> OverQuota(const OwnerTally& wanted) const;
+  std::optional<std::string> OverMemory(const OwnerTally& wanted) const;
   bool RefusedNewLayer(const Operation& operation, const std::string& layer,
                        const std::string& field);
 
@@ -122,6 +128,7 @@ class CommitApplier {
   Draft& draft_;
   const Limits& limits_;
   const std::vector<DisplayView>& views_;
+  const MemoryRoom& room_;
   const Author& author_;
   const sync::TimeNs now_;
 

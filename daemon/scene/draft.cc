@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "gpu/derived_bytes.h"
+
 namespace voxeld::daemon {
 
 uint64_t AddSaturating(uint64_t a, uint64_t b) { return a > UINT64_MAX - b ? UINT64_MAX : a + b; }
@@ -63,6 +65,7 @@ void Draft::Count(uint64_t owner, const OwnerTally& more, const OwnerTally& less
     counted->drawables += more.drawables - less.drawables;
     counted->layers += more.layers - less.layers;
     counted->bytes += more.bytes - less.bytes;
+    counted->derived += more.derived - less.derived;
   }
 }
 
@@ -73,6 +76,20 @@ uint64_t Draft::DrawablesOf(uint64_t owner, const Content& content) const {
   const InstanceRef* instance = InstanceOf(content);
   if (instance == nullptr) return 1;
   return std::max<uint64_t>(1, FindObject({owner, instance->object})->drawables);
+}
+
+uint64_t Draft::DerivedBytesOf(uint64_t owner, const Content& content) const {
+  if (const InstanceRef* instance = InstanceOf(content)) {
+    return FindObject({owner, instance->object})->derived;
+  }
+  const auto of = [](const GeometryPtr& geometry) {
+    return kHeldBytesPerDrawable + gpu::MostDerivedBytes(geometry->record);
+  };
+  const auto* group = std::get_if<GroupPtr>(&content);
+  if (group == nullptr) return of(std::get<GeometryPtr>(content));
+  uint64_t bytes = 0;
+  for (const GroupData::Part& part : (*group)->parts) bytes += of(part.geometry);
+  return bytes;
 }
 
 Bounds Draft::BoundsOf(uint64_t owner, const Content& content) const {
@@ -124,9 +141,14 @@ void Draft::ClearLayer(const OwnedName& key) {
   layer.bounds = {};
 }
 
+OwnerTally Draft::CountOf(const OwnedName& layer, const Entity& entity) const {
+  return {.drawables = DrawablesOf(layer.owner, entity.data.content),
+          .bytes = entity.bytes,
+          .derived = DerivedBytesOf(layer.owner, entity.data.content)};
+}
+
 void Draft::Index(const OwnedName& layer, const std::string& id, const Entity& entity) {
-  Count(layer.owner,
-        {.drawables = DrawablesOf(layer.owner, entity.data.content), .bytes = entity.bytes}, {});
+  Count(layer.owner, CountOf(layer, entity), {});
   ++next_.entities;
   if (const InstanceRef* instance = InstanceOf(entity.data.content)) {
     next_.uses.Put(UseBy(layer, id, *instance), true);
@@ -137,8 +159,7 @@ void Draft::Index(const OwnedName& layer, const std::string& id, const Entity& e
 }
 
 void Draft::Unindex(const OwnedName& layer, const std::string& id, const Entity& entity) {
-  Count(layer.owner, {},
-        {.drawables = DrawablesOf(layer.owner, entity.data.content), .bytes = entity.bytes});
+  Count(layer.owner, {}, CountOf(layer, entity));
   --next_.entities;
   if (const InstanceRef* instance = InstanceOf(entity.data.content)) {
     next_.uses.Erase(UseBy(layer, id, *instance));
@@ -213,7 +234,8 @@ void Draft::PutObject(const OwnedName& key, Object object) {
       return true;
     });
     for (const UseKey& use : instances) {
-      Count(key.owner, {.drawables = now}, {.drawables = before});
+      Count(key.owner, {.drawables = now, .derived = object.derived},
+            {.drawables = before, .derived = old->derived});
       const OwnedName layer{use.owner, use.layer};
       const gpu::Affine transform = (*FindEntity(layer, use.id))->data.transform;
       OpenLayer(layer).bounds.Include(MapBounds(transform, object.bounds));

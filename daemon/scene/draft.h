@@ -42,6 +42,8 @@ class Draft {
   }
   // Primitives that an entity of this content draws; at least 1. The object must exist.
   uint64_t DrawablesOf(uint64_t owner, const Content& content) const;
+  // Bytes that an engine derives from such an entity at most. The object must exist.
+  uint64_t DerivedBytesOf(uint64_t owner, const Content& content) const;
   Bounds BoundsOf(uint64_t owner, const Content& content) const;
 
   // ---- layers
@@ -76,6 +78,8 @@ class Draft {
  private:
   // Adds `more` to the owner's tally and to the total, and takes `less` away.
   void Count(uint64_t owner, const OwnerTally& more, const OwnerTally& less);
+  // What an entity of this layer counts for.
+  OwnerTally CountOf(const OwnedName& layer, const Entity& entity) const;
   Layer& OpenLayer(const OwnedName& key);
   void Index(const OwnedName& layer, const std::string& id, const Entity& entity);
   void Unindex(const OwnedName& layer, const std::string& id, const Entity& entity);

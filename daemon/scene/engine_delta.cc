@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "gpu/derived_bytes.h"
 #include "gpu/word.h"
 
 namespace voxeld::daemon {
@@ -12,6 +13,7 @@ constexpr uint32_t kNoTint = 0x00FFFFFF;
 constexpr uint64_t kNoLayer = 0;  // no layer has this number
 constexpr uint32_t kRecordsPerBreath = 256;
 constexpr size_t kBytesPerBreath = size_t{1} << 20;
+constexpr size_t kKeptSlots = 4096;  // of an index that has few entries left
 
 const Snapshot& EmptyScene() {
   static const Snapshot empty;
@@ -48,6 +50,11 @@ bool LooksSame(const Entity& a, const Entity& b) {
          a.data.content == b.data.content;
 }
 
+template <typename T>
+uint64_t BytesOf(const std::vector<T>& values) {
+  return gpu::HeapBytes(values.capacity() * sizeof(T));
+}
+
 }  // namespace
 
 EngineScene::EngineScene(std::function<void()> breathe, Choose choose)
@@ -64,6 +71,7 @@ void EngineScene::Forget() {
   reset_ = true;
   geometries_.clear();
   drawn_.clear();
+  parts_bytes_ = 0;
 }
 
 size_t EngineScene::Plan(SnapshotPtr next) {
@@ -122,8 +130,18 @@ size_t EngineScene::Plan(SnapshotPtr next) {
   size += put_drawables_.size() * gpu::DeltaWriter::SizeOf(gpu::DrawableRecord());
   size += gpu::DeltaWriter::kSizeOfId *
           (drop_geometries_.size() + drop_drawables_.size() + drop_layers_.size());
+  GiveBackSlots();
   held_ = next_;
   return size;
+}
+
+void EngineScene::GiveBackSlots() {
+  if (drawn_.bucket_count() > kKeptSlots && drawn_.size() < drawn_.bucket_count() / 8) {
+    drawn_.rehash(0);
+  }
+  if (geometries_.capacity() > kKeptSlots && geometries_.size() < geometries_.capacity() / 8) {
+    geometries_.rehash(0);
+  }
 }
 
 void EngineScene::Write(gpu::DeltaWriter& writer) {
@@ -155,8 +173,23 @@ void EngineScene::Write(gpu::DeltaWriter& writer) {
   for (const uint64_t id : drop_drawables_) writer.Drop(gpu::Op::kDropDrawable, id);
   for (const uint64_t id : drop_geometries_) writer.Drop(gpu::Op::kDropGeometry, id);
   for (const uint64_t id : drop_layers_) writer.Drop(gpu::Op::kDropLayer, id);
-  put_geometries_.clear();
-  unused_.clear();
+  // A plan may be large, and the next one small.
+  put_geometries_ = {};
+  unused_ = {};
+  flat_ = {};
+  put_layers_ = {};
+  put_drawables_ = {};
+  drop_drawables_ = {};
+  drop_geometries_ = {};
+  drop_layers_ = {};
+}
+
+uint64_t EngineScene::memory_bytes() const {
+  using Drawn = decltype(drawn_)::value_type;
+  using Geometry = decltype(geometries_)::value_type;
+  constexpr uint64_t kNode = gpu::HeapBytes(sizeof(Drawn) + sizeof(void*));
+  return drawn_.size() * kNode + gpu::HeapBytes(drawn_.bucket_count() * sizeof(void*)) +
+         gpu::HeapBytes(geometries_.capacity() * (sizeof(Geometry) + 1)) + parts_bytes_;
 }
 
 void EngineScene::PlanInstances(const Snapshot& before, const Snapshot& next) {
@@ -222,6 +255,7 @@ void EngineScene::Draw(const OwnedName& key, const Layer& layer, const std::stri
   const std::vector<Part> old = std::move(parts);
   parts.clear();
   parts.reserve(flat_.size());
+  parts_bytes_ += BytesOf(parts) - BytesOf(old);
   for (size_t i = 0; i < flat_.size(); ++i) {
     gpu::DrawableRecord record;
     record.id = i < old.size() ? old[i].drawable : next_id_++;
@@ -249,6 +283,7 @@ void EngineScene::Undraw(const Entity& entity) {
     drop_drawables_.push_back(part.drawable);
     Release(part.geometry);
   }
+  parts_bytes_ -= BytesOf(it->second);
   drawn_.erase(it);
   Breathe();
 }

@@ -56,6 +56,8 @@ class EngineScene {
 
   // What is held, for tests and figures.
   size_t geometries() const { return geometries_.size(); }
+  // Bytes of the indexes of what is held.
+  uint64_t memory_bytes() const;
 
  private:
   // A geometry that is drawn in both ways is two to the engine.
@@ -98,6 +100,8 @@ class EngineScene {
   void Flatten(uint64_t owner, const Content& content, const gpu::Affine& map, uint32_t tint);
   uint64_t Use(const HeldGeometry& geometry);
   void Release(const HeldGeometry& geometry);
+  // Of indexes that have grown much larger than what is left in them.
+  void GiveBackSlots();
   void Breathe();
 
   const std::function<void()> breathe_;
@@ -109,6 +113,7 @@ class EngineScene {
   uint64_t next_id_ = 1;
   absl::flat_hash_map<GeometryKey, GeometryUse> geometries_;
   std::unordered_map<uint64_t, std::vector<Part>> drawn_;  // by number of entity
+  uint64_t parts_bytes_ = 0;                               // of the vectors in it
 
   // The plan.
   SnapshotPtr next_;

@@ -70,6 +70,8 @@ std::vector<std::pair<std::string, Object>> CommitApplier::Derive(const std::str
       if (child_name == nullptr) {
         object.drawables =
             AddSaturating(object.drawables, draft_.DrawablesOf(author_.owner, part.content));
+        object.derived =
+            AddSaturating(object.derived, draft_.DerivedBytesOf(author_.owner, part.content));
         bounds = draft_.BoundsOf(author_.owner, part.content);
       } else {
         if (affected.contains(*child_name)) self(self, *child_name);
@@ -78,6 +80,7 @@ std::vector<std::pair<std::string, Object>> CommitApplier::Derive(const std::str
             it != done.end() ? &derived[it->second].second : draft_.FindObject(Key(*child_name));
         if (child == nullptr) continue;  // refused before
         object.drawables = AddSaturating(object.drawables, child->drawables);
+        object.derived = AddSaturating(object.derived, child->derived);
         object.depth = std::max(object.depth, child->depth + 1);
         bounds = child->bounds;
       }
@@ -120,7 +123,7 @@ bool CommitApplier::RefusedDerived(const Operation& operation, const DefineObjec
     return true;
   };
   const OwnerTally& tally = draft_.tally(author_.owner);
-  uint64_t drawables = tally.drawables;
+  OwnerTally wanted = tally;
   for (const auto& [name, object] : derived) {
     if (object.depth > limits_.max_instance_depth) {
       return refuse(Reason::kCycle,
@@ -137,10 +140,11 @@ bool CommitApplier::RefusedDerived(const Operation& operation, const DefineObjec
     const Object* before = draft_.FindObject(Key(name));
     if (before == nullptr) continue;
     for (const UseKey& use : InstancesOf(name)) {
-      drawables -= std::max<uint64_t>(1, before->drawables);
-      drawables = AddSaturating(drawables, std::max<uint64_t>(1, object.drawables));
-      if (drawables > limits_.max_entities_per_owner) {
-        return refuse(Reason::kQuotaExceeded, *OverQuota(drawables, tally.bytes));
+      wanted.drawables -= std::max<uint64_t>(1, before->drawables);
+      wanted.drawables = AddSaturating(wanted.drawables, std::max<uint64_t>(1, object.drawables));
+      wanted.derived = AddSaturating(wanted.derived - before->derived, object.derived);
+      if (wanted.drawables > limits_.max_entities_per_owner) {
+        return refuse(Reason::kQuotaExceeded, *OverQuota(wanted));
       }
       const OwnedName layer = Key(use.layer);
       const gpu::Affine& transform = (*draft_.FindEntity(layer, use.id))->data.transform;
@@ -153,9 +157,9 @@ bool CommitApplier::RefusedDerived(const Operation& operation, const DefineObjec
     }
   }
   const Object* old = draft_.FindObject(Key(define.object));
-  const uint64_t bytes = tally.bytes - (old == nullptr ? 0 : old->bytes) +
-                         Draft::ObjectBytes(define.object, *define.data);
-  if (auto over = OverQuota(drawables, bytes)) {
+  wanted.bytes = tally.bytes - (old == nullptr ? 0 : old->bytes) +
+                 Draft::ObjectBytes(define.object, *define.data);
+  if (auto over = OverQuota(wanted)) {
     return refuse(Reason::kQuotaExceeded, *std::move(over));
   }
   return false;

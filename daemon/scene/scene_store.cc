@@ -23,7 +23,7 @@ void SceneStore::Publish(Draft draft) {
 CommitResult SceneStore::Apply(const Author& author, std::vector<Operation> operations,
                                sync::TimeNs now, bool strict, uint64_t refused_before) {
   Draft draft(snapshot_, next_number_);
-  CommitApplier applier(draft, limits_, views_, author, now);
+  CommitApplier applier(draft, limits_, views_, room_, author, now);
   CommitResult result;
   for (Operation& operation : operations) {
     if (abandoned_) break;

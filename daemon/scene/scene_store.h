@@ -42,6 +42,9 @@ class SceneStore {
   // What coordinates are checked against from now on.
   void SetViews(std::vector<DisplayView> views) { views_ = std::move(views); }
 
+  // How much the scene may grow in the commits that follow; without it, by any amount.
+  void SetMemoryRoom(const MemoryRoom& room) { room_ = room; }
+
   // Applies `operations`, which have passed CheckAlone, as one commit.
   // With `strict` any refusal, or `refused_before` > 0 (what was refused on arrival),
   // refuses it whole. Call Expire(now) first.
@@ -82,6 +85,7 @@ class SceneStore {
 
   const Limits limits_;
   std::vector<DisplayView> views_;
+  MemoryRoom room_;
   std::atomic<bool> abandoned_ = false;
   uint64_t next_number_ = 1;
   SnapshotPtr snapshot_;

@@ -75,6 +75,7 @@ struct Object {
   // Derived from the definition and those that it refers to.
   uint32_t depth = 1;      // 1: no instances inside
   uint64_t drawables = 0;  // primitives that one instance draws; saturates
+  uint64_t derived = 0;    // bytes that one engine derives from one instance at most; saturates
   Bounds bounds;           // in the object's coordinates
 };
 using ObjectPtr = std::shared_ptr<const Object>;
@@ -109,11 +110,16 @@ struct EntityPlace {
   auto operator<=>(const EntityPlace&) const = default;
 };
 
+// Beside what engines derive, so much is held of each drawable: by the index of what an engine has, and in passing by the
+// delta that brings it there.
+inline constexpr uint64_t kHeldBytesPerDrawable = 800;
+
 // What counts against quotas: an owner's, or everybody's together.
 struct OwnerTally {
   uint64_t drawables = 0;  // entities, an instance counting as what it draws (at least 1)
   uint64_t layers = 0;
   uint64_t bytes = 0;
+  uint64_t derived = 0;  // that each engine derives from them at most (MostDerivedBytes)
   bool operator==(const OwnerTally&) const = default;
 };
 

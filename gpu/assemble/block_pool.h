@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "gpu/assemble/buffer.h"
@@ -25,6 +26,8 @@ class BlockPool {
   }
   // Between Takes: what lies in pages without blocks in use goes back to the system, if more than `keep` are free.
   void Trim(size_t keep);
+  // Of all pages that it has, with and without blocks in use.
+  uint64_t memory_bytes() const { return slabs_.size() * slab_blocks_ * block_bytes_; }
 
  private:
   struct Slab {

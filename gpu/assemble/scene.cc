@@ -6,8 +6,15 @@
 #include <utility>
 
 #include "gpu/assemble/delta_plan.h"
+#include "gpu/derived_bytes.h"
 
 namespace voxeld::gpu {
+
+namespace {
+
+constexpr size_t kKeptSlots = 4096;  // of a hash map that has few entries left
+
+}  // namespace
 
 RetainedGeometry KeepOnHost(const GeometryView& view) {
   const size_t positions = view.positions.size_bytes(), indices = view.indices.size_bytes(),
@@ -27,6 +34,7 @@ RetainedGeometry KeepOnHost(const GeometryView& view) {
   if (indices > 0) copy(kept.view.indices);
   if (colors > 0) copy(kept.view.colors);
   kept.memory = std::move(memory);
+  kept.copied_bytes = HeapBytes(positions + indices + colors);
   return kept;
 }
 
@@ -57,9 +65,26 @@ const Drawable* Scene::FindDrawable(uint64_t id) const {
   return it == drawables_.end() ? nullptr : it->second.get();
 }
 
+uint64_t Scene::memory_bytes() const {
+  // A slot of a hash map has a byte of its own; a set of users or of a layer's drawables has three slots for two pointers.
+  constexpr uint64_t kLink = (sizeof(Drawable*) + 1) * 3 / 2;
+  constexpr uint64_t kDrawable = HeapBytes(sizeof(Drawable)) + 2 * kLink;
+  static_assert(kDrawable + 3 * HeapBytes(1) + 64 <= kMostDrawableBytes);
+  const auto slots = [](const auto& map) {
+    using Slot = typename std::remove_cvref_t<decltype(map)>::value_type;
+    return HeapBytes(map.capacity() * (sizeof(Slot) + 1));
+  };
+  // A geometry with users has a block for them.
+  return slots(drawables_) + slots(geometries_) + slots(layers_) + drawables_.size() * kDrawable +
+         geometries_.size() * (HeapBytes(sizeof(RetainedGeometry) + 16) + HeapBytes(1)) +
+         layers_.size() * HeapBytes(sizeof(Layer)) + copied_bytes_;
+}
+
 void Scene::PutGeometry(const GeometryView& view, SceneObserver& observer) {
   GeometryEntry& entry = geometries_[view.record.id];
+  if (entry.geometry != nullptr) copied_bytes_ -= entry.geometry->copied_bytes;
   entry.geometry = std::make_shared<const RetainedGeometry>(observer.Retain(view));
+  copied_bytes_ += entry.geometry->copied_bytes;
   // Only after a drop in the same delta can it have users already.
   for (Drawable* drawable : entry.users) {
     observer.OnLeave(*drawable);
@@ -115,6 +140,15 @@ void Scene::PutLayer(const LayerRecord& record, SceneObserver& observer) {
   }
 }
 
+void Scene::GiveBackSlots() {
+  const auto shrink = [](auto& map) {
+    if (map.capacity() > kKeptSlots && map.size() < map.capacity() / 8) map.rehash(0);
+  };
+  shrink(drawables_);
+  shrink(geometries_);
+  for (auto& [id, layer] : layers_) shrink(layer->drawables);
+}
+
 void Scene::RankLayers() {
   std::vector<Layer*> layers;
   for (const auto& [id, layer] : layers_) layers.push_back(layer.get());
@@ -152,6 +186,7 @@ absl::Status Scene::Apply(std::span<const std::byte> delta, BulkSource* bulk,
       drawables_.clear();
       layers_.clear();
       geometries_.clear();
+      copied_bytes_ = 0;
     } else if (const auto* geometry = std::get_if<GeometryView>(&step)) {
       PutGeometry(*geometry, observer);
     } else if (const auto* layer = std::get_if<LayerRecord>(&step)) {
@@ -166,8 +201,12 @@ absl::Status Scene::Apply(std::span<const std::byte> delta, BulkSource* bulk,
       gone.push_back(TakeDrawable(drop->id, observer));
     }
   }
-  for (uint64_t id : plan->geometries_to_erase) geometries_.erase(id);
+  for (uint64_t id : plan->geometries_to_erase) {
+    const auto node = geometries_.extract(id);
+    copied_bytes_ -= node.mapped().geometry->copied_bytes;
+  }
   for (uint64_t id : plan->layers_to_erase) layers_.erase(id);
+  GiveBackSlots();
   RankLayers();
   LinkMasks();
   return absl::OkStatus();

@@ -23,6 +23,7 @@ namespace voxeld::gpu {
 struct RetainedGeometry {
   GeometryView view;
   std::shared_ptr<const void> memory;  // what its arrays lie in; none if there are none
+  uint64_t copied_bytes = 0;           // of that, if it is the host's and this geometry's alone
 };
 
 // Bulk memory as it is, else a copy of its arrays: the delta is gone after it was applied.
@@ -101,6 +102,8 @@ class Scene {
   int64_t GeometryUses(uint64_t id) const;
   int64_t LayerUses(uint64_t id) const;
   const Drawable* FindDrawable(uint64_t id) const;
+  // Of records, indexes and copies of arrays; what is derived is not among them.
+  uint64_t memory_bytes() const;
 
  private:
   struct GeometryEntry {
@@ -112,12 +115,15 @@ class Scene {
   void PutDrawable(const DrawableRecord& record, SceneObserver& observer);
   void PutLayer(const LayerRecord& record, SceneObserver& observer);
   std::unique_ptr<Drawable> TakeDrawable(uint64_t id, SceneObserver& observer);
+  // Of maps that have grown much larger than what is left in them.
+  void GiveBackSlots();
   void RankLayers();
   void LinkMasks();
 
   absl::flat_hash_map<uint64_t, GeometryEntry> geometries_;
   absl::flat_hash_map<uint64_t, std::unique_ptr<Layer>> layers_;
   absl::flat_hash_map<uint64_t, std::unique_ptr<Drawable>> drawables_;
+  uint64_t copied_bytes_ = 0;  // of all geometries' arrays
 };
 
 }  // namespace voxeld::gpu

@@ -9,19 +9,27 @@
 #include "gpu/assemble/blend.h"
 #include "gpu/assemble/draw.h"
 #include "gpu/assemble/tile_clip.h"
+#include "gpu/derived_bytes.h"
 
 namespace voxeld::gpu {
 namespace {
 
-uint64_t DerivedBytes(const Drawable& d, size_t entry_bytes) {
-  return d.vertices.size() * sizeof(d.vertices[0]) + d.hoisted.size() * sizeof(d.hoisted[0]) +
-         d.inside.size() * sizeof(d.inside[0]) + (d.cut != nullptr ? d.cut->bytes() : 0) +
-         d.bins.tiles.size() * (2 * sizeof(uint32_t) + entry_bytes) + d.bins.item_bytes();
+template <typename T>
+uint64_t BytesOf(const std::vector<T>& values) {
+  return HeapBytes(values.capacity() * sizeof(T));
+}
+
+// Its entries in tiles are counted where they are (entries_bytes_).
+uint64_t DerivedBytes(const Drawable& d) {
+  return BytesOf(d.vertices) + BytesOf(d.hoisted) + BytesOf(d.inside) +
+         (d.cut != nullptr ? d.cut->bytes() : 0) + BytesOf(d.bins.tiles) + BytesOf(d.bins.begin) +
+         BytesOf(d.bins.counts) + BytesOf(d.bins.triangles) + d.bins.item_bytes();
 }
 
 constexpr size_t kSmallDrawable = 2048;  // vertices: prepared by one thread
 constexpr size_t kCachedTiles = 1024;    // drawn in one frame: so many colours may stay in caches
 constexpr size_t kFreeBlocks = 256;      // kept, beside as many as are spare
+constexpr size_t kKeptEntries = 4096;    // of a list whose entries have gone
 constexpr size_t kMovedRun = 16;  // tiles that a worker draws one behind the other where more are
 
 // Puts a layer's words over the colours of a tile.
@@ -130,8 +138,8 @@ uint64_t Volume::index_bytes() const {
 }
 
 uint64_t Volume::memory_bytes() const {
-  return derived_bytes_ + index_bytes() - budget_.kept_bytes() +
-         (lit_tiles_ + tiles_.spare_blocks()) * sizeof(TileWords);
+  return scene_.memory_bytes() + derived_bytes_ + entries_bytes_ + index_bytes() -
+         budget_.kept_bytes() + tiles_.memory_bytes();
 }
 
 void Volume::MarkDirty(uint32_t tile) {
@@ -175,7 +183,13 @@ void Volume::OnLayerLook(Layer& layer, const LayerRecord& next) {
 // At a cost that drawing those tiles exceeds.
 void Volume::TakeOutLeaving() {
   for (uint32_t tile : leaving_) {
-    std::erase_if(index_[tile].entries, [](const Entry& e) { return e.drawable->leaving; });
+    std::vector<Entry>& entries = index_[tile].entries;
+    std::erase_if(entries, [](const Entry& e) { return e.drawable->leaving; });
+    if (entries.capacity() > kKeptEntries && entries.size() < entries.capacity() / 8) {
+      entries_bytes_ -= BytesOf(entries);
+      entries.shrink_to_fit();
+      entries_bytes_ += BytesOf(entries);
+    }
     index_[tile].leaving = false;
   }
   leaving_.clear();
@@ -184,6 +198,7 @@ void Volume::TakeOutLeaving() {
     drawable->bins.Clear();
   }
   left_.clear();
+  if (left_.capacity() > kKeptEntries) left_.shrink_to_fit();
 }
 
 absl::Status Volume::Apply(std::span<const std::byte> delta, BulkSource* bulk) {
@@ -211,6 +226,7 @@ void Volume::SetView(const TileGrid& grid, const Affine& view, std::vector<uint8
   lit_voxels_ = 0;
   lit_tiles_ = 0;
   derived_bytes_ = 0;
+  entries_bytes_ = 0;
   singular_ = 0;
   counted_ = 0;
   most_kept_ = 0;
@@ -274,18 +290,26 @@ void Volume::PreparePending() {
     d->pending = false;
     singular_ += IsSingular(*d);
     counted_ += d->bins.counted();
-    d->derived_bytes = DerivedBytes(*d, sizeof(Entry));
+    d->derived_bytes = DerivedBytes(*d);
     derived_bytes_ += d->derived_bytes;
     List(*d);
     if (!d->layer->drawn) continue;
     for (const uint32_t tile : d->bins.tiles) MarkDirty(tile);
   }
   pending_.clear();
+  if (pending_.capacity() > kKeptEntries) pending_.shrink_to_fit();
 }
 
 void Volume::List(Drawable& d) {
   for (uint32_t row = 0; row < d.bins.tiles.size(); ++row) {
-    index_[d.bins.tiles[row]].entries.push_back({&d, row});
+    std::vector<Entry>& entries = index_[d.bins.tiles[row]].entries;
+    if (entries.size() < entries.capacity()) {
+      entries.push_back({&d, row});
+      continue;
+    }
+    entries_bytes_ -= BytesOf(entries);
+    entries.push_back({&d, row});
+    entries_bytes_ += BytesOf(entries);
   }
 }
 
@@ -307,7 +331,7 @@ void Volume::KeepCounted() {
     }
     List(d);
     derived_bytes_ -= d.derived_bytes;
-    d.derived_bytes = DerivedBytes(d, sizeof(Entry));
+    d.derived_bytes = DerivedBytes(d);
     derived_bytes_ += d.derived_bytes;
     if (--counted_ == 0) break;
   }

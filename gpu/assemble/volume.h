@@ -54,7 +54,7 @@ class TileStore {
   }
   // Between Takes: what tiles of these that went dark had is kept for others, `most` blocks at most in all.
   void Recycle(std::span<const uint32_t> tiles, size_t most);
-  size_t spare_blocks() const { return spare_.size(); }
+  uint64_t memory_bytes() const { return pool_.memory_bytes(); }
 
  private:
   struct Block {
@@ -183,6 +183,7 @@ class Volume final : private SceneObserver {
   size_t counted_ = 0;      // drawables
   uint64_t most_kept_ = 0;  // of the budget, since KeepCounted last tried
   uint64_t lit_voxels_ = 0, lit_tiles_ = 0, derived_bytes_ = 0;
+  uint64_t entries_bytes_ = 0;  // of all index_[…].entries
   uint32_t singular_ = 0;
 };
 

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "gpu/core_engine.h"
+#include "gpu/cpu/abandonable_executor.h"
 #include "gpu/cpu/cpu_core.h"
 
 namespace voxeld::gpu {
@@ -25,9 +26,13 @@ EngineInfo InfoOf(int threads, std::string reason) {
 
 std::unique_ptr<Engine> CreateCpuEngine(const EngineOptions& options, std::string reason) {
   const int threads = ThreadCount(options);
+  std::unique_ptr<Executor> executor = MakeExecutor(threads);
+  if (options.abandoned != nullptr) {
+    executor = MakeAbandonableExecutor(std::move(executor), options.abandoned);
+  }
   return std::make_unique<CoreEngine<CpuCore>>(
       options, InfoOf(threads, std::move(reason)),
-      std::make_unique<CpuCore>(MakeExecutor(threads), options.part, options.index_bytes));
+      std::make_unique<CpuCore>(std::move(executor), options.part, options.index_bytes));
 }
 
 }  // namespace voxeld::gpu

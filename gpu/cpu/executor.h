@@ -11,7 +11,7 @@ namespace voxeld::gpu {
 class Executor {
  public:
   // One index of a loop; `worker`, 0 to concurrency() − 1, names who runs it: no two run under the
-  // same number at once. May throw for want of memory alone.
+  // same number at once. What it throws ends the loop.
   using Body = std::function<void(size_t index, int worker)>;
 
   virtual ~Executor() = default;

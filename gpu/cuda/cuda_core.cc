@@ -100,7 +100,7 @@ absl::StatusOr<FrameResult> CudaCore::SubmitFrame(const FrameRequest& request, F
   const absl::StatusOr<int64_t> slice = stopwatch_.Between(assembled, Mark::kPacked);
   if (!slice.ok()) return slice.status();
   result.singular_drawables = volume_.singular_drawables();
-  result.memory_bytes = device_->pool().held();
+  result.memory_bytes = device_->pool().held() + volume_.scene_bytes();
   result.assemble_ns = *assemble;
   result.slice_ns = *slice;
   result.copy_ns = std::max<int64_t>(0, clock.Now() - start - *assemble - *slice);

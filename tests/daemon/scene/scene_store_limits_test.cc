@@ -4,8 +4,11 @@
 
 #include <cmath>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "daemon/scene/scene_store.h"
+#include "gpu/derived_bytes.h"
 #include "tests/daemon/scene/store_fixture.h"
 
 namespace voxeld::daemon {
@@ -13,6 +16,7 @@ namespace {
 
 using testing::Begin;
 using testing::CheckIndices;
+using testing::Define;
 using testing::DeleteAllMine;
 using testing::DeleteId;
 using testing::Dots;
@@ -91,6 +95,72 @@ TEST(SceneStore, BytesAreCountedAndLimited) {
   EXPECT_EQ(f.Commit(Put("a", "big", Entity1(Dots(0, 1, 1200)))).refused_operations, 0u);
   f.Commit(DeleteAllMine());
   EXPECT_EQ(f.Tally(), OwnerTally());
+}
+
+// The object "many" draws 4^depth dots.
+void DefineMany(StoreFixture& f, int depth) {
+  std::string name = "dot";
+  f.Commit(Define(name, {{Dots(0, 1, 1), {}}}));
+  for (int i = 0; i < depth; ++i) {
+    const std::string next = i == depth - 1 ? "many" : "many" + std::to_string(i);
+    f.Commit(Define(next, std::vector<ObjectPart>(4, {InstanceRef{name}, {}})));
+    name = next;
+  }
+}
+
+constexpr uint64_t kOfADot =
+    kHeldBytesPerDrawable + gpu::kMostDrawableBytes + gpu::HeapBytes(3 * sizeof(int32_t));
+
+TEST(SceneStore, AnInstanceThatDerivesMoreThanThereIsRoomForIsRefused) {
+  StoreFixture f{Limits()};
+  DefineMany(f, 5);
+  const uint64_t needed = 2 * 1024 * kOfADot;  // on two engines
+  f.store.SetMemoryRoom({.bytes = needed, .engines = 2});
+  const CommitResult result = f.Commit(Put("a", "it", Entity1(InstanceRef{"many"})));
+  ASSERT_EQ(result.issues.size(), 1u);
+  EXPECT_EQ(result.issues[0].reason, Reason::kQuotaExceeded);
+  EXPECT_EQ(result.issues[0].layer, "a");
+  EXPECT_EQ(result.issues[0].id, "it");
+  EXPECT_THAT(result.issues[0].message, HasSubstr("what 2 engines would derive from it"));
+  EXPECT_THAT(result.issues[0].message,
+              HasSubstr("max_memory_bytes leaves " + std::to_string(needed)));
+  EXPECT_EQ(f.Scene(), "");
+  // The entity itself is held, too.
+  f.store.SetMemoryRoom({.bytes = needed + 4096, .engines = 2});
+  EXPECT_EQ(f.Commit(Put("a", "it", Entity1(InstanceRef{"many"}))).refused_operations, 0u);
+  EXPECT_EQ(f.Tally().derived, 1024 * kOfADot);
+  EXPECT_EQ(CheckIndices(*f.store.snapshot()), "");
+}
+
+TEST(SceneStore, AnObjectThatGrowsCountsForEachInstance) {
+  StoreFixture f{Limits()};
+  DefineMany(f, 2);
+  f.Commit(Put("a", "1", Entity1(InstanceRef{"many"})),
+           Put("a", "2", Entity1(InstanceRef{"many"})));
+  EXPECT_EQ(f.Tally().derived, 2 * 16 * kOfADot);
+  f.store.SetMemoryRoom({.bytes = 31 * kOfADot, .engines = 1});
+  const Operation twice = Define("dot", {{Dots(0, 1, 1), {}}, {Dots(0, 1, 1), {}}});
+  CommitResult result = f.Commit(twice);
+  ASSERT_EQ(result.issues.size(), 1u);
+  EXPECT_EQ(result.issues[0].reason, Reason::kQuotaExceeded);
+  EXPECT_THAT(result.issues[0].message, HasSubstr("max_memory_bytes"));
+  f.store.SetMemoryRoom({.bytes = 33 * kOfADot, .engines = 1});
+  EXPECT_EQ(f.Commit(twice).refused_operations, 0u);
+  EXPECT_EQ(f.Tally().derived, 2 * 32 * kOfADot);
+  EXPECT_EQ(CheckIndices(*f.store.snapshot()), "");
+}
+
+TEST(SceneStore, WithoutRoomWhatTakesNoMoreIsApplied) {
+  StoreFixture f{Limits()};
+  f.Commit(Put("a", "big", Entity1(Dots(0, 1, 1000))), Put("a", "small"));
+  f.store.SetMemoryRoom({.bytes = 0, .engines = 1});
+  EXPECT_EQ(f.Commit(Put("a", "new")).refused_operations, 1u);
+  EXPECT_EQ(f.Commit(Put("a", "big", Entity1(Dots(0, 1, 1000)))).refused_operations, 0u)
+      << "the same again";
+  EXPECT_EQ(f.Commit(DeleteId("a", "big"), Put("a", "new")).refused_operations, 0u)
+      << "what the commit itself made room for";
+  EXPECT_EQ(f.Scene(), "a: new small");
+  EXPECT_EQ(CheckIndices(*f.store.snapshot()), "");
 }
 
 TEST(SceneStore, CountsAgainstTheLimitsOfAnEntity) {

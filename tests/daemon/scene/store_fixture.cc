@@ -5,6 +5,8 @@
 #include <map>
 #include <set>
 
+#include "gpu/derived_bytes.h"
+
 namespace voxeld::daemon::testing {
 
 std::string CheckIndices(const Snapshot& snapshot) {
@@ -29,6 +31,24 @@ std::string CheckIndices(const Snapshot& snapshot) {
     return sum;
   };
 
+  const std::function<uint64_t(uint64_t, const Content&)> derived =
+      [&](uint64_t owner, const Content& content) -> uint64_t {
+    const auto of = [](const GeometryPtr& geometry) {
+      return kHeldBytesPerDrawable + gpu::MostDerivedBytes(geometry->record);
+    };
+    uint64_t sum = 0;
+    if (const auto* geometry = std::get_if<GeometryPtr>(&content)) return of(*geometry);
+    if (const auto* group = std::get_if<GroupPtr>(&content)) {
+      for (const GroupData::Part& part : (*group)->parts) sum += of(part.geometry);
+      return sum;
+    }
+    const Object* object = snapshot.FindObject({owner, std::get<InstanceRef>(content).object});
+    if (object == nullptr) return 0;  // told above
+    for (const ObjectPart& part : object->data->parts) sum += derived(owner, part.content);
+    if (sum != object->derived) wrong += "bytes derived from an object\n";
+    return sum;
+  };
+
   snapshot.layers.ForEach([&](const OwnedName& key, const LayerPtr& layer) {
     ++owners[key.owner].layers;
     owners[key.owner].bytes += sizeof(Layer) + key.name.size();
@@ -39,6 +59,7 @@ std::string CheckIndices(const Snapshot& snapshot) {
       owners[key.owner].bytes += entity->bytes;
       owners[key.owner].drawables +=
           std::max<uint64_t>(1, drawables(key.owner, entity->data.content));
+      owners[key.owner].derived += derived(key.owner, entity->data.content);
       if (const auto* instance = std::get_if<InstanceRef>(&entity->data.content)) {
         uses.insert({key.owner, instance->object, false, key.name, id});
       }
@@ -74,6 +95,7 @@ std::string CheckIndices(const Snapshot& snapshot) {
     total.drawables += tally.drawables;
     total.layers += tally.layers;
     total.bytes += tally.bytes;
+    total.derived += tally.derived;
   }
   if (total != snapshot.total) wrong += "total\n";
   if (entities != snapshot.entities) wrong += "entities\n";

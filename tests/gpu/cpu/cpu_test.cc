@@ -5,12 +5,15 @@
 #include <algorithm>
 #include <atomic>
 #include <fstream>
+#include <memory>
 #include <new>
+#include <stdexcept>
 #include <system_error>
 #include <thread>
 #include <vector>
 
 #include "gpu/call_queue.h"
+#include "gpu/cpu/abandonable_executor.h"
 #include "gpu/cpu/executor.h"
 #include "gpu/staging.h"
 
@@ -89,6 +92,25 @@ TEST(Executor, WhatABodyThrowsComesOutOnceNoneRuns) {
       }
       ExpectEachIndexOnce(*executor);
     }
+  }
+}
+
+TEST(AbandonableExecutor, RunsLoopsUntilTheyAreGivenUp) {
+  for (int threads : {1, 3}) {
+    const auto abandoned = std::make_shared<std::atomic<bool>>(false);
+    const std::unique_ptr<Executor> executor =
+        MakeAbandonableExecutor(MakeThreadExecutor(threads), abandoned);
+    EXPECT_EQ(executor->concurrency(), threads);
+    ExpectEachIndexOnce(*executor);
+    std::atomic<int> ran{0};
+    EXPECT_THROW(executor->For(1000, 1,
+                               [&](size_t, int) {
+                                 ++ran;
+                                 *abandoned = true;
+                               }),
+                 std::runtime_error);
+    EXPECT_LE(ran, threads) << "those that ran at once";
+    EXPECT_THROW(executor->For(1, 1, [&](size_t, int) { ++ran; }), std::runtime_error);
   }
 }
 

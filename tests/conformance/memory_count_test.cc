@@ -1,0 +1,171 @@
+// FrameResult::memory_bytes against the memory that the C library's allocator gave the process meanwhile.
+#include <gtest/gtest.h>
+#include <malloc.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iostream>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "gpu/derived_bytes.h"
+#include "tests/conformance/engine_driver.h"
+#include "tests/conformance/scene_generator.h"
+
+namespace voxeld::gpu::conformance {
+namespace {
+
+constexpr int kSize = 64;
+constexpr size_t kDrawables = 1000;
+
+uint64_t Allocated() {
+  const struct mallinfo2 heap = mallinfo2();
+  return uint64_t{heap.uordblks} + heap.hblkhd;
+}
+
+// Large blocks are aligned to large pages, and the allocator counts what it skips for that, which nobody ever touches: from here on
+// what is resident is looked at.
+constexpr double kLarge = 256 << 20;
+
+uint64_t Resident() {
+  std::ifstream file("/proc/self/statm");
+  uint64_t pages = 0, resident = 0;
+  file >> pages >> resident;
+  return resident * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
+}
+
+// Each of the scene's drawables many times.
+void Multiply(SceneModel& scene, SceneGenerator& chance) {
+  if (scene.drawables.empty()) return;
+  const std::vector<std::pair<uint64_t, DrawableRecord>> first(scene.drawables.begin(),
+                                                               scene.drawables.end());
+  uint64_t id = first.back().first;
+  while (scene.drawables.size() < kDrawables) {
+    for (const auto& [from, drawable] : first) {
+      DrawableRecord copy = drawable;
+      copy.id = ++id;
+      for (const int at : {3, 7, 11}) copy.transform.m[at] += chance.Real(-kSize, kSize);
+      scene.drawables.emplace(copy.id, copy);
+    }
+  }
+}
+
+class MemoryCount : public ::testing::Test {
+ protected:
+  MemoryCount() {
+    EngineOptions options;
+    options.kind = EngineKind::kCpu;
+    options.inline_execution = true;
+    options.threads = 1;
+    driver_.emplace(EngineCase{"cpu", [](EngineOptions o) { return CreateEngine(o); }}, options);
+  }
+
+  struct Growth {
+    double counted = 0, measured = 0;
+    double ratio() const { return counted / measured; }
+  };
+  // From an engine without a scene to one that has drawn it.
+  Growth Draw(const Target& target, const SceneModel& scene) {
+    EXPECT_TRUE(driver_->SetTarget(target).ok());
+    DeltaBuffer nothing;
+    nothing.Reset();
+    EXPECT_TRUE(driver_->Apply(nothing).ok());
+    const uint64_t counted = driver_->Frame()->memory_bytes;
+    DeltaBuffer delta;
+    delta.PutWhole(scene);
+    malloc_trim(0);
+    const uint64_t before = Allocated(), resident = Resident();
+    EXPECT_TRUE(driver_->Apply(delta).ok());
+    const absl::StatusOr<FrameResult> frame = driver_->Frame();
+    EXPECT_TRUE(frame.ok()) << frame.status();
+    double measured = static_cast<double>(Allocated()) - static_cast<double>(before);
+    if (measured >= kLarge) {
+      malloc_trim(0);
+      measured = static_cast<double>(Resident()) - static_cast<double>(resident);
+    }
+    return {static_cast<double>(frame->memory_bytes) - static_cast<double>(counted), measured};
+  }
+
+  void DrawRandomScenes(uint64_t count);
+
+  std::optional<EngineDriver> driver_;
+};
+
+void MemoryCount::DrawRandomScenes(uint64_t count) {
+  const uint64_t seed = SeedOr(1);
+  std::vector<double> ratios;
+  for (uint64_t i = 0; i < count; ++i) {
+    SceneGenerator chance(seed + i);
+    const Target target = chance.RandomTarget();
+    SceneModel scene = chance.RandomScene(kSize);
+    Multiply(scene, chance);
+    if (scene.drawables.empty()) continue;
+    const Growth growth = Draw(target, scene);
+    ratios.push_back(growth.ratio());
+    EXPECT_GE(growth.ratio(), 0.8)
+        << "seed " << seed + i << ": " << growth.counted << " of " << growth.measured;
+    EXPECT_LE(growth.ratio(), 1.25)
+        << "seed " << seed + i << ": " << growth.counted << " of " << growth.measured;
+  }
+  std::sort(ratios.begin(), ratios.end());
+  ASSERT_GT(ratios.size(), count / 2);
+  std::cout << ratios.size() << " scenes, counted to measured growth " << ratios.front() << " to "
+            << ratios.back() << ", median " << ratios[ratios.size() / 2] << "\n";
+}
+
+TEST_F(MemoryCount, ScenesAreCountedAsTheyGrow) { DrawRandomScenes(25); }
+
+TEST_F(MemoryCount, ManyScenesAreCountedAsTheyGrow) { DrawRandomScenes(200); }
+
+// Many drawables of one small geometry, as instances are.
+TEST_F(MemoryCount, InstancesTakeNoMoreThanWhatIsExpectedOfThem) {
+  SceneGenerator chance(SeedOr(1));
+  const Target target = chance.RandomTarget();
+  SceneModel scene;
+  scene.layers[1].id = 1;
+  ModelGeometry& dot = scene.geometries[1];
+  dot.record.id = 1;
+  dot.record.vertex_count = 1;
+  dot.positions = {0, 0, 0};
+  constexpr size_t kDots = 100'000;
+  for (uint64_t id = 1; id <= kDots; ++id) {
+    DrawableRecord& drawable = scene.drawables[id];
+    drawable.id = id;
+    drawable.geometry = drawable.layer = 1;
+    for (const int at : {3, 7, 11}) drawable.transform.m[at] = chance.Real(0, kSize);
+  }
+  const Growth growth = Draw(target, scene);
+  EXPECT_GE(growth.ratio(), 0.8);
+  EXPECT_LE(growth.ratio(), 1.25);
+  EXPECT_LE(growth.measured, static_cast<double>(kDots * MostDerivedBytes(dot.record)));
+  std::cout << growth.measured / kDots << " bytes a drawable, counted as " << growth.counted / kDots
+            << "\n";
+}
+
+TEST_F(MemoryCount, WhatGoesIsGivenBack) {
+  SceneGenerator chance(SeedOr(1));
+  const Target target = chance.RandomTarget();
+  ASSERT_TRUE(driver_->SetTarget(target).ok());
+  ASSERT_TRUE(driver_->Frame().ok());
+  const uint64_t before = Allocated();
+  {
+    SceneModel scene = chance.RandomScene(kSize);
+    Multiply(scene, chance);
+    DeltaBuffer delta;
+    delta.PutWhole(scene);
+    ASSERT_TRUE(driver_->Apply(delta).ok());
+    ASSERT_TRUE(driver_->Frame().ok());
+    DeltaBuffer drops;
+    for (const auto& [id, drawable] : scene.drawables) drops.Drop(Op::kDropDrawable, id);
+    for (const auto& [id, geometry] : scene.geometries) drops.Drop(Op::kDropGeometry, id);
+    for (const auto& [id, layer] : scene.layers) drops.Drop(Op::kDropLayer, id);
+    ASSERT_TRUE(driver_->Apply(drops).ok());
+    ASSERT_TRUE(driver_->Frame().ok());
+  }
+  EXPECT_LT(Allocated(), before + (3 << 20));
+}
+
+}  // namespace
+}  // namespace voxeld::gpu::conformance
