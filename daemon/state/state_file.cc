@@ -87,9 +87,16 @@ absl::StatusOr<std::unique_ptr<StateFile>> StateFile::Open(StateFileOptions opti
 absl::Status StateFile::OpenDatabase() {
   if (options_.vfs.empty()) {
     // SQLite would make it for everybody to read; what stands beside it takes its mode.
-    const int made = open(options_.path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
-    if (made < 0) return absl::ErrnoToStatus(errno, absl::StrCat("the state file ", options_.path));
-    close(made);
+    constexpr int kFlags = O_RDWR | O_CLOEXEC | O_NOFOLLOW;
+    int file = open(options_.path.c_str(), kFlags | O_CREAT | O_EXCL, 0600);
+    const bool was_there = file < 0 && errno == EEXIST;
+    if (was_there) file = open(options_.path.c_str(), kFlags);
+    if (file < 0) return absl::ErrnoToStatus(errno, absl::StrCat("the state file ", options_.path));
+    struct stat info {};
+    const bool is_empty = was_there && fstat(file, &info) == 0 && info.st_size == 0;
+    close(file);
+    // SQLite would take it for a new one, and nobody would know that something was lost.
+    if (is_empty) return absl::DataLossError("it is empty, as if it had been truncated");
   }
   int code = sqlite3_open_v2(
       options_.path.c_str(), &database_,

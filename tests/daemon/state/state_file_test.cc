@@ -117,6 +117,15 @@ TEST_F(StateFileTest, WhatIsNoDatabaseIsPutAside) {
   EXPECT_TRUE(Put(**file, {PutOf(kEntity, "x")}).ok());
 }
 
+TEST_F(StateFileTest, AnEmptyFileIsPutAside) {
+  std::ofstream(path_).close();
+  const auto file = Open();
+  ASSERT_TRUE(file.ok()) << file.status();
+  EXPECT_THAT((*file)->quarantined(), HasSubstr(path_ + ".damaged-1234: it is empty"));
+  EXPECT_TRUE(std::filesystem::exists(path_ + ".damaged-1234"));
+  EXPECT_GT(std::filesystem::file_size(path_), 0u) << "a new one has taken its place";
+}
+
 TEST_F(StateFileTest, TriggersAndTablesOfOthersHaveNoSay) {
   for (const char* sql :
        {"CREATE TRIGGER t AFTER INSERT ON rows BEGIN DELETE FROM rows; END", "CREATE TABLE more(a)",
