@@ -14,7 +14,7 @@ namespace voxeld {
 #define VOXELD_LARGE_FRAMES
 #endif
 #endif
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(NDEBUG)
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(__OPTIMIZE__)
 #define VOXELD_LARGE_FRAMES
 #endif
 

@@ -3,9 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <poll.h>
 #include <sys/resource.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cmath>
@@ -18,7 +16,6 @@
 #include "absl/strings/str_cat.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
-#include "tools/voxelctl/import/contained.h"
 #include "tools/voxelctl/import/importer.h"
 
 namespace voxeld::voxelctl {
@@ -95,70 +92,6 @@ TEST(MoreMeshes, DamagedOnesEndWell) {
       }
     }
   }
-}
-
-TEST(Contained, ModelsComeBackAsTheyWere) {
-  Model model;
-  model.format = "kind";
-  model.note = "a note";
-  model.up = Up::kX;
-  model.parts.push_back({.kind = Kind::kSegments,
-                         .positions = {{1, 2, 3}, {4, 5, 6}},
-                         .normals = {{0, 0, 1}, {0, 1, 0}},
-                         .colors = {{1, 2, 3}, {4, 5, 6}},
-                         .indices = {0, 1},
-                         .thickness = 0.5});
-  const auto back = ReadContained({.path = "p"}, [&model] { return model; });
-  ASSERT_THAT(back, IsOk());
-  EXPECT_EQ(back->path, "p");
-  EXPECT_EQ(back->format, "kind");
-  EXPECT_EQ(back->note, "a note");
-  EXPECT_EQ(back->up, Up::kX);
-  ASSERT_EQ(back->parts.size(), 1u);
-  EXPECT_EQ(back->parts[0].kind, Kind::kSegments);
-  EXPECT_EQ(back->parts[0].positions, model.parts[0].positions);
-  EXPECT_EQ(back->parts[0].normals, model.parts[0].normals);
-  EXPECT_EQ(back->parts[0].colors, model.parts[0].colors);
-  EXPECT_EQ(back->parts[0].indices, model.parts[0].indices);
-  EXPECT_EQ(back->parts[0].thickness, 0.5);
-}
-
-TEST(Contained, WhatGoesWrongIsSaid) {
-  const auto error = [](const std::function<absl::StatusOr<Model>()>& read) {
-    return std::string(ReadContained({.path = "p"}, read).status().message());
-  };
-  EXPECT_EQ(error([] { return absl::InvalidArgumentError("p: so it is"); }), "p: so it is");
-  EXPECT_THAT(error([]() -> absl::StatusOr<Model> {
-                ::raise(SIGSEGV);
-                return Model();
-              }),
-              HasSubstr("p: the library that reads it crashed"));
-  EXPECT_THAT(error([]() -> absl::StatusOr<Model> { std::abort(); }), HasSubstr("crashed"));
-}
-
-TEST(Contained, EndsWithWhoAsked) {
-  int line[2];  // open as long as the process that reads, which alone keeps its other end
-  ASSERT_EQ(::pipe(line), 0);
-  const pid_t asks = ::fork();
-  if (asks == 0) {
-    ::close(line[0]);
-    (void)ReadContained({.path = "p"}, [&line]() -> absl::StatusOr<Model> {
-      const pid_t self = ::getpid();
-      if (::write(line[1], &self, sizeof(self)) != sizeof(self)) std::abort();
-      while (true) ::pause();
-    });
-    ::_exit(0);
-  }
-  ::close(line[1]);
-  pid_t reads = 0;
-  ASSERT_EQ(::read(line[0], &reads, sizeof(reads)), ssize_t{sizeof(reads)});
-  ASSERT_EQ(::kill(asks, SIGKILL), 0);
-  ASSERT_EQ(::waitpid(asks, nullptr, 0), asks);
-  pollfd ended = {.fd = line[0], .events = POLLIN, .revents = 0};
-  const bool has = ::poll(&ended, 1, 30'000) == 1;
-  EXPECT_TRUE(has) << "it runs on";
-  if (!has) ::kill(reads, SIGKILL);
-  ::close(line[0]);
 }
 
 // ----------------------------------------------------------------------------------- what moves

@@ -12,11 +12,12 @@
 namespace voxeld::voxelctl {
 namespace {
 
-ImportOptions OptionsOf(const PlayOptions& options) {
+ImportOptions OptionsOf(const PlayOptions& options, Interrupt* interrupt) {
   return {.globe = options.globe,
           .raw = options.raw,
           .style = options.style,
-          .other_files = options.other_files};
+          .other_files = options.other_files,
+          .interrupt = interrupt};
 }
 
 }  // namespace
@@ -30,7 +31,7 @@ absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interru
     console.ProgressBar("reading",
                         static_cast<double>(i) / static_cast<double>(options.files.size()),
                         EscapeForTerminal(options.files[i]));
-    absl::StatusOr<Model> model = ImportFile(options.files[i], OptionsOf(options));
+    absl::StatusOr<Model> model = ImportFile(options.files[i], OptionsOf(options, &interrupt));
     if (model.ok()) {
       if (!model->note.empty()) console.Say(EscapeForTerminal(model->note));
       models.push_back(*std::move(model));
@@ -62,10 +63,10 @@ absl::StatusOr<std::unique_ptr<FrameSource>> OpenFrames(const PlayOptions& optio
         "--loop is for sequences ('frame_####.obj', or several files with --sequence) and "
         "--animate");
   }
-  if (!one) return std::make_unique<FileFrames>(options.files, OptionsOf(options));
+  if (!one) return std::make_unique<FileFrames>(options.files, OptionsOf(options, nullptr));
   absl::StatusOr<std::vector<std::string>> files = FindSequence(options.files[0]);
   if (!files.ok()) return files.status();
-  return std::make_unique<FileFrames>(*std::move(files), OptionsOf(options));
+  return std::make_unique<FileFrames>(*std::move(files), OptionsOf(options, nullptr));
 }
 
 }  // namespace voxeld::voxelctl

@@ -11,14 +11,19 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <filesystem>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
-#include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
+#include "daemon/address/descriptor.h"
+#include "tools/voxelctl/import/sandbox.h"
 
 // Sanitizers reserve more address space than the limit.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -32,9 +37,10 @@
 namespace voxeld::voxelctl {
 namespace {
 
-[[maybe_unused]] constexpr rlim_t kMostMemory = rlim_t{4} << 30;
-constexpr rlim_t kMostSeconds = 120;
+[[maybe_unused]] constexpr rlim_t kMostMemory = rlim_t{4} << 30, kOfFile = 4;
+constexpr rlim_t kMostSeconds = 120, kMostDescriptors = 64;
 constexpr unsigned kMostWaiting = 600;  // s
+constexpr int kNoSandbox = 2;           // exit status
 
 class Writer {
  public:
@@ -90,18 +96,43 @@ class Reader {
   bool ok_ = true;
 };
 
+void WriteVolume(const SampledVolume& volume, Writer& writer) {
+  const uint8_t has_window = volume.window.has_value();
+  writer.Bytes(&volume.size, sizeof(volume.size));
+  writer.Bytes(&volume.corners, sizeof(volume.corners));
+  writer.Bytes(&has_window, 1);
+  if (has_window) writer.Bytes(&*volume.window, sizeof(*volume.window));
+  writer.All(volume.samples);
+  writer.All(volume.colors);
+}
+
+SampledVolume ReadVolume(Reader& reader) {
+  SampledVolume volume;
+  uint8_t has_window = 0;
+  reader.Bytes(&volume.size, sizeof(volume.size));
+  reader.Bytes(&volume.corners, sizeof(volume.corners));
+  reader.Bytes(&has_window, 1);
+  if (has_window != 0) reader.Bytes(&volume.window.emplace(), sizeof(*volume.window));
+  reader.All(&volume.samples);
+  reader.All(&volume.colors);
+  return volume;
+}
+
 bool WriteModel(const absl::StatusOr<Model>& model, int descriptor) {
   Writer writer(descriptor);
-  const uint8_t good = model.ok();
-  writer.Bytes(&good, 1);
-  if (!good) {
+  const int code = model.status().raw_code();
+  writer.Bytes(&code, sizeof(code));
+  if (!model.ok()) {
     writer.All(std::string(model.status().message()));
     return writer.ok();
   }
-  const uint64_t parts = model->parts.size();
-  writer.Bytes(&model->up, sizeof(model->up));
+  const uint64_t parts = model->parts.size(), volumes = model->volumes.size();
+  writer.All(model->path);
   writer.All(model->format);
   writer.All(model->note);
+  writer.Bytes(&model->up, sizeof(model->up));
+  writer.Bytes(&model->globe, sizeof(model->globe));
+  writer.Bytes(&model->lit_already, sizeof(model->lit_already));
   writer.Bytes(&parts, sizeof(parts));
   for (const Part& part : model->parts) {
     writer.Bytes(&part.kind, sizeof(part.kind));
@@ -112,6 +143,8 @@ bool WriteModel(const absl::StatusOr<Model>& model, int descriptor) {
     writer.All(part.colors);
     writer.All(part.indices);
   }
+  writer.Bytes(&volumes, sizeof(volumes));
+  for (const SampledVolume& volume : model->volumes) WriteVolume(volume, writer);
   return writer.ok();
 }
 
@@ -120,25 +153,37 @@ absl::Status Spoilt(const SourceFile& file, absl::string_view how) {
                    "the file is damaged or not what its name says");
 }
 
+// The writer may be in a stranger's hands, so enumerations are checked; ImportFile checks the rest.
 absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_t size) {
   Reader reader(bytes, size);
-  uint8_t good = 0;
-  reader.Bytes(&good, 1);
-  if (!good) {
+  int code = 0;
+  reader.Bytes(&code, sizeof(code));
+  if (code != 0) {
     std::string message;
     reader.All(&message);
-    return reader.ok() ? absl::InvalidArgumentError(message) : Spoilt(file, "gave up");
+    if (!reader.ok()) return Spoilt(file, "gave up");
+    return absl::Status(static_cast<absl::StatusCode>(code), message);
   }
   Model model;
-  model.path = file.path;
-  uint64_t parts = 0;
-  reader.Bytes(&model.up, sizeof(model.up));
+  uint64_t parts = 0, volumes = 0;
+  uint8_t up = 0, globe = 0, lit_already = 0;
+  reader.All(&model.path);
   reader.All(&model.format);
   reader.All(&model.note);
+  reader.Bytes(&up, 1);
+  reader.Bytes(&globe, 1);
+  reader.Bytes(&lit_already, 1);
+  if (up > static_cast<uint8_t>(Up::kZ)) return Spoilt(file, "gave up halfway");
+  model.up = static_cast<Up>(up);
+  model.globe = globe != 0;
+  model.lit_already = lit_already != 0;
   reader.Bytes(&parts, sizeof(parts));
   for (uint64_t i = 0; i < parts && reader.ok(); ++i) {
     Part part;
-    reader.Bytes(&part.kind, sizeof(part.kind));
+    uint8_t kind = 0;
+    reader.Bytes(&kind, 1);
+    if (kind > static_cast<uint8_t>(Kind::kTriangles)) return Spoilt(file, "gave up halfway");
+    part.kind = static_cast<Kind>(kind);
     reader.Bytes(&part.thickness, sizeof(part.thickness));
     reader.Bytes(&part.level, sizeof(part.level));
     reader.All(&part.positions);
@@ -147,11 +192,38 @@ absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_
     reader.All(&part.indices);
     model.parts.push_back(std::move(part));
   }
+  reader.Bytes(&volumes, sizeof(volumes));
+  for (uint64_t i = 0; i < volumes && reader.ok(); ++i) model.volumes.push_back(ReadVolume(reader));
   if (!reader.ok()) return Spoilt(file, "gave up halfway");
   return model;
 }
 
-[[noreturn]] void RunChild(const std::function<bool(int)>& write, int descriptor, pid_t parent) {
+// The folder below which the reader may open files: that of the file, or the one that is read.
+std::string Readable(const SourceFile& file) {
+  if (file.other_files == OtherFiles::kNone) return "";
+  if (file.other_files == OtherFiles::kAny) return "/";
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file.path, ignored)) return file.path;
+  const std::string folder = std::filesystem::path(file.path).parent_path().string();
+  return folder.empty() ? "." : folder;
+}
+
+void Limit(int resource, rlim_t most) {
+  const rlimit limit = {most, most};
+  ::setrlimit(static_cast<__rlimit_resource>(resource), &limit);
+}
+
+// Bytes of address space that this process has.
+rlim_t AddressSpace() {
+  const daemon::Descriptor file(::open("/proc/self/statm", O_RDONLY | O_CLOEXEC));
+  char text[64] = {};
+  if (::read(file.get(), text, sizeof(text) - 1) <= 0) return 0;
+  return std::strtoull(text, nullptr, 10) * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE));
+}
+
+[[noreturn]] void RunChild(const SourceFile& file,
+                           const std::function<absl::StatusOr<Model>()>& read, int descriptor,
+                           pid_t parent) {
   // Ends with the thread that waits for it, which may have ended already.
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(1);
@@ -160,45 +232,71 @@ absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_
   ::sigprocmask(SIG_SETMASK, &none, nullptr);
   for (const int signal : {SIGINT, SIGTERM, SIGALRM, SIGABRT, SIGSEGV, SIGBUS, SIGFPE})
     ::signal(signal, SIG_DFL);
-  const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
-  // What the library says is not for people, and what this process had yet to say is not said twice.
-  for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) {
-    if (nowhere >= 0) ::dup2(nowhere, stream);
-  }
-  const rlimit core = {0, 0}, seconds = {kMostSeconds, kMostSeconds};
-  ::setrlimit(RLIMIT_CORE, &core);
-  ::setrlimit(RLIMIT_CPU, &seconds);
-  ::alarm(kMostWaiting);
+  // The connections of this process are not for the reader. What a library says is not for people.
+  constexpr int kModel = 3;
+  const int nowhere = ::open("/dev/null", O_RDWR | O_CLOEXEC);
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, stream);
+  if (descriptor != kModel) ::dup2(descriptor, kModel);
+  ::close_range(kModel + 1, ~0U, 0);
+  Limit(RLIMIT_CORE, 0);
+  Limit(RLIMIT_CPU, kMostSeconds);
+  Limit(RLIMIT_NOFILE, kMostDescriptors);
 #if !defined(VOXELD_SHADOW_MEMORY)
-  const rlimit memory = {kMostMemory, kMostMemory};
-  ::setrlimit(RLIMIT_AS, &memory);
+  Limit(RLIMIT_AS, AddressSpace() + kMostMemory + kOfFile * file.bytes.size());
 #endif
+  ::alarm(kMostWaiting);
+  // For a file of the user's own the sandbox is a second line: without Landlock the first remains.
+  const bool is_confined = Sandbox::Get().Enter(Readable(file)).ok();
+  if (!is_confined && file.other_files == OtherFiles::kNone) ::_exit(kNoSandbox);
   bool good = false;
   try {
-    good = write(descriptor);
+    good = WriteModel(read(), kModel);
   } catch (const std::exception&) {
   }
   ::_exit(good ? 0 : 1);
 }
 
-// What `write` puts into the descriptor that it is given, as `take` reads it.
-template <typename Taken>
-absl::StatusOr<Taken> Run(const SourceFile& file, const std::function<bool(int)>& write,
-                          const std::function<absl::StatusOr<Taken>(const char*, size_t)>& take) {
-  const int descriptor = ::memfd_create("voxelctl-model", MFD_CLOEXEC);
-  if (descriptor < 0) {
-    return absl::ResourceExhaustedError(absl::StrCat(file.path, ": ", std::strerror(errno)));
+absl::Status NoSandbox(const SourceFile& file, const absl::Status& why) {
+  return absl::FailedPreconditionError(
+      absl::StrCat(EscapeForTerminal(file.path), ": is not read, since ", why.message(),
+                   "; Linux 5.13 or later with Landlock and seccomp is expected"));
+}
+
+// Waits for the end of `child`, which `interrupt` brings about.
+int Await(pid_t child, Interrupt* interrupt) {
+  const int listener =
+      interrupt == nullptr ? 0 : interrupt->AddListener([child] { ::kill(child, SIGKILL); });
+  siginfo_t info;
+  while (::waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOWAIT) < 0 &&
+         errno == EINTR) {
   }
-  const absl::Cleanup close = [descriptor] { ::close(descriptor); };
-  const pid_t parent = ::getpid();
-  const pid_t child = ::fork();
-  if (child < 0) {
-    return absl::ResourceExhaustedError(absl::StrCat(file.path, ": ", std::strerror(errno)));
-  }
-  if (child == 0) RunChild(write, descriptor, parent);
+  // Its number is its own until it has been waited for.
+  if (interrupt != nullptr) interrupt->RemoveListener(listener);
   int state = 0;
   while (::waitpid(child, &state, 0) < 0 && errno == EINTR) {
   }
+  return state;
+}
+
+}  // namespace
+
+absl::StatusOr<Model> ReadContained(const SourceFile& file,
+                                    const std::function<absl::StatusOr<Model>()>& read,
+                                    Interrupt* interrupt) {
+  const absl::Status landlock = Sandbox::Get().CheckLandlock();
+  if (file.other_files == OtherFiles::kNone && !landlock.ok()) return NoSandbox(file, landlock);
+  const auto failed = [&file] {
+    return absl::ResourceExhaustedError(
+        absl::StrCat(EscapeForTerminal(file.path), ": ", std::strerror(errno)));
+  };
+  const daemon::Descriptor descriptor(::memfd_create("voxelctl-model", MFD_CLOEXEC));
+  if (!descriptor.ok()) return failed();
+  const pid_t parent = ::getpid();
+  const pid_t child = ::fork();
+  if (child < 0) return failed();
+  if (child == 0) RunChild(file, read, descriptor.get(), parent);
+  const int state = Await(child, interrupt);
+  if (interrupt != nullptr && interrupt->requested()) return absl::CancelledError("interrupted");
   if (WIFSIGNALED(state)) {
     const int signal = WTERMSIG(state);
     if (signal == SIGINT || signal == SIGTERM) return absl::CancelledError("interrupted");
@@ -206,49 +304,19 @@ absl::StatusOr<Taken> Run(const SourceFile& file, const std::function<bool(int)>
       return Spoilt(file, absl::StrCat("did not end within ", kMostSeconds, " s of the processor"));
     return Spoilt(file, absl::StrCat("crashed (", ::strsignal(signal), ")"));
   }
-  if (WEXITSTATUS(state) != 0) return Spoilt(file, "wanted more than 4 GiB of memory, or gave up");
-  const off_t size = ::lseek(descriptor, 0, SEEK_END);
-  if (size <= 0) return Spoilt(file, "gave up");
-  void* bytes = ::mmap(nullptr, static_cast<size_t>(size), PROT_READ, MAP_PRIVATE, descriptor, 0);
-  if (bytes == MAP_FAILED) {
-    return absl::ResourceExhaustedError(absl::StrCat(file.path, ": ", std::strerror(errno)));
+  if (WEXITSTATUS(state) == kNoSandbox) {
+    return NoSandbox(file, absl::UnavailableError("its reader could not be confined"));
   }
-  absl::StatusOr<Taken> taken = take(static_cast<const char*>(bytes), static_cast<size_t>(size));
+  if (WEXITSTATUS(state) != 0) return Spoilt(file, "wanted more than 4 GiB of memory, or gave up");
+  const off_t size = ::lseek(descriptor.get(), 0, SEEK_END);
+  if (size <= 0) return Spoilt(file, "gave up");
+  void* bytes =
+      ::mmap(nullptr, static_cast<size_t>(size), PROT_READ, MAP_PRIVATE, descriptor.get(), 0);
+  if (bytes == MAP_FAILED) return failed();
+  absl::StatusOr<Model> model =
+      ReadModel(file, static_cast<const char*>(bytes), static_cast<size_t>(size));
   ::munmap(bytes, static_cast<size_t>(size));
-  return taken;
-}
-
-}  // namespace
-
-absl::StatusOr<Model> ReadContained(const SourceFile& file,
-                                    const std::function<absl::StatusOr<Model>()>& read) {
-  return Run<Model>(
-      file, [&read](int descriptor) { return WriteModel(read(), descriptor); },
-      [&file](const char* bytes, size_t size) { return ReadModel(file, bytes, size); });
-}
-
-absl::StatusOr<std::string> ReadBytesContained(
-    const SourceFile& file, const std::function<absl::StatusOr<std::string>()>& read) {
-  return Run<std::string>(
-      file,
-      [&read](int descriptor) {
-        const absl::StatusOr<std::string> all = read();
-        Writer writer(descriptor);
-        const uint8_t good = all.ok();
-        writer.Bytes(&good, 1);
-        writer.All(good ? *all : std::string(all.status().message()));
-        return writer.ok();
-      },
-      [&file](const char* bytes, size_t size) -> absl::StatusOr<std::string> {
-        Reader reader(bytes, size);
-        uint8_t good = 0;
-        std::string all;
-        reader.Bytes(&good, 1);
-        reader.All(&all);
-        if (!reader.ok()) return Spoilt(file, "gave up");
-        if (!good) return absl::InvalidArgumentError(all);
-        return all;
-      });
+  return model;
 }
 
 }  // namespace voxeld::voxelctl

@@ -1,23 +1,22 @@
-// Reading in a process of its own what a library may stumble over.
+// Reads files in a process of its own, which a damaged or hostile file may crash, slow down or take over.
 #pragma once
 
 #include <functional>
-#include <string>
 
 #include "absl/status/statusor.h"
 #include "tools/voxelctl/import/model.h"
 #include "tools/voxelctl/import/source_file.h"
+#include "tools/voxelctl/process/interrupt.h"
 
 namespace voxeld::voxelctl {
 
-// What `read` returns (parts, format, note and up; no volumes), from a copy of this process with 4 GiB of memory, two minutes of the
-// processor and ten in all: if it crashes, runs away or takes more, that is InvalidArgument, and nothing of it is left here. It ends
-// with the process that asked, however that ends.
+// Returns what `read` returns in a copy of this process that has limits and a sandbox (sandbox.h): 4 GiB of memory beside this
+// process's own and four times the file, 120 s of processor time, 10 minutes, 64 descriptors; of files it can open those that
+// file.other_files allows. The copy ends with this process.
+// Errors: those of `read`; InvalidArgument if it crashed or went beyond a limit; Cancelled if `interrupt` (may be null) was requested;
+// FailedPrecondition if file.other_files is kNone, as for a stranger's file, and this system has no Landlock.
 absl::StatusOr<Model> ReadContained(const SourceFile& file,
-                                    const std::function<absl::StatusOr<Model>()>& read);
-
-// The same for bytes.
-absl::StatusOr<std::string> ReadBytesContained(
-    const SourceFile& file, const std::function<absl::StatusOr<std::string>()>& read);
+                                    const std::function<absl::StatusOr<Model>()>& read,
+                                    Interrupt* interrupt = nullptr);
 
 }  // namespace voxeld::voxelctl

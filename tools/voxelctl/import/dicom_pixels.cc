@@ -17,7 +17,6 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
-#include "tools/voxelctl/import/contained.h"
 #include "tools/voxelctl/import/volume_samples.h"
 
 namespace voxeld::voxelctl {
@@ -215,8 +214,7 @@ absl::Status Decode(const SourceFile& file, const DicomFacts& facts, SampledVolu
   absl::string_view bytes = whole.substr(facts.compressed ? 0 : facts.pixels[0].first);
   if (facts.compressed) {
     const uint64_t wanted = pixels * facts.samples_per_pixel * SampleBytes(code.type);
-    absl::StatusOr<std::string> out =
-        ReadBytesContained(file, [&] { return Decompress(file, facts, wanted); });
+    absl::StatusOr<std::string> out = Decompress(file, facts, wanted);
     if (!out.ok()) return out.status();
     decoded = *std::move(out);
     bytes = decoded;

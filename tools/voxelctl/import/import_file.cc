@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "absl/strings/str_cat.h"
+#include "tools/voxelctl/import/contained.h"
 #include "tools/voxelctl/import/geojson.h"
 #include "tools/voxelctl/import/importer.h"
 #include "tools/voxelctl/import/json_text.h"
@@ -114,7 +115,8 @@ absl::StatusOr<Model> ImportFile(const std::string& path, const ImportOptions& o
                                                               .other_files = options.other_files}
                                                  : ReadSourceFile(path, options.other_files);
   if (!file.ok()) return file.status();
-  absl::StatusOr<Model> model = folder ? ReadFolder(path) : Read(*file, options);
+  absl::StatusOr<Model> model = ReadContained(
+      *file, [&] { return folder ? ReadFolder(path) : Read(*file, options); }, options.interrupt);
   if (!model.ok()) return model;
   const absl::Status status = CheckModel(*file, *model);
   if (!status.ok()) return status;

@@ -1,11 +1,14 @@
 #include "tools/voxelctl/import/mesh_beginning.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
+#include "tools/voxelctl/import/nesting.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -19,6 +22,21 @@ struct Beginning {
   absl::string_view within;                 // this within the first 4096 bytes
   absl::string_view expected;
 };
+
+// Libraries recurse on what is nested. People and programs nest some ten deep.
+constexpr int kMostNesting = 200;
+
+int NestingOf(const SourceFile& file) {
+  const absl::string_view text = file.bytes;
+  if (file.extension == "dae") return ElementDepth(text);
+  if (file.extension == "ifc") return BracketDepth(text, '\'');
+  if (file.extension == "bvh" || absl::StartsWith(text, ";")) return BracketDepth(text, '"');
+  // Of formats that are not known here.
+  if (text.substr(0, kHead).find('\0') != absl::string_view::npos) return 0;
+  return std::max(
+      absl::StartsWith(absl::StripLeadingAsciiWhitespace(text), "<") ? ElementDepth(text) : 0,
+      BracketDepth(text, '"'));
+}
 
 }  // namespace
 
@@ -44,6 +62,10 @@ absl::Status CheckMeshBeginning(const SourceFile& file) {
     for (const absl::string_view front : b.at_front) good |= absl::StartsWith(head, front);
     if (!good)
       return FileError(file, absl::StrCat("is ", DescribeContents(file.bytes)), b.expected);
+  }
+  if (const int depth = NestingOf(file); depth > kMostNesting) {
+    return FileError(file, absl::StrCat("is nested ", depth, " levels deep"),
+                     absl::StrCat("at most ", kMostNesting, " are read"));
   }
   return absl::OkStatus();
 }

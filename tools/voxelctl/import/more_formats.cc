@@ -6,7 +6,6 @@
 #include "absl/strings/str_cat.h"
 #include "common/text/printable.h"
 #include "tools/voxelctl/import/assimp_scene.h"
-#include "tools/voxelctl/import/contained.h"
 #include "tools/voxelctl/import/dicom_check.h"
 #include "tools/voxelctl/import/dicom_volume.h"
 #include "tools/voxelctl/import/las_points.h"
@@ -53,7 +52,7 @@ absl::StatusOr<Model> ReadMoreFormats(const SourceFile& file, const ImportOption
   if (extension == "svg") return ReadSvgDrawing(file);
   // Slices often have no extension, or what looks like one.
   if (extension == "dcm" || LooksLikeDicom(file)) return ReadDicomVolume(file);
-  if (AssimpReads(extension)) return ReadContained(file, [&file] { return ReadMesh(file); });
+  if (AssimpReads(extension)) return ReadMesh(file);
   return FileError(
       file,
       extension.empty()

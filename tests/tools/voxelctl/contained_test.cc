@@ -1,0 +1,249 @@
+// Reading in a process of its own: what comes back, and what the reader cannot do.
+#include "tools/voxelctl/import/contained.h"
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <seccomp.h>
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <functional>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "tests/tools/voxelctl/status_matchers.h"
+#include "tests/tools/voxelctl/temp_folder.h"
+#include "tools/voxelctl/import/sandbox.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST(Contained, ModelsComeBackAsTheyWere) {
+  Model model;
+  model.format = "kind";
+  model.note = "a note";
+  model.up = Up::kX;
+  model.parts.push_back({.kind = Kind::kSegments,
+                         .positions = {{1, 2, 3}, {4, 5, 6}},
+                         .normals = {{0, 0, 1}, {0, 1, 0}},
+                         .colors = {{1, 2, 3}, {4, 5, 6}},
+                         .indices = {0, 1},
+                         .thickness = 0.5});
+  model.path = "p";
+  model.lit_already = true;
+  SampledVolume& numbers = model.volumes.emplace_back();
+  numbers.size = {1, 1, 2};
+  numbers.samples = {3, 4};
+  numbers.corners[7] = {7, 8, 9};
+  SampledVolume& colors = model.volumes.emplace_back();
+  colors.size = {1, 1, 1};
+  colors.samples = {1};
+  colors.colors = {{1, 2, 3}};
+  colors.window = {5, 6};
+  const auto back = ReadContained({.path = "p"}, [&model] { return model; });
+  ASSERT_THAT(back, IsOk());
+  EXPECT_EQ(back->path, "p");
+  EXPECT_EQ(back->format, "kind");
+  EXPECT_EQ(back->note, "a note");
+  EXPECT_EQ(back->up, Up::kX);
+  ASSERT_EQ(back->parts.size(), 1u);
+  EXPECT_EQ(back->parts[0].kind, Kind::kSegments);
+  EXPECT_EQ(back->parts[0].positions, model.parts[0].positions);
+  EXPECT_EQ(back->parts[0].normals, model.parts[0].normals);
+  EXPECT_EQ(back->parts[0].colors, model.parts[0].colors);
+  EXPECT_EQ(back->parts[0].indices, model.parts[0].indices);
+  EXPECT_EQ(back->parts[0].thickness, 0.5);
+  EXPECT_TRUE(back->lit_already);
+  ASSERT_EQ(back->volumes.size(), 2u);
+  EXPECT_EQ(back->volumes[0].size, (std::array<uint32_t, 3>{1, 1, 2}));
+  EXPECT_EQ(back->volumes[0].samples, (std::vector<float>{3, 4}));
+  EXPECT_EQ(back->volumes[0].corners[7], (Point3{7, 8, 9}));
+  EXPECT_EQ(back->volumes[0].window, std::nullopt);
+  EXPECT_EQ(back->volumes[1].window, (std::array<double, 2>{5, 6}));
+  EXPECT_EQ(back->volumes[1].colors, (std::vector<Rgb>{{1, 2, 3}}));
+}
+
+TEST(Contained, WhatGoesWrongIsSaid) {
+  const auto error = [](const std::function<absl::StatusOr<Model>()>& read) {
+    return std::string(ReadContained({.path = "p"}, read).status().message());
+  };
+  EXPECT_EQ(error([] { return absl::InvalidArgumentError("p: so it is"); }), "p: so it is");
+  EXPECT_THAT(error([]() -> absl::StatusOr<Model> {
+                *static_cast<volatile int*>(nullptr) = 1;
+                return Model();
+              }),
+              HasSubstr("p: the library that reads it crashed"));
+  EXPECT_THAT(error([]() -> absl::StatusOr<Model> { std::abort(); }), HasSubstr("crashed"));
+}
+
+// What `act` returns as a reader of `file`: 0, or the error of the call that failed.
+int ErrorOf(const SourceFile& file, const std::function<bool()>& act) {
+  const auto model = ReadContained(file, [&act]() -> absl::StatusOr<Model> {
+    Model told;
+    errno = 0;
+    told.note = std::to_string(act() ? 0 : errno);
+    return told;
+  });
+  EXPECT_THAT(model, IsOk());
+  return model.ok() ? std::atoi(model->note.c_str()) : -1;
+}
+
+bool Opens(const std::string& path, int flags = O_RDONLY) {
+  const int file = ::open(path.c_str(), flags, 0600);
+  if (file >= 0) ::close(file);
+  return file >= 0;
+}
+
+class SandboxTest : public ::testing::Test {
+ protected:
+  SandboxTest() {
+    ::mkdir(folder_.Path("own").c_str(), 0700);
+    inside_ = folder_.Write("own/beside.txt", "x");
+    outside_ = folder_.Write("outside.txt", "x");
+    file_.path = folder_.Path("own/file.obj");
+  }
+
+  TempFolder folder_;
+  std::string inside_, outside_;
+  SourceFile file_;
+};
+
+TEST_F(SandboxTest, AStrangersFileOpensNothing) {
+  file_.other_files = OtherFiles::kNone;
+  for (const std::string& path : {inside_, outside_, std::string("/etc/passwd"), std::string("/"),
+                                  std::string("/proc/self/environ")}) {
+    EXPECT_EQ(ErrorOf(file_, [&] { return Opens(path); }), EACCES) << path;
+  }
+}
+
+TEST_F(SandboxTest, AFileOfTheUsersOwnOpensWhatItsFolderHolds) {
+  file_.other_files = OtherFiles::kBelow;
+  EXPECT_EQ(ErrorOf(file_, [&] { return Opens(inside_); }), 0);
+  EXPECT_EQ(ErrorOf(file_, [&] { return Opens(outside_); }), EACCES);
+  EXPECT_EQ(::symlink(outside_.c_str(), folder_.Path("own/link").c_str()), 0);
+  EXPECT_EQ(ErrorOf(file_, [&] { return Opens(folder_.Path("own/link")); }), EACCES);
+  file_.other_files = OtherFiles::kAny;
+  EXPECT_EQ(ErrorOf(file_, [&] { return Opens(outside_); }), 0);
+}
+
+TEST_F(SandboxTest, NothingIsWrittenRemovedOrStarted) {
+  file_.other_files = OtherFiles::kAny;
+  const pid_t parent = ::getpid();
+  EXPECT_EQ(ErrorOf(file_, [&] { return Opens(inside_, O_WRONLY); }), EACCES);
+  EXPECT_EQ(ErrorOf(file_, [&] { return Opens(folder_.Path("new"), O_CREAT | O_WRONLY); }), EACCES);
+  EXPECT_EQ(ErrorOf(file_, [&] { return ::unlink(inside_.c_str()) == 0; }), EPERM);
+  EXPECT_EQ(ErrorOf(file_, [&] { return ::truncate(inside_.c_str(), 0) == 0; }), EPERM);
+  EXPECT_EQ(ErrorOf(file_, [] { return ::execl("/bin/true", "true", nullptr) == 0; }), EPERM);
+  EXPECT_EQ(ErrorOf(file_, [] { return ::fork() >= 0; }), EPERM);
+  EXPECT_EQ(ErrorOf(file_, [] { return ::socket(AF_INET, SOCK_STREAM, 0) >= 0; }), EPERM);
+  EXPECT_EQ(ErrorOf(file_, [] { return ::socket(AF_UNIX, SOCK_STREAM, 0) >= 0; }), EPERM);
+  EXPECT_EQ(ErrorOf(file_, [&] { return ::kill(parent, 0) == 0; }), EPERM);
+}
+
+TEST_F(SandboxTest, TheReaderHasNoDescriptorOfThisProcess) {
+  const int mine = ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 10);
+  ASSERT_GE(mine, 0);
+  char byte = 0;
+  EXPECT_EQ(ErrorOf(file_, [&] { return ::read(mine, &byte, 1) >= 0; }), EBADF);
+  EXPECT_EQ(ErrorOf(file_, [&] { return ::read(STDIN_FILENO, &byte, 1) == 0; }), 0) << "/dev/null";
+  ::close(mine);
+}
+
+TEST_F(SandboxTest, DescriptorsAreLimited) {
+  EXPECT_EQ(ErrorOf(file_,
+                    [&] {
+                      for (int i = 0; i < 100; ++i) {
+                        if (::open(inside_.c_str(), O_RDONLY) < 0) return false;
+                      }
+                      return true;
+                    }),
+            EMFILE);
+}
+
+// As an old kernel, or a service manager's filter, does.
+void WithoutLandlock() {
+  ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
+  const scmp_filter_ctx filter = seccomp_init(SCMP_ACT_ALLOW);
+  seccomp_rule_add(filter, SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(landlock_create_ruleset), 0);
+  if (seccomp_load(filter) != 0) ::_exit(98);
+}
+
+TEST_F(SandboxTest, WithoutLandlockAStrangersFileIsRefusedWithTheReason) {
+  const auto read = [this](OtherFiles others) {
+    file_.other_files = others;
+    return ReadContained(file_, [] { return Model(); }).status();
+  };
+  EXPECT_EXIT(
+      {
+        WithoutLandlock();
+        const absl::Status refused = read(OtherFiles::kNone);
+        const bool says = absl::IsFailedPrecondition(refused) &&
+                          refused.message().find("Landlock") != absl::string_view::npos;
+        ::_exit(says && read(OtherFiles::kBelow).ok() ? 7 : 8);
+      },
+      ::testing::ExitedWithCode(7), "");
+}
+
+TEST(Contained, EndsWhenItIsInterrupted) {
+  Interrupt interrupt(Interrupt::Watch::kNothing);
+  std::thread later([&interrupt] { interrupt.Request(); });
+  const absl::Status status = ReadContained(
+                                  {.path = "p"},
+                                  []() -> absl::StatusOr<Model> {
+                                    for (volatile bool always = true; always;) {
+                                    }
+                                    return Model();
+                                  },
+                                  &interrupt)
+                                  .status();
+  later.join();
+  EXPECT_TRUE(absl::IsCancelled(status)) << status;
+}
+
+// 0: it has none.
+pid_t ChildOf(pid_t process) {
+  std::ifstream file(absl::StrCat("/proc/", process, "/task/", process, "/children"));
+  pid_t child = 0;
+  file >> child;
+  return child;
+}
+
+bool Runs(pid_t process) {
+  std::ifstream file(absl::StrCat("/proc/", process, "/stat"));
+  std::string number, name, state;
+  return file >> number >> name >> state && state != "Z" && state != "X";
+}
+
+TEST(Contained, EndsWithWhoAsked) {
+  const pid_t asks = ::fork();
+  if (asks == 0) {
+    (void)ReadContained({.path = "p"}, []() -> absl::StatusOr<Model> {
+      for (volatile bool always = true; always;) {
+      }
+      return Model();
+    });
+    ::_exit(0);
+  }
+  pid_t reads = 0;
+  while (reads == 0) reads = ChildOf(asks);
+  ASSERT_EQ(::kill(asks, SIGKILL), 0);
+  ASSERT_EQ(::waitpid(asks, nullptr, 0), asks);
+  for (int tries = 0; Runs(reads) && tries < 10'000; ++tries) ::usleep(1000);
+  EXPECT_FALSE(Runs(reads));
+}
+
+}  // namespace
+}  // namespace voxeld::voxelctl

@@ -1,0 +1,35 @@
+// Takes from a process what reading a file does not need, so that a file that takes over the reader gets nothing.
+#pragma once
+
+#include <linux/filter.h>
+
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+
+namespace voxeld::voxelctl {
+
+// Thread-safe.
+class Sandbox {
+ public:
+  // Made once, by the first call; making it takes longer than entering it.
+  static const Sandbox& Get();
+
+  // Unavailable, with the reason, if this system cannot keep a process from opening files: the kernel has no Landlock (Linux 5.13
+  // and later have it), it is switched off, or a service manager's filter forbids it.
+  absl::Status CheckLandlock() const;
+
+  // Confines this process for good, its threads and children too. It can still use its memory and open descriptors, and open files
+  // to read below `readable` (a folder; "/": all files; empty: none). It cannot write or create files, use the network, start
+  // programs, or signal and trace other processes. Call it in a process with one thread.
+  // Errors: Unavailable: files (CheckLandlock) or calls (seccomp) are not confined, the other is.
+  absl::Status Enter(const std::string& readable) const;
+
+ private:
+  Sandbox();
+
+  std::vector<sock_filter> filter_;  // empty: there is none
+};
+
+}  // namespace voxeld::voxelctl
