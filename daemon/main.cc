@@ -57,7 +57,7 @@ namespace {
 constexpr int kUsageError = 2;
 // With half a second for what plays a file together below the 5 s that we promise.
 constexpr sync::TimeNs kServerLimit = 2 * sync::kSecond;
-constexpr sync::TimeNs kCoreLimit = 2500 * sync::kMillisecond;
+constexpr sync::TimeNs kStopLimit = 4500 * sync::kMillisecond;  // for the server and the core
 constexpr sync::TimeNs kEndLimit = 5 * sync::kSecond;
 
 int Fail(int code, const absl::Status& status) {
@@ -418,6 +418,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
     signal = 0;
   }
   end_limit.emplace(kEndLimit);
+  const sync::TimeNs stop_by = clock.Now() + kStopLimit;
   reloads = nullptr;
   watchdog.reset();
   supervisor.Stopping();
@@ -428,7 +429,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   watch.Tell(nullptr);
   if (play.player != nullptr) play.player->End();
   (*server)->Shutdown(kServerLimit);
-  const absl::Status stopped = core.Stop(kCoreLimit);
+  const absl::Status stopped = core.Stop(stop_by - clock.Now());
   if (kept != nullptr) kept->Stop();
   http->reset();
   if (!stopped.ok()) log.Error("not all ended", {{"why", std::string(stopped.message())}});

@@ -41,8 +41,8 @@ class Budget {
   // For uses that are measured, not charged. One thread a use.
   void Set(Use use, uint64_t bytes);
 
-  // What engines have drawn was expected to take `bytes` at most (OwnerTally::derived); it is measured now, and in kEngines.
-  // Each engine replaces what it said before.
+  // An engine has drawn a scene that was expected to take at most `bytes` (OwnerTally::derived), and measured it (kEngines).
+  // `before`: its last value, which this replaces.
   void ReplaceDerived(uint64_t before, uint64_t bytes) {
     derived_.fetch_add(bytes - before, std::memory_order_relaxed);  // modulo 2⁶⁴, so less too
   }

@@ -217,13 +217,13 @@ void Core::Impl::RefuseCommit(Session& session, const WaitingCommit& commit, uin
 
 MemoryRoom Core::Impl::RoomFor(const WaitingCommit& commit) const {
   const uint64_t engines = displays_.size();
-  // What engines have yet to derive is not measured yet.
+  // Engines have not measured yet what they have yet to draw, so the expected size counts for it.
   const uint64_t expected = store_.snapshot()->total.derived * engines;
   const uint64_t drawn = budget_->derived_bytes();
-  // Messages that are being read are bounded by themselves, and what comes of them is charged for next.
+  // Messages that are being read have a limit of their own, and are charged when they are staged.
   const uint64_t used = budget_->used_bytes() - budget_->used_bytes(Budget::Use::kArriving) +
                         (expected > drawn ? expected - drawn : 0);
-  // What the commit holds now, the scene will hold.
+  // The commit's own bytes become the scene's.
   const uint64_t limit = budget_->limit_bytes() + commit.bytes;
   return {.bytes = limit > used ? limit - used : 0, .engines = engines};
 }

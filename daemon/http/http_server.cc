@@ -372,7 +372,8 @@ class Server::Impl {
     return true;
   }
 
-  // Of those that wait for a request, with a place or without; these have kFirstRequest. False: there is none.
+  // Closes the connection that has waited for a request longest. `placed`: among those with a place, or else among those without one
+  // that have had kFirstRequest. Returns: whether there was one.
   bool CloseLongestIdle(bool placed) {
     const auto before =
         std::chrono::steady_clock::now() - std::chrono::nanoseconds(placed ? 0 : kFirstRequest);

@@ -71,10 +71,10 @@ using Upgrade = std::function<absl::StatusOr<ServeWebSocket>(const Request& requ
 
 struct ServerOptions {
   Address listen;
-  // Places: for requests, for connections that are kept open after one, and for WebSockets. A request for which there is none
-  // takes that of the connection that has been idle longest; where all are at work it is answered with 503.
+  // Number of places. Requests, connections that are kept open after one, and WebSockets take a place each. If none is free, the
+  // connection that has been idle longest is closed; if all are at work, the request is answered with 503.
   uint32_t max_connections = 64;
-  // Paths with kReservedPlaces of their own beside those, so that health is known whoever else asks.
+  // These paths have kReservedPlaces of their own, so that health can always be read.
   std::vector<std::string> reserved_paths;
   uint32_t max_header_bytes = 8192;  // 431 beyond
   // For a request to come in, and for an answer to be read.
@@ -92,8 +92,8 @@ struct ServerOptions {
 class Server {
  public:
   static constexpr size_t kReservedPlaces = 8;
-  // Connections of which no request has come yet are in no place. Where there are so many, the one that has waited longest is
-  // closed for the next; not before it has had the time for its first request.
+  // A connection takes no place before its first request. If so many wait, the one that has waited longest is closed for the next
+  // one, but not before it has had kFirstRequest.
   static constexpr size_t kMostWaiting = 1024;
   static constexpr sync::TimeNs kFirstRequest = 200 * sync::kMillisecond;
 

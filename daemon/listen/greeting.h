@@ -29,9 +29,9 @@ class Greeting {
   // Empty SETTINGS: HTTP/2's defaults, until gRPC sends its own.
   static constexpr std::string_view kServerSettings{"\0\0\0\x04\0\0\0\0\0", 9};
 
-  // The words by which clients know that there is no room (RefusalFrames).
+  // Clients recognise a full daemon by these words.
   static constexpr std::string_view kNoRoom = "voxeld has no room for another connection";
-  // SETTINGS, and GOAWAY with kNoRoom: what a client over HTTP/2 is sent before its connection is closed.
+  // Returns: SETTINGS, and GOAWAY with kNoRoom, to send to an HTTP/2 client before its connection is closed.
   static std::string RefusalFrames();
 
   enum class Verdict : uint8_t {

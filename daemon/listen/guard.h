@@ -172,11 +172,12 @@ class Guard {
   void MarkBusy(const Connection& connection) VOXELD_REQUIRES(mutex_);
   void Uncount(Connection& connection) VOXELD_REQUIRES(mutex_);
   Counted CountOf(const std::string& address) const VOXELD_REQUIRES(mutex_);
-  // Whether there is no place for another connection, of `address` or (if that is empty) of all.
+  // Returns: whether another connection has no place. `address`: its address if the limit is for one address; empty: the limit is
+  // for all.
   bool IsFull(const Counted& counted, uint32_t limit, const std::string& address,
               std::vector<Doomed>& doomed) VOXELD_REQUIRES(mutex_);
-  // Cuts the unauthorised connection, of `address` or (if that is empty) of all, that has been idle longest. False: there is none
-  // that has had its time.
+  // Cuts the unauthorised connection that has been idle longest, of `address` or (empty) of all. Returns: false if none has had its
+  // time for a first call.
   bool MakeRoom(const std::string& address, std::vector<Doomed>& doomed) VOXELD_REQUIRES(mutex_);
   // So that no more connections are open than limits allow, as soon as that is possible.
   void MakeAllRoom(std::vector<Doomed>& doomed) VOXELD_REQUIRES(mutex_);

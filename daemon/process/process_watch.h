@@ -17,8 +17,8 @@ namespace voxeld::daemon {
 class ProcessWatch {
  public:
   // How often the system is given what the allocator keeps, and what is allocated is counted. Both go through all that is
-  // free, and whoever wants memory waits meanwhile: of the time they may have a thousandth. When a client's scene has gone, what
-  // is given back is much, and does not wait for its turn.
+  // free, and whoever wants memory waits meanwhile: of the time they may have a thousandth. Much freed
+  // memory, as of a client's scene that has gone, is given back at once.
   static constexpr sync::TimeNs kGiveBack = 60 * sync::kSecond, kCount = sync::kSecond;
   static constexpr int64_t kRest = 1000;
   static constexpr uint64_t kMuch = uint64_t{32}
@@ -52,7 +52,7 @@ class ProcessWatch {
   SegmentWatch segments_;
   TimeWatch time_;
   std::atomic<uint64_t> heap_bytes_;
-  // Of the thread that looks.
+  // These belong to the thread that looks.
   sync::TimeNs give_back_at_, count_at_, much_at_ = 0;
   uint64_t most_bytes_ = 0;  // allocated, since the system was given something
 };

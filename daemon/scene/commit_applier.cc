@@ -183,7 +183,7 @@ std::optional<std::string> CommitApplier::OverQuota(const OwnerTally& wanted) co
 std::optional<std::string> CommitApplier::OverMemory(const OwnerTally& wanted) const {
   const OwnerTally& tally = draft_.tally(author_.owner);
   if (wanted.bytes <= tally.bytes && wanted.derived <= tally.derived) return std::nullopt;
-  // Of all owners, from the commit before to what is wanted; less than 0 if more has gone in this commit than has come.
+  // Returns: the growth of all owners since the last commit; negative if this commit has removed more than it added.
   const auto growth = [&](uint64_t OwnerTally::*of) {
     return static_cast<double>(draft_.total().*of) - static_cast<double>(draft_.base().total.*of) +
            static_cast<double>(wanted.*of) - static_cast<double>(tally.*of);

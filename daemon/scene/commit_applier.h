@@ -29,7 +29,7 @@ struct Author {
   uint64_t max_bytes = UINT64_MAX, max_entities = UINT64_MAX;
 };
 
-// What there is for a scene that grows.
+// The memory that a scene may grow into.
 struct MemoryRoom {
   uint64_t bytes = UINT64_MAX;  // that the scene, and what engines derive from it, may grow by
   uint64_t engines = 0;         // each of which derives all of it
@@ -105,7 +105,7 @@ class CommitApplier {
   void TellOfCoarseIn(const Operation& operation, const std::string& name, const Layer& layer,
                       const char* field);
 
-  // What is wrong if the author came to `wanted` (layers aside); nothing if quotas and memory allow it.
+  // Returns: why the author may not come to `wanted` (layers aside); nothing if quotas and memory allow it.
   std::optional<std::string> OverQuota(const OwnerTally& wanted) const;
   std::optional<std::string> OverMemory(const OwnerTally& wanted) const;
   bool RefusedNewLayer(const Operation& operation, const std::string& layer,

@@ -78,7 +78,7 @@ class Draft {
  private:
   // Adds `more` to the owner's tally and to the total, and takes `less` away.
   void Count(uint64_t owner, const OwnerTally& more, const OwnerTally& less);
-  // What an entity of this layer counts for.
+  // Returns: what an entity of this layer counts against quotas.
   OwnerTally CountOf(const OwnedName& layer, const Entity& entity) const;
   Layer& OpenLayer(const OwnedName& key);
   void Index(const OwnedName& layer, const std::string& id, const Entity& entity);

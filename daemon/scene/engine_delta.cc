@@ -270,6 +270,7 @@ void EngineScene::Draw(const OwnedName& key, const Layer& layer, const std::stri
     parts.push_back({record.id, std::move(geometry)});
     Breathe();
   }
+  if (flat_.capacity() > kKeptSlots) flat_ = {};
   for (size_t i = 0; i < old.size(); ++i) {
     if (i >= parts.size()) drop_drawables_.push_back(old[i].drawable);
     Release(old[i].geometry);

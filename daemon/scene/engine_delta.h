@@ -17,6 +17,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <string>
@@ -100,7 +101,7 @@ class EngineScene {
   void Flatten(uint64_t owner, const Content& content, const gpu::Affine& map, uint32_t tint);
   uint64_t Use(const HeldGeometry& geometry);
   void Release(const HeldGeometry& geometry);
-  // Of indexes that have grown much larger than what is left in them.
+  // Shrinks indexes that have grown much larger than their contents.
   void GiveBackSlots();
   void Breathe();
 
@@ -125,7 +126,8 @@ class EngineScene {
   std::vector<HeldGeometry> unused_;  // dropped to no use at some time; may be in use again
   std::vector<uint64_t> drop_geometries_, drop_drawables_, drop_layers_;
   std::vector<gpu::LayerRecord> put_layers_;
-  std::vector<gpu::DrawableRecord> put_drawables_;
+  std::deque<gpu::DrawableRecord>
+      put_drawables_;  // may be a million, which are not copied as they come
   bool put_reset_ = false;
 };
 

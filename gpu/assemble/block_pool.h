@@ -26,7 +26,7 @@ class BlockPool {
   }
   // Between Takes: what lies in pages without blocks in use goes back to the system, if more than `keep` are free.
   void Trim(size_t keep);
-  // Of all pages that it has, with and without blocks in use.
+  // Returns: bytes of all its pages, with and without blocks in use.
   uint64_t memory_bytes() const { return slabs_.size() * slab_blocks_ * block_bytes_; }
 
  private:

@@ -1,6 +1,7 @@
 #include "gpu/assemble/delta_plan.h"
 
 #include <algorithm>
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -38,7 +39,7 @@ class Planner final : public DeltaVisitor {
   }
   absl::Status OnLayer(const LayerRecord& l) override {
     layers_[l.id] = true;
-    plan_.steps.emplace_back(l);
+    plan_.steps.emplace_back(std::make_unique<const LayerRecord>(l));
     return absl::OkStatus();
   }
   absl::Status OnDrop(Op op, uint64_t id) override {

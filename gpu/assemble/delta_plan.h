@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
+#include <memory>
 #include <span>
 #include <variant>
 #include <vector>
@@ -17,10 +19,12 @@ struct DropStep {
   uint64_t id;
 };
 struct ResetStep {};
-using DeltaStep = std::variant<GeometryView, DrawableRecord, LayerRecord, DropStep, ResetStep>;
+// Layers' records are several times as large as all others, and few.
+using LayerStep = std::unique_ptr<const LayerRecord>;
+using DeltaStep = std::variant<GeometryView, DrawableRecord, LayerStep, DropStep, ResetStep>;
 
 struct DeltaPlan {
-  std::vector<DeltaStep> steps;
+  std::deque<DeltaStep> steps;  // may be a million, which are not copied as they come
   // Dropped, and not put again later in the delta. They have no users at its end.
   std::vector<uint64_t> geometries_to_erase, layers_to_erase;
 };

@@ -189,8 +189,8 @@ absl::Status Scene::Apply(std::span<const std::byte> delta, BulkSource* bulk,
       copied_bytes_ = 0;
     } else if (const auto* geometry = std::get_if<GeometryView>(&step)) {
       PutGeometry(*geometry, observer);
-    } else if (const auto* layer = std::get_if<LayerRecord>(&step)) {
-      PutLayer(*layer, observer);
+    } else if (const auto* layer = std::get_if<LayerStep>(&step)) {
+      PutLayer(**layer, observer);
     }
   }
   for (const DeltaStep& step : plan->steps) {

@@ -102,7 +102,7 @@ class Scene {
   int64_t GeometryUses(uint64_t id) const;
   int64_t LayerUses(uint64_t id) const;
   const Drawable* FindDrawable(uint64_t id) const;
-  // Of records, indexes and copies of arrays; what is derived is not among them.
+  // Returns: bytes of records, indexes and copies of arrays, without derived data.
   uint64_t memory_bytes() const;
 
  private:
@@ -115,7 +115,7 @@ class Scene {
   void PutDrawable(const DrawableRecord& record, SceneObserver& observer);
   void PutLayer(const LayerRecord& record, SceneObserver& observer);
   std::unique_ptr<Drawable> TakeDrawable(uint64_t id, SceneObserver& observer);
-  // Of maps that have grown much larger than what is left in them.
+  // Shrinks maps that have grown much larger than their contents.
   void GiveBackSlots();
   void RankLayers();
   void LinkMasks();

@@ -149,6 +149,7 @@ void Volume::MarkDirty(uint32_t tile) {
 }
 
 void Volume::OnLeave(Drawable& drawable) {
+  executor_.ThrowIfAbandoned();
   if (drawable.pending || drawable.leaving) return;  // in no tile, or on its way out already
   for (uint32_t tile : drawable.bins.tiles) {
     if (drawable.layer->drawn) MarkDirty(tile);
@@ -165,6 +166,7 @@ void Volume::OnLeave(Drawable& drawable) {
 }
 
 void Volume::OnEnter(Drawable& drawable) {
+  executor_.ThrowIfAbandoned();
   if (drawable.pending) return;
   drawable.pending = true;
   pending_.push_back(&drawable);

@@ -16,11 +16,15 @@ class AbandonableExecutor final : public Executor {
 
   void For(size_t count, size_t grain, const Body& body) override {
     executor_->For(count, grain, [&](size_t index, int worker) {
-      if (abandoned_->load(std::memory_order_relaxed)) {
-        throw std::runtime_error("the engine is being stopped");
-      }
+      ThrowIfAbandoned();
       body(index, worker);
     });
+  }
+
+  void ThrowIfAbandoned() const override {
+    if (abandoned_->load(std::memory_order_relaxed)) {
+      throw std::runtime_error("the engine is being stopped");
+    }
   }
 
  private:

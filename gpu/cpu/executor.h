@@ -20,6 +20,8 @@ class Executor {
   // Indices are handed out in runs of `grain` (at least 1). What a body throws first is thrown once none runs
   // any more; some indices are then left out.
   virtual void For(size_t count, size_t grain, const Body& body) = 0;
+  // For long work between loops: throws if loops would (MakeAbandonableExecutor).
+  virtual void ThrowIfAbandoned() const {}
 };
 
 // In the caller's thread.

@@ -87,7 +87,7 @@ TEST_F(SlowAllocator, HasAThousandthOfTheTime) {
   EXPECT_GE(counted_, counted + 18);
 }
 
-// What is allocated is what a test says.
+// The test sets the number of allocated bytes.
 class ScriptedAllocator : public ::testing::Test {
  protected:
   ScriptedAllocator() { given_back_ = 0; }

@@ -102,6 +102,7 @@ TEST(AbandonableExecutor, RunsLoopsUntilTheyAreGivenUp) {
         MakeAbandonableExecutor(MakeThreadExecutor(threads), abandoned);
     EXPECT_EQ(executor->concurrency(), threads);
     ExpectEachIndexOnce(*executor);
+    executor->ThrowIfAbandoned();
     std::atomic<int> ran{0};
     EXPECT_THROW(executor->For(1000, 1,
                                [&](size_t, int) {
@@ -111,6 +112,7 @@ TEST(AbandonableExecutor, RunsLoopsUntilTheyAreGivenUp) {
                  std::runtime_error);
     EXPECT_LE(ran, threads) << "those that ran at once";
     EXPECT_THROW(executor->For(1, 1, [&](size_t, int) { ++ran; }), std::runtime_error);
+    EXPECT_THROW(executor->ThrowIfAbandoned(), std::runtime_error);
   }
 }
 

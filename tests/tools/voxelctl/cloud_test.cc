@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "tests/tools/voxelctl/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
 #include "tools/voxelctl/import/importer.h"
@@ -24,7 +25,7 @@ using ::testing::IsEmpty;
 class Clouds : public testing::Test {
  protected:
   absl::StatusOr<Model> Import(const std::string& name, const std::string& bytes) {
-    return ImportFile(folder_.Write(name, bytes), {});
+    return ReadHere(folder_.Write(name, bytes), {});
   }
   Part Points(const std::string& name, const std::string& bytes) {
     const auto model = Import(name, bytes);

@@ -17,6 +17,7 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "tests/tools/voxelctl/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/volume_files.h"
 #include "tools/voxelctl/import/frames.h"
@@ -207,8 +208,7 @@ class Damage : public testing::Test {
   // `beside`: what stands beside it may be what is said to be wrong.
   absl::StatusOr<Model> Import(const std::string& name, const std::string& bytes,
                                const std::string& beside = "") {
-    const auto model =
-        ImportFile(folder_.Write(name, bytes), {.raw = RawLayout{.size = {2, 2, 2}}});
+    const auto model = ReadHere(folder_.Write(name, bytes), {.raw = RawLayout{.size = {2, 2, 2}}});
     if (!model.ok()) {
       const absl::string_view message = model.status().message();
       EXPECT_TRUE(absl::StartsWith(message, folder_.Path(name)) ||
@@ -279,7 +279,7 @@ TEST_F(Damage, FoldersAndSequences) {
   }
   ASSERT_EQ(good.size(), 3u);
   const std::string folder = folder_.Path("slices");
-  ASSERT_THAT(ImportFile(folder, {}), IsOk());
+  ASSERT_THAT(ReadHere(folder, {}), IsOk());
   const std::string cube = Real(std::string(VOXELD_MODELS_DIR) + "/OFF/Cube.off");
   for (const int i : {1, 2, 3}) folder_.Write(absl::StrCat("frame_", i, ".off"), cube);
   std::mt19937 random(23);
@@ -292,7 +292,7 @@ TEST_F(Damage, FoldersAndSequences) {
   };
   for (int i = 0; i < 40; ++i) {
     folder_.Write("slices/2", damage(good[1], i));
-    const auto model = ImportFile(folder, {});
+    const auto model = ReadHere(folder, {});
     if (!model.ok()) {
       EXPECT_TRUE(absl::StartsWith(model.status().message(), folder)) << model.status();
     }
@@ -433,7 +433,7 @@ TEST_F(Damage, HugeOnesTakeLittleMemory) {
        "1\nPOINTS 4000000000\nDATA ascii\n1 2 3\n"},
   };
   for (const Sample& sample : huge) {
-    EXPECT_LT(MegabytesOf([&] { (void)ImportFile(folder_.Write(sample.name, sample.bytes), {}); }),
+    EXPECT_LT(MegabytesOf([&] { (void)ReadHere(folder_.Write(sample.name, sample.bytes), {}); }),
               40)
         << sample.name;
     const auto model = Import(sample.name, sample.bytes);

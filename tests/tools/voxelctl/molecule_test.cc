@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "tests/tools/voxelctl/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
 #include "tools/voxelctl/import/importer.h"
@@ -29,7 +30,7 @@ class Molecules : public testing::Test {
  protected:
   absl::StatusOr<Model> Import(const std::string& bytes,
                                MoleculeStyle style = MoleculeStyle::kBalls) {
-    return ImportFile(folder_.Write("a.pdb", bytes), {.style = style});
+    return ReadHere(folder_.Write("a.pdb", bytes), {.style = style});
   }
   // Of the first part, which are the rods, if there are any.
   size_t Bonds(const std::string& bytes) {
@@ -94,7 +95,7 @@ TEST_F(Molecules, OneModelAndOneLocation) {
 }
 
 TEST_F(Molecules, RealProteins) {
-  const auto model = ImportFile("/usr/share/pymol/data/tut/1hpv.pdb", {});
+  const auto model = ReadHere("/usr/share/pymol/data/tut/1hpv.pdb", {});
   ASSERT_THAT(model, IsOk()) << "tools/setup --import installs pymol-data";
   size_t atoms = 0;
   for (const Part& part : model->parts) {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "tests/tools/voxelctl/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/volume_files.h"
 #include "tools/voxelctl/import/inflate.h"
@@ -202,12 +203,12 @@ TEST_F(Volumes, ManyEmptyStreamsTakeNoTime) {
 }
 
 TEST_F(Volumes, RealBrains) {
-  const auto brain = ImportFile(absl::StrCat(kTemplates, "ch2bet.nii.gz"), {});
+  const auto brain = ReadHere(absl::StrCat(kTemplates, "ch2bet.nii.gz"), {});
   ASSERT_THAT(brain, IsOk()) << "tools/setup --import installs mricron-data";
   EXPECT_EQ(brain->format, "NIfTI, compressed");
   EXPECT_THAT(brain->volumes.at(0).size, ElementsAre(181, 217, 181));
   for (const char* name : {"aal.nii.gz", "ch2.nii.gz", "inia19-t1-brain.nii.gz", "brodmann.nii.gz"})
-    EXPECT_THAT(ImportFile(absl::StrCat(kTemplates, name), {}), IsOk()) << name;
+    EXPECT_THAT(ReadHere(absl::StrCat(kTemplates, name), {}), IsOk()) << name;
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "absl/strings/str_cat.h"
+#include "tests/tools/voxelctl/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/volume_files.h"
 
@@ -93,18 +94,18 @@ TEST_F(Volumes, NrrdOfEitherHand) {
 // Of npm's nrrd-js, which tools/setup fetches.
 TEST_F(Volumes, RealNrrd) {
   const std::string folder = absl::StrCat(VOXELD_DATA_DIR, "/nrrd-js/");
-  const auto picture = ImportFile(folder + "example1.nrrd", {});
+  const auto picture = ReadHere(folder + "example1.nrrd", {});
   ASSERT_THAT(picture, IsOk());
   const SampledVolume& raw = picture->volumes[0];
   EXPECT_THAT(raw.size, ElementsAre(3, 512, 512));
   const std::string bytes = ReadAll(folder + "example1.nrrd");
   for (size_t i = 1; i < raw.samples.size(); i += 1001)
     ASSERT_EQ(raw.samples[raw.samples.size() - i], static_cast<uint8_t>(bytes[bytes.size() - i]));
-  const auto text = ImportFile(folder + "example2.nrrd", {});
+  const auto text = ReadHere(folder + "example2.nrrd", {});
   ASSERT_THAT(text, IsOk());
   EXPECT_THAT(text->volumes[0].samples,
               ElementsAre(1, 2, 3, 65000, 64000, 63000, 10000, 11000, 12000, 4, 5, 6));
-  const auto four = ImportFile(folder + "example4.nrrd", {});
+  const auto four = ReadHere(folder + "example4.nrrd", {});
   ASSERT_THAT(four, IsOk());
   EXPECT_THAT(four->volumes[0].size, ElementsAre(4, 3, 2));
   EXPECT_EQ(four->volumes[0].samples[23], 24);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "tests/tools/voxelctl/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
 #include "tools/voxelctl/import/importer.h"
@@ -17,7 +18,7 @@ namespace {
 
 absl::StatusOr<Model> Ply(const std::string& bytes) {
   TempFolder folder;
-  return ImportFile(folder.Write("a.ply", bytes), {});
+  return ReadHere(folder.Write("a.ply", bytes), {});
 }
 
 std::string AsciiPly(const std::string& elements, const std::string& body) {

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "tests/tools/voxelctl/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
 #include "tools/voxelctl/import/importer.h"
@@ -36,7 +37,7 @@ std::string LittleXyz(float x, float y, float z) {
 constexpr const char* kXyz = "property float x\nproperty float y\nproperty float z\n";
 
 TEST(PlyPoints, AsciiWithListsAndOtherElements) {
-  const absl::StatusOr<Model> model = ImportFile(DataFile("points.ply"), {});
+  const absl::StatusOr<Model> model = ReadHere(DataFile("points.ply"), {});
   ASSERT_THAT(model, IsOk());
   EXPECT_EQ(model->format, "PLY points");
   EXPECT_EQ(model->up, Up::kZ);
@@ -64,7 +65,7 @@ TEST_P(PlyBinary, EveryType) {
              Bytes<uint8_t>(2, big) + Bytes<int16_t>(1, big) + Bytes<int16_t>(2, big) +
              Bytes<int8_t>(-1, big);
   }
-  const absl::StatusOr<Model> model = ImportFile(folder.Write("cloud.ply", bytes), {});
+  const absl::StatusOr<Model> model = ReadHere(folder.Write("cloud.ply", bytes), {});
   ASSERT_THAT(model, IsOk());
   EXPECT_EQ(model->parts[0].positions,
             (std::vector<Point3>{{1.25, -300, 70000}, {2.25, -300, 70000}}));
@@ -88,7 +89,7 @@ TEST(PlyPoints, SeventyThousandPoints) {
     bytes += {static_cast<char>(i), static_cast<char>(i >> 8), 'z'};
     bytes += Bytes(0.0f, false);
   }
-  const absl::StatusOr<Model> model = ImportFile(folder.Write("cloud.ply", bytes), {});
+  const absl::StatusOr<Model> model = ReadHere(folder.Write("cloud.ply", bytes), {});
   ASSERT_THAT(model, IsOk());
   const Part& part = model->parts[0];
   ASSERT_EQ(part.positions.size(), 70051u);
@@ -100,13 +101,13 @@ TEST(PlyPoints, SeventyThousandPoints) {
 TEST(PlyPoints, PointsThatAreNotANumberAreLeftOutAndSaid) {
   TempFolder folder;
   const absl::StatusOr<Model> model =
-      ImportFile(folder.Write("a.ply", Header("ascii", "3",
-                                              absl::StrCat(kXyz,
-                                                           "property uchar red\nproperty "
-                                                           "uchar green\nproperty uchar "
-                                                           "blue\n")) +
-                                           "0 0 0 1 2 3\nnan nan nan 4 5 6\n9 9 9 7 8 9\n"),
-                 {});
+      ReadHere(folder.Write("a.ply", Header("ascii", "3",
+                                            absl::StrCat(kXyz,
+                                                         "property uchar red\nproperty "
+                                                         "uchar green\nproperty uchar "
+                                                         "blue\n")) +
+                                         "0 0 0 1 2 3\nnan nan nan 4 5 6\n9 9 9 7 8 9\n"),
+               {});
   ASSERT_THAT(model, IsOk());
   EXPECT_EQ(model->parts[0].positions, (std::vector<Point3>{{0, 0, 0}, {9, 9, 9}}));
   EXPECT_EQ(model->parts[0].colors, (std::vector<Rgb>{{1, 2, 3}, {7, 8, 9}}));
@@ -118,7 +119,7 @@ TEST(PlyPoints, FloatColorsGoTo255WhereOneIsGreaterThan1) {
   const std::string properties =
       absl::StrCat(kXyz, "property float red\nproperty float green\nproperty float blue\n");
   const auto colors = [&](const std::string& body) {
-    return ImportFile(folder.Write("a.ply", Header("ascii", "2", properties) + body), {})
+    return ReadHere(folder.Write("a.ply", Header("ascii", "2", properties) + body), {})
         ->parts.at(0)
         .colors;
   };
@@ -145,7 +146,7 @@ TEST_P(BadPly, IsRefusedWithWords) {
   const std::string path = folder.Write("bad.ply", GetParam().bytes);
   Words words = GetParam().words;
   words.push_back(path);
-  EXPECT_THAT(ImportFile(path, {}), Fails(words));
+  EXPECT_THAT(ReadHere(path, {}), Fails(words));
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -221,7 +222,7 @@ TEST(PlyPoints, SaysWhenACopyAsTextHasDamagedIt) {
   }
   const std::string path =
       folder.Write("cloud.ply", Header("binary_little_endian", "201", kXyz) + data);
-  EXPECT_THAT(ImportFile(path, {}), Fails(Words{"no CR LF at all", "copied as text"}));
+  EXPECT_THAT(ReadHere(path, {}), Fails(Words{"no CR LF at all", "copied as text"}));
 }
 
 TEST(PlyPoints, MendsACloudWithNormalsThatWasCopiedAsText) {
@@ -249,7 +250,7 @@ TEST(PlyPoints, MendsACloudWithNormalsThatWasCopiedAsText) {
   const std::string header =
       Header("binary_little_endian", std::to_string(kCount),
              std::string(kXyz) + "property float nx\nproperty float ny\nproperty float nz\n");
-  const absl::StatusOr<Model> model = ImportFile(folder.Write("cloud.ply", header + damaged), {});
+  const absl::StatusOr<Model> model = ReadHere(folder.Write("cloud.ply", header + damaged), {});
   ASSERT_THAT(model, IsOk());
   EXPECT_THAT(model->note, testing::HasSubstr("lost " + std::to_string(lost) + " bytes"));
   ASSERT_EQ(model->parts[0].positions.size(), positions.size());
@@ -262,7 +263,7 @@ TEST(PlyPoints, MendsACloudWithNormalsThatWasCopiedAsText) {
 
 TEST(PlyPoints, AMissingFileIsNamed) {
   TempFolder folder;
-  EXPECT_THAT(ImportFile(folder.Path("none.ply"), {}), Fails(Words{"none.ply", "No such file"}));
+  EXPECT_THAT(ReadHere(folder.Path("none.ply"), {}), Fails(Words{"none.ply", "No such file"}));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
+#include "tests/tools/voxelctl/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
 #include "tools/voxelctl/import/importer.h"
@@ -51,7 +52,7 @@ std::string Ascii() { return absl::StrCat("solid a\n", kFacet1, kFacet2, "endsol
 
 absl::StatusOr<Model> Stl(const std::string& bytes) {
   TempFolder folder;
-  return ImportFile(folder.Write("a.stl", bytes), {});
+  return ReadHere(folder.Write("a.stl", bytes), {});
 }
 
 void ExpectRectangle(const std::string& bytes) {
@@ -140,7 +141,7 @@ TEST(StlColor, OfMagicsHasRedInTheLowBitsAndOneForTheWhole) {
 TEST(StlColor, AttributesWithoutItsBitAreNoColor) { ExpectRectangle(Rectangle("x", 7, 0x7fff)); }
 
 TEST(StlSurface, CornersAtOnePlaceWithOneNormalAreOneVertex) {
-  const absl::StatusOr<Model> model = ImportFile(DataFile("arrow.stl"), {});
+  const absl::StatusOr<Model> model = ReadHere(DataFile("arrow.stl"), {});
   ASSERT_THAT(model, IsOk());
   EXPECT_EQ(model->parts[0].indices.size(), 12u);
   EXPECT_EQ(model->parts[0].positions.size(), 12u) << "the faces of a tetrahedron share no normal";

@@ -12,6 +12,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "tests/tools/voxelctl/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
 #include "tools/voxelctl/import/importer.h"
@@ -35,7 +36,7 @@ std::string Svg(const std::string& content) {
 class Drawings : public testing::Test {
  protected:
   absl::StatusOr<Model> Import(const std::string& bytes) {
-    return ImportFile(folder_.Write("a.svg", bytes), {});
+    return ReadHere(folder_.Write("a.svg", bytes), {});
   }
   Model ReadAll(const std::string& content) {
     const auto model = Import(Svg(content));
@@ -322,7 +323,7 @@ TEST_F(Drawings, RealOnes) {
   const std::string folder = "/usr/share/pymol/data/";
   for (const char* name : {"openvr/hints_vive_controller.svg", "openvr/menu_splash.svg",
                            "pmg_qt/icons/refresh.svg", "pymol/icons/icon2.svg"}) {
-    const auto model = ImportFile(folder + name, {});
+    const auto model = ReadHere(folder + name, {});
     ASSERT_THAT(model, IsOk()) << name;
     double area = 0;
     for (const Part& part : model->parts) area += part.kind == Kind::kTriangles ? AreaOf(part) : 0;

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "absl/status/statusor.h"
+#include "tests/tools/voxelctl/read_here.h"
 #include "tests/tools/voxelctl/temp_folder.h"
 #include "tools/voxelctl/import/importer.h"
 
@@ -39,7 +40,7 @@ class Volumes : public testing::Test {
  protected:
   absl::StatusOr<Model> Import(const std::string& name, const std::string& bytes,
                                const ImportOptions& options = {}) {
-    return ImportFile(folder_.Write(name, bytes), options);
+    return ReadHere(folder_.Write(name, bytes), options);
   }
   SampledVolume Read(const std::string& name, const std::string& bytes,
                      const ImportOptions& options = {}) {

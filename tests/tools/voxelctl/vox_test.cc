@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "tests/tools/voxelctl/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
 #include "tools/voxelctl/import/importer.h"
@@ -65,7 +66,7 @@ std::string Shape(int32_t id, int32_t model) {
 class VoxFiles : public testing::Test {
  protected:
   absl::StatusOr<Model> Import(const std::string& bytes) {
-    return ImportFile(folder_.Write("a.vox", bytes), {});
+    return ReadHere(folder_.Write("a.vox", bytes), {});
   }
   Part Read(const std::string& chunks) {
     const auto model = Import(Vox(chunks));

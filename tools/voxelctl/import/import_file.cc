@@ -106,6 +106,13 @@ absl::Status CheckModel(const SourceFile& file, const Model& model) {
 
 }  // namespace
 
+absl::StatusOr<Model> ReadSource(const SourceFile& file, const ImportOptions& options) {
+  absl::StatusOr<Model> model = Read(file, options);
+  if (!model.ok()) return model;
+  if (absl::Status status = CheckModel(file, *model); !status.ok()) return status;
+  return model;
+}
+
 absl::StatusOr<Model> ImportFile(const std::string& path, const ImportOptions& options) {
   std::error_code ignored;
   const bool folder = std::filesystem::is_directory(path, ignored);

@@ -28,4 +28,7 @@ struct ImportOptions {
 // not empty. An error's message begins with the path and says what was found and what would be right.
 absl::StatusOr<Model> ImportFile(const std::string& path, const ImportOptions& options);
 
+// The same for a file that was read, in this process: for tests and fuzz targets, whose sanitizers are to see what happens.
+absl::StatusOr<Model> ReadSource(const SourceFile& file, const ImportOptions& options);
+
 }  // namespace voxeld::voxelctl

@@ -31,7 +31,7 @@ int NestingOf(const SourceFile& file) {
   if (file.extension == "dae") return ElementDepth(text);
   if (file.extension == "ifc") return BracketDepth(text, '\'');
   if (file.extension == "bvh" || absl::StartsWith(text, ";")) return BracketDepth(text, '"');
-  // Of formats that are not known here.
+  // All other text formats.
   if (text.substr(0, kHead).find('\0') != absl::string_view::npos) return 0;
   return std::max(
       absl::StartsWith(absl::StripLeadingAsciiWhitespace(text), "<") ? ElementDepth(text) : 0,

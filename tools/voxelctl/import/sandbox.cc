@@ -57,7 +57,7 @@ absl::Status ConfineFiles(const std::string& readable) {
   return absl::OkStatus();
 }
 
-// What reading needs, and what the C library does for it. All else fails with EPERM.
+// Calls that reading needs, and that the C library makes for it. All others fail with EPERM.
 constexpr int kCalls[] = {
     // Memory.
     SCMP_SYS(brk), SCMP_SYS(madvise), SCMP_SYS(mmap), SCMP_SYS(mprotect), SCMP_SYS(mremap),
@@ -74,11 +74,11 @@ constexpr int kCalls[] = {
     // Its own end. Without kill and tgkill abort() ends by a fault.
     SCMP_SYS(exit), SCMP_SYS(exit_group), SCMP_SYS(restart_syscall), SCMP_SYS(rt_sigaction),
     SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn), SCMP_SYS(sigaltstack),
-    // Of itself.
+    // Questions about itself.
     SCMP_SYS(getpid), SCMP_SYS(getrandom), SCMP_SYS(getrusage), SCMP_SYS(gettid),
     SCMP_SYS(sched_getaffinity), SCMP_SYS(sysinfo), SCMP_SYS(uname)};
 
-// The filter as the kernel takes it; empty if there is none.
+// Returns: the filter in the kernel's form; empty if it could not be made.
 std::vector<sock_filter> MakeFilter() {
   const scmp_filter_ctx filter = seccomp_init(SCMP_ACT_ERRNO(EPERM));
   if (filter == nullptr) return {};

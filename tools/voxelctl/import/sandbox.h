@@ -29,7 +29,7 @@ class Sandbox {
  private:
   Sandbox();
 
-  std::vector<sock_filter> filter_;  // empty: there is none
+  std::vector<sock_filter> filter_;  // empty if it could not be made
 };
 
 }  // namespace voxeld::voxelctl
