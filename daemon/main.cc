@@ -375,7 +375,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   });
   auto ticker = std::make_unique<access::Ticker>(clock, access::Security::kLookInterval, [&] {
     security->Look();
-    process.Look();
+    process.Look(core.budget()->used_bytes());
   });
   watch.Tell([server = server->get()](bool serving) { server->SetServing(serving); });
   *phase = http::Phase::kServing;

@@ -4,25 +4,27 @@
 
 namespace voxeld::daemon {
 
-void ProcessWatch::Look() {
+void ProcessWatch::Look(uint64_t held_bytes) {
   segments_.Look();
   if (const sync::TimeNs begun = clock_.Now(); begun >= count_at_) {
     heap_bytes_ = allocator_.count();
     count_at_ = Next(begun, kCount);
   }
   most_bytes_ = std::max<uint64_t>(most_bytes_, heap_bytes_);
-  const bool much = most_bytes_ - heap_bytes_ >= kMuch;
+  most_held_ = std::max(most_held_, held_bytes);
+  // The budget knows at once what counting may learn late.
+  const bool much = most_bytes_ - heap_bytes_ >= kMuch || most_held_ - held_bytes >= kMuch;
   const sync::TimeNs begun = clock_.Now();
-  if (begun >= give_back_at_ || (much && begun >= much_at_)) {
-    allocator_.give_back();
-    give_back_at_ = Next(begun, kGiveBack);
-    much_at_ = Next(begun, 0);
-    most_bytes_ = heap_bytes_;
-  }
+  if (begun < give_back_at_ && !(much && begun >= much_at_)) return;
+  allocator_.give_back();
+  much_at_ = Next(begun, 0, kRestOfMuch);
+  give_back_at_ = much ? Next(begun, kGiveBackAgain, kRestOfMuch) : Next(begun, kGiveBack);
+  most_bytes_ = heap_bytes_;
+  most_held_ = held_bytes;
 }
 
-sync::TimeNs ProcessWatch::Next(sync::TimeNs begun, sync::TimeNs period) const {
-  return begun + std::max(period, kRest * (clock_.Now() - begun));
+sync::TimeNs ProcessWatch::Next(sync::TimeNs begun, sync::TimeNs period, int64_t rest) const {
+  return begun + std::max(period, rest * (clock_.Now() - begun));
 }
 
 ProcessFigures ProcessWatch::figures() const {

@@ -21,8 +21,11 @@ class ProcessWatch {
   // memory, as of a client's scene that has gone, is given back at once.
   static constexpr sync::TimeNs kGiveBack = 60 * sync::kSecond, kCount = sync::kSecond;
   static constexpr int64_t kRest = 1000;
-  static constexpr uint64_t kMuch = uint64_t{32}
-                                    << 20;  // freed since the system was given something
+  // So much was freed since the system was given something. It is given back at once, and again when the rest of a large scene may
+  // have followed, within a hundredth of the time.
+  static constexpr uint64_t kMuch = uint64_t{32} << 20;
+  static constexpr sync::TimeNs kGiveBackAgain = 3 * sync::kSecond;
+  static constexpr int64_t kRestOfMuch = 100;
 
   struct Allocator {
     void (*give_back)() = &GiveBackFreeMemory;
@@ -39,13 +42,14 @@ class ProcessWatch {
         give_back_at_(clock.Now() + kGiveBack),
         count_at_(clock.Now() + kCount) {}
 
-  void Look();                         // every second or so, from one thread
+  // Call every second or so, from one thread. `held_bytes`: what clients' scenes take, as the budget has it.
+  void Look(uint64_t held_bytes = 0);
   void LookAtTime() { time_.Look(); }  // as TimeWatch says
   ProcessFigures figures() const;
 
  private:
   // When it is time again for what has begun at `begun`, each `period` if it is quick.
-  sync::TimeNs Next(sync::TimeNs begun, sync::TimeNs period) const;
+  sync::TimeNs Next(sync::TimeNs begun, sync::TimeNs period, int64_t rest = kRest) const;
 
   sync::Clock& clock_;
   const Allocator allocator_;
@@ -54,7 +58,8 @@ class ProcessWatch {
   std::atomic<uint64_t> heap_bytes_;
   // These belong to the thread that looks.
   sync::TimeNs give_back_at_, count_at_, much_at_ = 0;
-  uint64_t most_bytes_ = 0;  // allocated, since the system was given something
+  // At most, since the system was given something.
+  uint64_t most_bytes_ = 0, most_held_ = 0;
 };
 
 }  // namespace voxeld::daemon

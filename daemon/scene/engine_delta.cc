@@ -50,6 +50,12 @@ bool LooksSame(const Entity& a, const Entity& b) {
          a.data.content == b.data.content;
 }
 
+// clear() and an assignment of {} would keep the memory.
+template <typename Container>
+void Free(Container& container) {
+  Container().swap(container);
+}
+
 template <typename T>
 uint64_t BytesOf(const std::vector<T>& values) {
   return gpu::HeapBytes(values.capacity() * sizeof(T));
@@ -174,14 +180,14 @@ void EngineScene::Write(gpu::DeltaWriter& writer) {
   for (const uint64_t id : drop_geometries_) writer.Drop(gpu::Op::kDropGeometry, id);
   for (const uint64_t id : drop_layers_) writer.Drop(gpu::Op::kDropLayer, id);
   // A plan may be large, and the next one small.
-  put_geometries_ = {};
-  unused_ = {};
-  flat_ = {};
-  put_layers_ = {};
-  put_drawables_ = {};
-  drop_drawables_ = {};
-  drop_geometries_ = {};
-  drop_layers_ = {};
+  Free(put_geometries_);
+  Free(unused_);
+  Free(flat_);
+  Free(put_layers_);
+  Free(put_drawables_);
+  Free(drop_drawables_);
+  Free(drop_geometries_);
+  Free(drop_layers_);
 }
 
 uint64_t EngineScene::memory_bytes() const {
@@ -270,7 +276,7 @@ void EngineScene::Draw(const OwnedName& key, const Layer& layer, const std::stri
     parts.push_back({record.id, std::move(geometry)});
     Breathe();
   }
-  if (flat_.capacity() > kKeptSlots) flat_ = {};
+  if (flat_.capacity() > kKeptSlots) Free(flat_);
   for (size_t i = 0; i < old.size(); ++i) {
     if (i >= parts.size()) drop_drawables_.push_back(old[i].drawable);
     Release(old[i].geometry);

@@ -122,16 +122,33 @@ TEST_F(ScriptedAllocator, MuchThatWasFreedIsGivenBackAtOnce) {
   EXPECT_EQ(given_back_, 1) << "32 MiB since the most";
   Look(68 << 20);
   EXPECT_EQ(given_back_, 1) << "again without a reason";
+  for (int i = 0; i < 3; ++i) Look(68 << 20);
+  EXPECT_EQ(given_back_, 2) << "the rest may have followed";
+  for (int i = 0; i < 50; ++i) Look(68 << 20);
+  EXPECT_EQ(given_back_, 2);
   Look(200 << 20);
   Look(10 << 20);
-  EXPECT_EQ(given_back_, 2);
+  EXPECT_EQ(given_back_, 3);
 }
 
-TEST_F(ScriptedAllocator, HasAThousandthOfTheTimeForThatToo) {
-  gives_back_for_ = 10 * sync::kMillisecond;
-  for (int i = 0; i < 30; ++i) Look(i % 2 == 0 ? 100 << 20 : 0);
-  EXPECT_LE(given_back_, 4);
-  EXPECT_GE(given_back_, 2);
+TEST_F(ScriptedAllocator, WhatTheBudgetSaysIsEnough) {
+  gives_back_for_ = 0;
+  bytes_ = 0;
+  for (const uint64_t held : {uint64_t{100} << 20, uint64_t{69} << 20}) {
+    clock_.Advance(sync::kSecond);
+    watch_.Look(held);
+  }
+  EXPECT_EQ(given_back_, 0);
+  clock_.Advance(sync::kSecond);
+  watch_.Look(uint64_t{68} << 20);
+  EXPECT_EQ(given_back_, 1);
+}
+
+TEST_F(ScriptedAllocator, HasAHundredthOfTheTimeForThat) {
+  gives_back_for_ = 50 * sync::kMillisecond;
+  for (int i = 0; i < 60; ++i) Look(i % 2 == 0 ? 100 << 20 : 0);
+  EXPECT_LE(given_back_, 13) << "each five seconds";
+  EXPECT_GE(given_back_, 5);
 }
 
 #if defined(__GLIBC__) && !defined(VOXELD_SANITIZED)
