@@ -221,11 +221,13 @@ MemoryRoom Core::Impl::RoomFor(const WaitingCommit& commit) const {
   const uint64_t expected = store_.snapshot()->total.derived * engines;
   const uint64_t drawn = budget_->derived_bytes();
   // Messages that are being read have a limit of their own, and are charged when they are staged.
-  const uint64_t used = budget_->used_bytes() - budget_->used_bytes(Budget::Use::kArriving) +
-                        (expected > drawn ? expected - drawn : 0);
+  // These are read one after another, while other threads charge.
+  const auto less = [](uint64_t from, uint64_t by) { return from > by ? from - by : 0; };
+  const uint64_t used = less(budget_->used_bytes(), budget_->used_bytes(Budget::Use::kArriving)) +
+                        less(expected, drawn);
   // The commit's own bytes become the scene's.
   const uint64_t limit = budget_->limit_bytes() + commit.bytes;
-  return {.bytes = limit > used ? limit - used : 0, .engines = engines};
+  return {.bytes = less(limit, used), .engines = engines};
 }
 
 void Core::Impl::Apply(Session& session, WaitingCommit commit) {

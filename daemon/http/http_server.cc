@@ -102,22 +102,30 @@ class Connection : public std::enable_shared_from_this<Connection> {
   }
 
  private:
-  void OnHeader(const error_code& error) {
+  // False: it has been refused.
+  bool Admitted() {
     waits_ = false;
-    if (error || !closed_) return OnRead(error);
-    if (!served_.admit(*this, Asked().path)) {
-      return Write(Plain(503, absl::StrCat(options_.max_connections,
-                                           " requests and WebSockets are being served, which is "
-                                           "max_http_connections; try again later")),
-                   true);
-    }
+    if (served_.admit(*this, Asked().path)) return true;
+    Write(Plain(503, absl::StrCat(options_.max_connections,
+                                  " requests and WebSockets are being served, which is "
+                                  "max_http_connections; try again later")),
+          true);
+    return false;
+  }
+
+  void OnHeader(const error_code& error) {
+    if (!closed_) return;
+    if (error) return OnRead(error);
     head_ = parser_->get().method() == wire::verb::head;
     if (parser_->get().count(wire::field::host) > 1) {
       return Write(Plain(400, "bad request: there is more than one Host header"), true);
     }
     if (parser_->get().method() == wire::verb::post && served_.receive) {
       std::optional<Reception> reception = served_.receive(Asked());
-      if (reception.has_value()) return GiveBodyAway(*std::move(reception));
+      if (reception.has_value()) {
+        if (Admitted()) GiveBodyAway(*std::move(reception));
+        return;
+      }
     }
     const auto length = parser_->content_length();
     if (length.has_value() && *length > kGreatestBody) return OnRead(wire::error::body_limit);
@@ -128,7 +136,12 @@ class Connection : public std::enable_shared_from_this<Connection> {
   }
 
   void OnRead(const error_code& error) {
-    if (!error) return Answer();
+    if (!closed_) return;
+    if (!error) {
+      if (Admitted()) Answer();
+      return;
+    }
+    waits_ = false;
     // What is no HTTP gets an answer too; what is no request any more does not.
     if (error == wire::error::header_limit)
       return Write(Plain(431, "the header is too large"), true);
@@ -360,14 +373,14 @@ class Server::Impl {
   }
 
   bool Admit(Connection& asking, std::string_view path) {
-    if (asking.placed()) return true;
     const auto& reserved = options_.reserved_paths;
     const size_t places =
         options_.max_connections +
         (std::find(reserved.begin(), reserved.end(), path) == reserved.end() ? 0 : kReservedPlaces);
-    if (Placed() >= options_.max_connections && !CloseLongestIdle(true) && Placed() >= places) {
-      return false;
+    const size_t mine = asking.placed() ? 1 : 0;
+    while (Placed() - mine >= options_.max_connections && CloseLongestIdle(true)) {
     }
+    if (Placed() - mine >= places) return false;
     asking.Place();
     return true;
   }

@@ -24,11 +24,13 @@ absl::Status Guard::MayEnter(const Peer& peer) {
     const auto penalty = penalties_.find(peer.address);
     if (penalty != penalties_.end() && now < penalty->second.until) {
       ++counters_.refused_after_cut;
-      status = absl::ResourceExhaustedError(absl::StrCat(
+      status = absl::UnavailableError(absl::StrCat(
           "a connection from ", peer.address, " was cut; further ones are refused for ",
           (penalty->second.until - now) / sync::kMillisecond,
           " ms, which cut_penalty_ns and the times before come to"));
-    } else if (IsFull(of_address, limits_.max_connections_per_address, peer.address, doomed)) {
+    } else if (of_address.authorised >= limits_.max_connections_per_address ||
+               (counted_.authorised < limits_.max_connections &&
+                IsFull(of_address, limits_.max_connections_per_address, peer.address, doomed))) {
       ++counters_.refused_by_address;
       status = absl::ResourceExhaustedError(
           absl::StrCat(of_address.open, " connections from ", peer.address,

@@ -95,7 +95,7 @@ class Guard {
   // ---- from the listener
 
   // Whether another connection of `peer` may be had, counted and logged: ResourceExhausted says
-  // which limit it would go beyond, or that its address is refused. May cut another one to make room.
+  // which limit it would go beyond, Unavailable that its address is refused for a while. May cut another one to make room.
   absl::Status MayEnter(const Peer& peer);
   // From accept on. `own`: the daemon's own, which counts against no limit but those of bytes and
   // time.

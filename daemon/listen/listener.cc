@@ -211,8 +211,9 @@ class Listener::Impl {
                   absl::StrCat("user ", who->user, ", process ", who->process));
       }
     }
-    if (!own && !guard_.MayEnter(peer).ok()) {
-      if (!accepted.tls) {
+    const absl::Status may = own ? absl::OkStatus() : guard_.MayEnter(peer);
+    if (!may.ok()) {
+      if (!accepted.tls && absl::IsResourceExhausted(may)) {
         const std::string frames = Greeting::RefusalFrames();
         send(connection.get(), frames.data(), frames.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
       }

@@ -47,6 +47,8 @@ struct ServiceContext {
   Logger* log = nullptr;  // may be none
   StreamLimits limits;
   WatchSlots scene_watches{"the scene", "max_scene_watches", 64};
+  // Ended, since their clients did not read; gRPC holds a message of each until they do.
+  WatchSlots stalled_watches{"the scene whose clients do not read", "max_scene_watches", 64};
   WatchSlots stats_watches{"the statistics", "max_stats_watches", 64};
   WatchSlots volume_watches{"volumes", "max_volume_watches", 16};
   const access::Access* access = nullptr;  // none: everybody may do everything

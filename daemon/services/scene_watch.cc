@@ -138,7 +138,9 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
         "the client took no message for ", context_.limits.watch_write_limit_ns / 1'000'000,
         " ms, which is watch_write_limit_ns: the scene is no longer held for it; read on while "
         "watching, or watch anew"));
-    slot_.Release();                  // others may watch, whenever its client reads on
+    // Others may watch, whenever its client reads on; but for clients without number that never do.
+    absl::StatusOr<WatchSlots::Slot> stalled = context_.stalled_watches.Take(caller().who);
+    if (stalled.ok()) slot_ = *std::move(stalled);
     messages_.LetGo(&told, &target);  // nobody has the turn while a message is written, nor after
   }
 

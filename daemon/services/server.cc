@@ -69,6 +69,8 @@ class Server::Impl {
                  .log = options_.log,
                  .limits = options_.streams,
                  .scene_watches{"the scene", "max_scene_watches", options_.max_scene_watches},
+                 .stalled_watches{"the scene whose clients do not read", "max_scene_watches",
+                                  options_.max_scene_watches},
                  .stats_watches{"the statistics", "max_stats_watches", options_.max_stats_watches},
                  .volume_watches{"volumes", "max_volume_watches", options_.max_volume_watches},
                  .access = options_.access,

@@ -78,8 +78,15 @@ absl::Status StateFile::Run(const char* sql) {
 
 absl::StatusOr<std::unique_ptr<StateFile>> StateFile::Open(StateFileOptions options) {
   std::unique_ptr<StateFile> file(new StateFile(std::move(options)));
+  const bool was_there = access(file->options_.path.c_str(), F_OK) == 0;
   absl::Status status = file->OpenDatabase();
   if (absl::IsDataLoss(status)) status = file->StartAnew(std::string(status.message()));
+  struct stat info {};
+  if (!status.ok() && !was_there && stat(file->options_.path.c_str(), &info) == 0 &&
+      info.st_size == 0) {
+    unlink(
+        file->options_.path.c_str());  // else the next start would take it for one that was emptied
+  }
   if (!status.ok()) return status;
   return file;
 }

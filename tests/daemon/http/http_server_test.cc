@@ -398,6 +398,16 @@ TEST_F(HttpServer, WhereAllAreAtWorkARequestIsRefusedButForReservedPaths) {
   for (int i = 0; i < 20; ++i) {
     EXPECT_THAT(Ask(Get("/hello")), StartsWith("HTTP/1.1 200 ")) << i;
   }
+  // One that is kept open after such a request leaves its place to no other, and may not ask for anything else itself.
+  Connection kept(server_->address());
+  kept.Send(Get("/hello"));
+  EXPECT_THAT(kept.ReadTo("hello\n"), StartsWith("HTTP/1.1 200 "));
+  EXPECT_THAT(Ask(Get("/later")), StartsWith("HTTP/1.1 503 "));
+  Connection again(server_->address());
+  again.Send(Get("/hello"));
+  EXPECT_THAT(again.ReadTo("hello\n"), StartsWith("HTTP/1.1 200 "));
+  again.Send(Get("/later"));
+  EXPECT_THAT(again.ReadTo("\r\n\r\n"), StartsWith("HTTP/1.1 503 "));
   for (Done& done : work) done({.body = "done\n"});
   EXPECT_THAT(first.ReadTo("done\n"), StartsWith("HTTP/1.1 200 "));
   EXPECT_THAT(second.ReadTo("done\n"), StartsWith("HTTP/1.1 200 "));

@@ -4,14 +4,17 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <linux/openat2.h>
 #include <seccomp.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
@@ -24,6 +27,7 @@
 #include "absl/strings/str_cat.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
+#include "tools/voxelctl/import/importer.h"
 #include "tools/voxelctl/import/sandbox.h"
 
 namespace voxeld::voxelctl {
@@ -89,6 +93,36 @@ TEST(Contained, WhatGoesWrongIsSaid) {
   EXPECT_THAT(error([]() -> absl::StatusOr<Model> { std::abort(); }), HasSubstr("crashed"));
 }
 
+// A reader in a stranger's hands sends what no honest one does.
+TEST(Contained, ModelsThatAreNotSoundAreRefused) {
+  const auto refused = [](const std::function<void(Model&)>& spoil) {
+    Model model;
+    model.path = "p";
+    model.parts.push_back({.kind = Kind::kTriangles,
+                           .positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}},
+                           .normals = std::vector<Point3>(3),
+                           .colors = std::vector<Rgb>(3),
+                           .indices = {0, 1, 2}});
+    SampledVolume& volume = model.volumes.emplace_back();
+    volume.size = {1, 2, 2};
+    volume.samples = {1, 2, 3, 4};
+    spoil(model);
+    return !CheckModel({.path = "p"}, model).ok();
+  };
+  EXPECT_FALSE(refused([](Model&) {}));
+  EXPECT_TRUE(refused([](Model& m) { m.parts[0].colors.pop_back(); }));
+  EXPECT_TRUE(refused([](Model& m) { m.parts[0].normals.pop_back(); }));
+  EXPECT_TRUE(refused([](Model& m) { m.parts[0].normals[1].x = std::nan(""); }));
+  EXPECT_TRUE(refused([](Model& m) { m.parts[0].indices.pop_back(); }));
+  EXPECT_TRUE(refused([](Model& m) { m.parts[0].indices[1] = 3; }));
+  EXPECT_TRUE(refused([](Model& m) { m.parts[0].kind = Kind::kPoints; }));
+  EXPECT_TRUE(refused([](Model& m) { m.parts[0].level = kMostLevel + 1; }));
+  EXPECT_TRUE(refused([](Model& m) { m.parts[0].thickness = HUGE_VAL; }));
+  EXPECT_TRUE(refused([](Model& m) { m.volumes[0].corners[3].y = HUGE_VAL; }));
+  // Their product is 4 modulo 2⁶⁴.
+  EXPECT_TRUE(refused([](Model& m) { m.volumes[0].size = {968973220, 49477, 384773}; }));
+}
+
 // What `act` returns as a reader of `file`: 0, or the error of the call that failed.
 int ErrorOf(const SourceFile& file, const std::function<bool()>& act) {
   const auto model = ReadContained(file, [&act]() -> absl::StatusOr<Model> {
@@ -142,8 +176,18 @@ TEST_F(SandboxTest, AFileOfTheUsersOwnOpensWhatItsFolderHolds) {
 TEST_F(SandboxTest, NothingIsWrittenRemovedOrStarted) {
   file_.other_files = OtherFiles::kAny;
   const pid_t parent = ::getpid();
-  EXPECT_EQ(ErrorOf(file_, [&] { return Opens(inside_, O_WRONLY); }), EACCES);
-  EXPECT_EQ(ErrorOf(file_, [&] { return Opens(folder_.Path("new"), O_CREAT | O_WRONLY); }), EACCES);
+  EXPECT_EQ(ErrorOf(file_, [&] { return Opens(inside_, O_WRONLY); }), EPERM);
+  EXPECT_EQ(ErrorOf(file_, [&] { return Opens(folder_.Path("new"), O_CREAT | O_WRONLY); }), EPERM);
+  EXPECT_EQ(ErrorOf(file_, [&] { return ::fcntl(STDIN_FILENO, F_SETOWN, parent) == 0; }), EPERM);
+  EXPECT_EQ(ErrorOf(file_,
+                    [&] {
+                      open_how how = {};
+                      how.flags = O_WRONLY;
+                      return ::syscall(SYS_openat2, AT_FDCWD, inside_.c_str(), &how, sizeof(how)) >=
+                             0;
+                    }),
+            EACCES)
+      << "this is Landlock's";
   EXPECT_EQ(ErrorOf(file_, [&] { return ::unlink(inside_.c_str()) == 0; }), EPERM);
   EXPECT_EQ(ErrorOf(file_, [&] { return ::truncate(inside_.c_str(), 0) == 0; }), EPERM);
   EXPECT_EQ(ErrorOf(file_, [] { return ::execl("/bin/true", "true", nullptr) == 0; }), EPERM);

@@ -41,6 +41,9 @@ namespace {
 constexpr rlim_t kMostSeconds = 120, kMostDescriptors = 64;
 constexpr unsigned kMostWaiting = 600;  // s
 constexpr int kNoSandbox = 2;           // exit status
+// What the reader may send: more than the largest model (kMaxModelVertices and the others).
+constexpr rlim_t kMostModelBytes = rlim_t{5} << 30;
+constexpr uint64_t kMostMessageBytes = 64 << 10;
 
 class Writer {
  public:
@@ -153,7 +156,21 @@ absl::Status Spoilt(const SourceFile& file, absl::string_view how) {
                    "the file is damaged or not what its name says");
 }
 
-// The writer may be in a stranger's hands, so enumerations are checked; ImportFile checks the rest.
+// One of those that readers use.
+absl::StatusCode CodeOf(int code) {
+  switch (static_cast<absl::StatusCode>(code)) {
+    case absl::StatusCode::kNotFound:
+    case absl::StatusCode::kPermissionDenied:
+    case absl::StatusCode::kFailedPrecondition:
+    case absl::StatusCode::kUnimplemented:
+    case absl::StatusCode::kResourceExhausted:
+      return static_cast<absl::StatusCode>(code);
+    default:
+      return absl::StatusCode::kInvalidArgument;
+  }
+}
+
+// The writer may be in a stranger's hands, so enumerations are checked; ImportFile checks the rest (CheckModel).
 absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_t size) {
   Reader reader(bytes, size);
   int code = 0;
@@ -161,8 +178,8 @@ absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_
   if (code != 0) {
     std::string message;
     reader.All(&message);
-    if (!reader.ok()) return Spoilt(file, "gave up");
-    return absl::Status(static_cast<absl::StatusCode>(code), message);
+    if (!reader.ok() || message.size() > kMostMessageBytes) return Spoilt(file, "gave up");
+    return absl::Status(CodeOf(code), message);
   }
   Model model;
   uint64_t parts = 0, volumes = 0;
@@ -241,6 +258,7 @@ rlim_t AddressSpace() {
   Limit(RLIMIT_CORE, 0);
   Limit(RLIMIT_CPU, kMostSeconds);
   Limit(RLIMIT_NOFILE, kMostDescriptors);
+  Limit(RLIMIT_FSIZE, kMostModelBytes);
 #if !defined(VOXELD_SHADOW_MEMORY)
   Limit(RLIMIT_AS, AddressSpace() + kMostMemory + kOfFile * file.bytes.size());
 #endif
@@ -300,8 +318,13 @@ absl::StatusOr<Model> ReadContained(const SourceFile& file,
   if (WIFSIGNALED(state)) {
     const int signal = WTERMSIG(state);
     if (signal == SIGINT || signal == SIGTERM) return absl::CancelledError("interrupted");
-    if (signal == SIGXCPU || signal == SIGKILL || signal == SIGALRM)
+    if (signal == SIGXCPU)
       return Spoilt(file, absl::StrCat("did not end within ", kMostSeconds, " s of the processor"));
+    if (signal == SIGALRM)
+      return Spoilt(file, absl::StrCat("did not end within ", kMostWaiting, " s"));
+    if (signal == SIGKILL)
+      return Spoilt(file, "was killed, as the system does when memory is short");
+    if (signal == SIGXFSZ) return Spoilt(file, "made more than a model may hold");
     return Spoilt(file, absl::StrCat("crashed (", ::strsignal(signal), ")"));
   }
   if (WEXITSTATUS(state) == kNoSandbox) {

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <system_error>
@@ -65,11 +66,47 @@ absl::StatusOr<Model> Read(const SourceFile& file, const ImportOptions& options)
   return ReadMoreFormats(file, options);
 }
 
+bool IsFinite(const Point3& p) {
+  return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
+}
+bool IsFinite(double number) { return std::isfinite(number); }
+
+template <typename Values>
+bool AreFinite(const Values& values) {
+  return std::all_of(std::begin(values), std::end(values),
+                     [](const auto& value) { return IsFinite(value); });
+}
+
+// Arrays have the lengths that all who read them rely on: the reader of a file may be in a stranger's hands.
+bool IsSound(const Part& part) {
+  const size_t count = part.positions.size();
+  const size_t each = part.kind == Kind::kPoints ? 0 : part.kind == Kind::kSegments ? 2 : 3;
+  return (part.normals.empty() || part.normals.size() == count) &&
+         (part.colors.empty() || part.colors.size() == count) &&
+         (each == 0 ? part.indices.empty() : part.indices.size() % each == 0) &&
+         part.level <= kMostLevel && std::isfinite(part.thickness) && AreFinite(part.normals);
+}
+
+// 0 if there are none, or more than a model may hold.
+uint64_t SamplesOf(const SampledVolume& volume) {
+  uint64_t samples = 1;
+  for (const uint32_t size : volume.size) {
+    if (size == 0 || samples > kMaxModelSamples / size) return 0;
+    samples *= size;
+  }
+  return samples;
+}
+
+}  // namespace
+
 // What every reader promises, held to: a slip in a library must not reach the server.
 absl::Status CheckModel(const SourceFile& file, const Model& model) {
-  uint64_t vertices = 0;
+  uint64_t vertices = 0, indices = 0, all_samples = 0;
   for (const Part& part : model.parts) {
     vertices += part.positions.size();
+    indices += part.indices.size();
+    if (!IsSound(part))
+      return FileError(file, "holds a part that is not sound", "damaged files are not read");
     for (const Point3& p : part.positions) {
       if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
         return FileError(file, absl::StrCat("holds the vertex (", p.x, ", ", p.y, ", ", p.z, ")"),
@@ -84,7 +121,11 @@ absl::Status CheckModel(const SourceFile& file, const Model& model) {
     }
   }
   for (const SampledVolume& volume : model.volumes) {
-    const uint64_t samples = uint64_t{volume.size[0]} * volume.size[1] * volume.size[2];
+    const uint64_t samples = SamplesOf(volume);
+    all_samples += samples;
+    if (!AreFinite(volume.corners) || (volume.window && !AreFinite(*volume.window))) {
+      return FileError(file, "holds a volume at no place", "its corners must be finite");
+    }
     if (samples == 0 || samples != volume.samples.size()) {
       return FileError(file, absl::StrCat("holds ", volume.samples.size(), " samples"),
                        absl::StrCat("its size makes ", samples));
@@ -99,12 +140,18 @@ absl::Status CheckModel(const SourceFile& file, const Model& model) {
     }
     ++vertices;
   }
+  if (vertices > kMaxModelVertices || indices > kMaxModelIndices ||
+      all_samples > kMaxModelSamples) {
+    return FileError(file,
+                     absl::StrCat("holds ", vertices, " vertices, ", indices, " indices and ",
+                                  all_samples, " samples"),
+                     absl::StrCat("at most ", kMaxModelVertices, ", ", kMaxModelIndices, " and ",
+                                  kMaxModelSamples, " are read"));
+  }
   if (vertices == 0)
     return FileError(file, "holds nothing to draw", "at least one vertex is expected");
   return absl::OkStatus();
 }
-
-}  // namespace
 
 absl::StatusOr<Model> ReadSource(const SourceFile& file, const ImportOptions& options) {
   absl::StatusOr<Model> model = Read(file, options);

@@ -28,6 +28,9 @@ struct ImportOptions {
 // not empty. An error's message begins with the path and says what was found and what would be right.
 absl::StatusOr<Model> ImportFile(const std::string& path, const ImportOptions& options);
 
+// Returns: InvalidArgument unless `model` is all that is promised above.
+absl::Status CheckModel(const SourceFile& file, const Model& model);
+
 // The same for a file that was read, in this process: for tests and fuzz targets, whose sanitizers are to see what happens.
 absl::StatusOr<Model> ReadSource(const SourceFile& file, const ImportOptions& options);
 

@@ -2,25 +2,49 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <iterator>
+#include <string>
+
+#include "absl/strings/match.h"
 
 namespace voxeld::voxelctl {
 
 int ElementDepth(absl::string_view text) {
+  // UTF-16 of ASCII has a NUL beside each character.
+  std::string plain;
+  if (text.find('\0') != absl::string_view::npos) {
+    std::copy_if(text.begin(), text.end(), std::back_inserter(plain),
+                 [](char c) { return c != 0; });
+    text = plain;
+  }
+  const auto skip = [&text](size_t at, absl::string_view end) {
+    const size_t found = text.find(end, at);
+    return found == absl::string_view::npos ? text.size() : found + end.size();
+  };
   int depth = 0, deepest = 0;
-  char before = 0;      // the character before, but for NULs
-  bool in_tag = false;  // of an element's beginning
-  for (const char c : text) {
-    if (c == '\0') continue;
-    if (before == '<' && c == '/') {
+  for (size_t at = text.find('<'); at < text.size(); at = text.find('<', at)) {
+    const absl::string_view rest = text.substr(at);
+    if (absl::StartsWith(rest, "<!--")) {
+      at = skip(at + 4, "-->");
+    } else if (absl::StartsWith(rest, "<![CDATA[")) {
+      at = skip(at + 9, "]]>");
+    } else if (absl::StartsWith(rest, "<?") || absl::StartsWith(rest, "<!")) {
+      at = skip(at + 2, ">");
+    } else if (absl::StartsWith(rest, "</")) {
       depth = std::max(0, depth - 1);
-    } else if (before == '<' && c != '?' && c != '!') {
-      deepest = std::max(deepest, ++depth);
-      in_tag = true;
-    } else if (c == '>' && in_tag) {
-      if (before == '/') --depth;
-      in_tag = false;
+      at += 2;
+    } else {
+      // To the end of the tag; '>' may stand in its attributes.
+      size_t end = at + 1;
+      while (end < text.size() && text[end] != '>') {
+        if (text[end] == '"' || text[end] == '\'') end = text.find(text[end], end + 1);
+        if (end < text.size()) ++end;
+      }
+      end = std::min(end, text.size());
+      deepest = std::max(deepest, depth + 1);
+      if (text[end - 1] != '/') ++depth;
+      at = end;
     }
-    before = c;
   }
   return deepest;
 }
