@@ -45,9 +45,9 @@ constexpr int kNoSandbox = 2;           // exit status
 constexpr rlim_t kMostModelBytes = rlim_t{5} << 30;
 constexpr uint64_t kMostMessageBytes = 64 << 10;
 
-class Writer {
+class ModelWriter {
  public:
-  explicit Writer(int descriptor) : descriptor_(descriptor) {}
+  explicit ModelWriter(int descriptor) : descriptor_(descriptor) {}
   bool ok() const { return ok_; }
 
   void Bytes(const void* bytes, size_t size) {
@@ -71,9 +71,9 @@ class Writer {
   bool ok_ = true;
 };
 
-class Reader {
+class ModelReader {
  public:
-  Reader(const char* at, size_t size) : at_(at), left_(size) {}
+  ModelReader(const char* at, size_t size) : at_(at), left_(size) {}
   bool ok() const { return ok_; }
 
   void Bytes(void* out, size_t size) {
@@ -99,7 +99,7 @@ class Reader {
   bool ok_ = true;
 };
 
-void WriteVolume(const SampledVolume& volume, Writer& writer) {
+void WriteVolume(const SampledVolume& volume, ModelWriter& writer) {
   const uint8_t has_window = volume.window.has_value();
   writer.Bytes(&volume.size, sizeof(volume.size));
   writer.Bytes(&volume.corners, sizeof(volume.corners));
@@ -109,7 +109,7 @@ void WriteVolume(const SampledVolume& volume, Writer& writer) {
   writer.All(volume.colors);
 }
 
-SampledVolume ReadVolume(Reader& reader) {
+SampledVolume ReadVolume(ModelReader& reader) {
   SampledVolume volume;
   uint8_t has_window = 0;
   reader.Bytes(&volume.size, sizeof(volume.size));
@@ -122,7 +122,7 @@ SampledVolume ReadVolume(Reader& reader) {
 }
 
 bool WriteModel(const absl::StatusOr<Model>& model, int descriptor) {
-  Writer writer(descriptor);
+  ModelWriter writer(descriptor);
   const int code = model.status().raw_code();
   writer.Bytes(&code, sizeof(code));
   if (!model.ok()) {
@@ -172,7 +172,7 @@ absl::StatusCode CodeOf(int code) {
 
 // The writer may be in a stranger's hands, so enumerations are checked; ImportFile checks the rest (CheckModel).
 absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_t size) {
-  Reader reader(bytes, size);
+  ModelReader reader(bytes, size);
   int code = 0;
   reader.Bytes(&code, sizeof(code));
   if (code != 0) {

@@ -66,15 +66,15 @@ absl::StatusOr<Model> Read(const SourceFile& file, const ImportOptions& options)
   return ReadMoreFormats(file, options);
 }
 
-bool IsFinite(const Point3& p) {
+bool IsFiniteValue(const Point3& p) {
   return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
 }
-bool IsFinite(double number) { return std::isfinite(number); }
+bool IsFiniteValue(double number) { return std::isfinite(number); }
 
 template <typename Values>
-bool AreFinite(const Values& values) {
+bool AllFinite(const Values& values) {
   return std::all_of(std::begin(values), std::end(values),
-                     [](const auto& value) { return IsFinite(value); });
+                     [](const auto& value) { return IsFiniteValue(value); });
 }
 
 // Arrays have the lengths that all who read them rely on: the reader of a file may be in a stranger's hands.
@@ -84,7 +84,7 @@ bool IsSound(const Part& part) {
   return (part.normals.empty() || part.normals.size() == count) &&
          (part.colors.empty() || part.colors.size() == count) &&
          (each == 0 ? part.indices.empty() : part.indices.size() % each == 0) &&
-         part.level <= kMostLevel && std::isfinite(part.thickness) && AreFinite(part.normals);
+         part.level <= kMostLevel && std::isfinite(part.thickness) && AllFinite(part.normals);
 }
 
 // 0 if there are none, or more than a model may hold.
@@ -123,7 +123,7 @@ absl::Status CheckModel(const SourceFile& file, const Model& model) {
   for (const SampledVolume& volume : model.volumes) {
     const uint64_t samples = SamplesOf(volume);
     all_samples += samples;
-    if (!AreFinite(volume.corners) || (volume.window && !AreFinite(*volume.window))) {
+    if (!AllFinite(volume.corners) || (volume.window && !AllFinite(*volume.window))) {
       return FileError(file, "holds a volume at no place", "its corners must be finite");
     }
     if (samples == 0 || samples != volume.samples.size()) {
