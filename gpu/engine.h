@@ -98,7 +98,7 @@ struct EngineOptions {
   // Called once, from a thread of the engine's, when an engine in a process of its own is lost, also
   // between calls. It must only post.
   std::function<void(const absl::Status&)> lost;
-  // Once it is true, what the CPU engine is drawing is given up, in DataLoss: nobody will see it. Null: never.
+  // When it becomes true, the CPU engine gives up its call in DataLoss. For a daemon that stops. May be null.
   std::shared_ptr<const std::atomic<bool>> abandoned;
   SlicePart part;
   uint64_t staging_limit_bytes = uint64_t{4} << 30;  // of blocks at once, until they are applied

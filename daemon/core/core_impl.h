@@ -217,7 +217,7 @@ class Core::Impl {
   // apply it now.
   bool PutAside(Session& session, WaitingCommit& commit);
   sync::TimeNs DueTime(sync::TimeNs present_at) const;
-  // By how much the scene may grow with it.
+  // Returns: by how much the scene may grow in this commit.
   MemoryRoom RoomFor(const WaitingCommit& commit) const;
   void Apply(Session& session, WaitingCommit commit);
   void RefuseCommit(Session& session, const WaitingCommit& commit, uint64_t refused,

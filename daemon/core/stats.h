@@ -76,7 +76,7 @@ struct ListenFigures {
   // beginning of a call; bytes without end that no call or message came of.
   uint64_t cut_for_bytes = 0, cut_for_time = 0, cut_for_cancelling = 0;
   uint64_t cut_for_greeting = 0, cut_for_flooding = 0;
-  uint64_t cut_for_room = 0;     // unauthorised and idle, when another one needed the place
+  uint64_t cut_for_room = 0;     // unauthorised and idle, to make room for another one
   uint64_t accept_failures = 0;  // out of descriptors, say; tried again until it works
   uint64_t probe_failures = 0;   // of connections to itself
   // Calls whose callers may not make them; those ended since their callers may not any more.

@@ -56,7 +56,7 @@ struct Served {
   const Handler handler;
   const Upgrade upgrade;
   const Receive receive;
-  // Whether the connection, of which a request for the path has come, has a place. Closes another one if need be.
+  // Gives a connection a place for a request of this path, and closes an idle one for it if necessary. Returns: whether there was one.
   std::function<bool(Connection&, std::string_view path)> admit;
   std::function<void(Stream, const RequestMessage&, const ServeWebSocket&)> upgraded;
   std::function<void(Stream, beast::flat_buffer, std::unique_ptr<BodyParser>, Reception)> received;
@@ -102,7 +102,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   }
 
  private:
-  // False: it has been refused.
+  // Takes a place for the request that has come. Returns: false if there was none, and the request has been answered with 503.
   bool Admitted() {
     waits_ = false;
     if (served_.admit(*this, Asked().path)) return true;

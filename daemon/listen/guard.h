@@ -80,8 +80,8 @@ class Guard {
   static constexpr sync::TimeNs kGrace = 100 * sync::kMillisecond;
   static constexpr int64_t kLongestPenalty = 64;  // of cut_penalty_ns
   static constexpr sync::TimeNs kFirstCall = 200 * sync::kMillisecond;
-  static constexpr uint32_t kYoungBeyond =
-      2;  // so many times a limit may be open while some are younger
+  // Connections younger than kFirstCall may exceed a limit by this factor.
+  static constexpr uint32_t kYoungBeyond = 2;
   // Addresses that are refused at once; further ones replace those whose time is over first.
   static constexpr size_t kMostPenalties = 4096;
 
@@ -141,7 +141,7 @@ class Guard {
     uint64_t base = 0;       // bytes that had come by then, if it was answered
     uint32_t waiting = 0;    // calls that the daemon has yet to answer
     bool watched = false;    // not authorised yet
-    bool answered = false;   // a call of it was, without authorising it
+    bool answered = false;   // a call was answered that does not authorise it
     bool cut = false;
     bool counted = false;  // against the limits
     bool authorised = false;
@@ -155,7 +155,7 @@ class Guard {
   struct Penalty {
     sync::TimeNs length = 0, until = 0;
   };
-  // That count against a limit.
+  // Connections that count against a limit.
   struct Counted {
     uint32_t open = 0, authorised = 0;
   };
@@ -179,7 +179,7 @@ class Guard {
   // Cuts the unauthorised connection that has been idle longest, of `address` or (empty) of all. Returns: false if none has had its
   // time for a first call.
   bool MakeRoom(const std::string& address, std::vector<Doomed>& doomed) VOXELD_REQUIRES(mutex_);
-  // So that no more connections are open than limits allow, as soon as that is possible.
+  // Cuts connections until no limit is exceeded, as far as that is possible yet.
   void MakeAllRoom(std::vector<Doomed>& doomed) VOXELD_REQUIRES(mutex_);
   void Doom(Connection& connection, Counters::Count& counter, std::string why, bool punished,
             std::vector<Doomed>& doomed) VOXELD_REQUIRES(mutex_);

@@ -197,7 +197,7 @@ class FramePipeline final : private display::Display::Listener {
   gpu::Target CurrentTarget() const;
   absl::Status ApplyDelta(size_t size);
   void OnCallDone(const absl::Status& status);
-  // `derived`: what was expected of the scene that it has drawn (OwnerTally::derived).
+  // Charges what the engine holds. `derived`: the upper bound that was expected for the scene that it has drawn (OwnerTally::derived).
   void SetEngineBytes(uint64_t bytes, uint64_t derived);
   void OnFrame(const absl::StatusOr<gpu::FrameResult>& result);
   void OnEngineFailure(const absl::Status& status, sync::TimeNs since);

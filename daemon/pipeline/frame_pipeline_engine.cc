@@ -83,6 +83,10 @@ void FramePipeline::TakeReturned() {
 void FramePipeline::SetEngineBytes(uint64_t bytes, uint64_t derived) {
   if (budget_ == nullptr) return;
   using Use = Budget::Use;
+  // A scene that grows is not counted twice meanwhile, as expected and as measured.
+  if (derived > derived_bytes_) {
+    budget_->ReplaceDerived(std::exchange(derived_bytes_, derived), derived);
+  }
   if (bytes > engine_bytes_) budget_->ChargeAnyway(Use::kEngines, bytes - engine_bytes_);
   if (bytes < engine_bytes_) budget_->Release(Use::kEngines, engine_bytes_ - bytes);
   engine_bytes_ = bytes;

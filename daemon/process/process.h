@@ -17,8 +17,7 @@ void TuneProcess();
 // places are free, and others who want memory of that arena wait for it; what is wanted again is faulted in again.
 void GiveBackFreeMemory();
 
-// Bytes that are allocated, as the allocator counts, and what it keeps for each thread. 0: it does
-// not tell.
+// Returns: allocated bytes, as the allocator counts them, with its caches of each thread; 0 if it does not count.
 uint64_t HeapBytes();
 
 // As many descriptors as the process may have: every client holds two, what serves it and what guards it.

@@ -16,13 +16,12 @@ namespace voxeld::daemon {
 // Thread-safe but for Look. One a process; all that it is made with outlives it.
 class ProcessWatch {
  public:
-  // How often the system is given what the allocator keeps, and what is allocated is counted. Both go through all that is
-  // free, and whoever wants memory waits meanwhile: of the time they may have a thousandth. Much freed
-  // memory, as of a client's scene that has gone, is given back at once.
+  // How often free memory is returned to the system, and how often allocated memory is counted. Both walk through all free
+  // blocks while other threads that allocate wait, so they may take a thousandth of the time.
   static constexpr sync::TimeNs kGiveBack = 60 * sync::kSecond, kCount = sync::kSecond;
   static constexpr int64_t kRest = 1000;
-  // So much was freed since the system was given something. It is given back at once, and again when the rest of a large scene may
-  // have followed, within a hundredth of the time.
+  // If this much was freed since memory was last returned, as when a large scene goes, it is returned at once, and again after
+  // kGiveBackAgain, when the rest of the scene may have followed. This may take a hundredth of the time.
   static constexpr uint64_t kMuch = uint64_t{32} << 20;
   static constexpr sync::TimeNs kGiveBackAgain = 3 * sync::kSecond;
   static constexpr int64_t kRestOfMuch = 100;
@@ -56,9 +55,9 @@ class ProcessWatch {
   SegmentWatch segments_;
   TimeWatch time_;
   std::atomic<uint64_t> heap_bytes_;
-  // These belong to the thread that looks.
+  // Used by the thread that calls Look.
   sync::TimeNs give_back_at_, count_at_, much_at_ = 0;
-  // At most, since the system was given something.
+  // The greatest values since memory was last returned.
   uint64_t most_bytes_ = 0, most_held_ = 0;
 };
 

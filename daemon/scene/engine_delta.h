@@ -126,8 +126,7 @@ class EngineScene {
   std::vector<HeldGeometry> unused_;  // dropped to no use at some time; may be in use again
   std::vector<uint64_t> drop_geometries_, drop_drawables_, drop_layers_;
   std::vector<gpu::LayerRecord> put_layers_;
-  std::deque<gpu::DrawableRecord>
-      put_drawables_;  // may be a million, which are not copied as they come
+  std::deque<gpu::DrawableRecord> put_drawables_;  // as DeltaPlan::steps
   bool put_reset_ = false;
 };
 

@@ -24,7 +24,7 @@ using LayerStep = std::unique_ptr<const LayerRecord>;
 using DeltaStep = std::variant<GeometryView, DrawableRecord, LayerStep, DropStep, ResetStep>;
 
 struct DeltaPlan {
-  std::deque<DeltaStep> steps;  // may be a million, which are not copied as they come
+  std::deque<DeltaStep> steps;  // up to millions; a deque does not copy them as it grows
   // Dropped, and not put again later in the delta. They have no users at its end.
   std::vector<uint64_t> geometries_to_erase, layers_to_erase;
 };

@@ -12,7 +12,7 @@ namespace voxeld::gpu {
 
 namespace {
 
-constexpr size_t kKeptSlots = 4096;  // of a hash map that has few entries left
+constexpr size_t kKeptSlots = 4096;  // a hash map keeps at most so many when few entries are left
 
 }  // namespace
 
@@ -66,7 +66,7 @@ const Drawable* Scene::FindDrawable(uint64_t id) const {
 }
 
 uint64_t Scene::memory_bytes() const {
-  // A slot of a hash map has a byte of its own; a set of users or of a layer's drawables has three slots for two pointers.
+  // Each slot of a hash map has a control byte. A set of pointers has about three slots for two pointers.
   constexpr uint64_t kLink = (sizeof(Drawable*) + 1) * 3 / 2;
   constexpr uint64_t kDrawable = HeapBytes(sizeof(Drawable)) + 2 * kLink;
   static_assert(kDrawable + 3 * HeapBytes(1) + 64 <= kMostDrawableBytes);
@@ -74,7 +74,7 @@ uint64_t Scene::memory_bytes() const {
     using Slot = typename std::remove_cvref_t<decltype(map)>::value_type;
     return HeapBytes(map.capacity() * (sizeof(Slot) + 1));
   };
-  // A geometry with users has a block for them.
+  // Each geometry has a block for its set of users.
   return slots(drawables_) + slots(geometries_) + slots(layers_) + drawables_.size() * kDrawable +
          geometries_.size() * (HeapBytes(sizeof(RetainedGeometry) + 16) + HeapBytes(1)) +
          layers_.size() * HeapBytes(sizeof(Layer)) + copied_bytes_;

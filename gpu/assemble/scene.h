@@ -23,7 +23,7 @@ namespace voxeld::gpu {
 struct RetainedGeometry {
   GeometryView view;
   std::shared_ptr<const void> memory;  // what its arrays lie in; none if there are none
-  uint64_t copied_bytes = 0;           // of that, if it is the host's and this geometry's alone
+  uint64_t copied_bytes = 0;           // of `memory`, if it is host memory of this geometry alone
 };
 
 // Bulk memory as it is, else a copy of its arrays: the delta is gone after it was applied.

@@ -19,7 +19,7 @@ uint64_t BytesOf(const std::vector<T>& values) {
   return HeapBytes(values.capacity() * sizeof(T));
 }
 
-// Its entries in tiles are counted where they are (entries_bytes_).
+// Without its entries in tiles, which entries_bytes_ counts.
 uint64_t DerivedBytes(const Drawable& d) {
   return BytesOf(d.vertices) + BytesOf(d.hoisted) + BytesOf(d.inside) +
          (d.cut != nullptr ? d.cut->bytes() : 0) + BytesOf(d.bins.tiles) + BytesOf(d.bins.begin) +

@@ -20,7 +20,7 @@ class Executor {
   // Indices are handed out in runs of `grain` (at least 1). What a body throws first is thrown once none runs
   // any more; some indices are then left out.
   virtual void For(size_t count, size_t grain, const Body& body) = 0;
-  // For long work between loops: throws if loops would (MakeAbandonableExecutor).
+  // Throws if For would (MakeAbandonableExecutor). Long work outside loops calls it now and then.
   virtual void ThrowIfAbandoned() const {}
 };
 

@@ -1,4 +1,4 @@
-// FrameResult::memory_bytes against the memory that the C library's allocator gave the process meanwhile.
+// Compares FrameResult::memory_bytes with the growth of the process's memory.
 #include <gtest/gtest.h>
 #include <malloc.h>
 #include <unistd.h>
@@ -25,8 +25,8 @@ uint64_t Allocated() {
   return uint64_t{heap.uordblks} + heap.hblkhd;
 }
 
-// Large blocks are aligned to large pages, and the allocator counts what it skips for that, which nobody ever touches: from here on
-// what is resident is looked at.
+// Large blocks are aligned to large pages. The allocator counts the address space that it skips for that, which is never used, so
+// growth from this size on is measured by resident memory.
 constexpr double kLarge = 256 << 20;
 
 uint64_t Resident() {
@@ -36,7 +36,7 @@ uint64_t Resident() {
   return resident * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
 }
 
-// Each of the scene's drawables many times.
+// Repeats the scene's drawables, at other places.
 void Multiply(SceneModel& scene, SceneGenerator& chance) {
   if (scene.drawables.empty()) return;
   const std::vector<std::pair<uint64_t, DrawableRecord>> first(scene.drawables.begin(),
@@ -85,7 +85,7 @@ class MemoryCount : public ::testing::Test {
     double counted = 0, measured = 0;
     double ratio() const { return counted / measured; }
   };
-  // From an engine without a scene to one that has drawn it.
+  // Returns: the growth from an empty scene to `scene`, drawn once.
   Growth Draw(const Target& target, const SceneModel& scene) {
     EXPECT_TRUE(driver_->SetTarget(target).ok());
     DeltaBuffer nothing;

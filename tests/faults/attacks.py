@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures what clients that mean harm cost others: time to be served beside connections that say nothing, and memory.
+"""Measures what hostile clients cost others: the time to be served beside silent connections, and memory.
 
 usage: attacks.py [--repetitions N] [--limit BYTES] [--json] [ports | instances | entities] ...
 
@@ -9,7 +9,7 @@ usage: attacks.py [--repetitions N] [--limit BYTES] [--json] [ports | instances 
              the owner has left
   entities   points as entities of their own until one is refused; the same
 
-Paths are in VOXELD and PYTHONPATH. Times are of one machine: compare runs, not numbers."""
+Paths are in VOXELD and PYTHONPATH (the client and tests/e2e). Times are of one machine: compare runs, not numbers."""
 import argparse
 import json
 import re
@@ -27,6 +27,7 @@ from types import TracebackType
 
 import numpy as np
 import voxeld as voxel
+from polling import until
 from programs import program
 
 PATIENCE = 60.0
@@ -44,7 +45,7 @@ class Daemon:
         self.process = subprocess.Popen(
             [program("VOXELD", "the daemon"), "--config", config, "--listen", f"127.0.0.1:{self.grpc}", "--http", f"127.0.0.1:{self.http}"],
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        self.until_ready()
+        until(self.shows, "the daemon shows something", PATIENCE)
 
     def __enter__(self) -> "Daemon":
         return self
@@ -60,16 +61,11 @@ class Daemon:
         with urllib.request.urlopen(f"http://127.0.0.1:{self.http}{path}", timeout=PATIENCE) as answer:
             return str(answer.read().decode())
 
-    def until_ready(self) -> None:
-        deadline = time.monotonic() + PATIENCE
-        while True:
-            try:
-                if 'state="showing"} 1' in self.get("/metrics"):
-                    return
-            except OSError:
-                if time.monotonic() > deadline:
-                    raise
-            time.sleep(0.05)
+    def shows(self) -> bool:
+        try:
+            return 'state="showing"} 1' in self.get("/metrics")
+        except OSError:  # it does not listen yet
+            return False
 
     def memory_mib(self, what: str = "VmRSS") -> float:
         status = Path(f"/proc/{self.process.pid}/status").read_text(encoding="ascii")
@@ -141,7 +137,7 @@ def ports(repetitions: int, limit: int) -> dict[str, list[float]]:
 
 
 def after(daemon: Daemon, idle: float) -> dict[str, list[float]]:
-    time.sleep(LEFT_FOR)
+    time.sleep(LEFT_FOR)  # the time is what is measured: how much is held when it is over
     return {"resident at its peak, MiB": [daemon.memory_mib("VmHWM")], "idle before, MiB": [idle],
             f"resident {LEFT_FOR:.0f} s after the owner left, MiB": [daemon.memory_mib()]}
 

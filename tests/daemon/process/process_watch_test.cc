@@ -6,6 +6,7 @@
 #include <cstring>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "daemon/process/process.h"
@@ -31,11 +32,19 @@ TEST(ProcessWatch, HasTheFiguresOfAll) {
   EXPECT_EQ(watch.figures().clock_steps, 0u);
 }
 
-// An allocator that takes its time.
-class SlowAllocator : public ::testing::Test {
+// An allocator whose calls take the time, and whose count has the value, that a test sets.
+class ScriptedAllocator : public ::testing::Test {
  protected:
-  SlowAllocator() { given_back_ = counted_ = 0; }
+  ScriptedAllocator() {
+    given_back_ = counted_ = 0;
+    gives_back_for_ = counts_for_ = 0;
+    bytes_.reset();
+  }
 
+  void Look(uint64_t bytes) {
+    bytes_ = bytes;
+    Watch(1);
+  }
   void Watch(int seconds) {
     for (int i = 0; i < seconds; ++i) {
       clock_.Advance(sync::kSecond);
@@ -47,6 +56,7 @@ class SlowAllocator : public ::testing::Test {
   static inline sync::TimeNs gives_back_for_ = 0, counts_for_ = 0;
   static inline int given_back_ = 0;
   static inline uint64_t counted_ = 0;
+  static inline std::optional<uint64_t> bytes_;  // none: the number of counts
   Logger log_{Logger::Level::kOff, Logger::Format::kText};
   ProcessWatch watch_{clock_,
                       log_,
@@ -58,12 +68,12 @@ class SlowAllocator : public ::testing::Test {
                        .count =
                            [] {
                              clock_.Advance(counts_for_);
-                             return ++counted_;
+                             ++counted_;
+                             return bytes_.value_or(counted_);
                            }}};
 };
 
-TEST_F(SlowAllocator, GivesBackEachMinuteAndCountsEachSecondIfThatIsQuick) {
-  gives_back_for_ = counts_for_ = 0;
+TEST_F(ScriptedAllocator, GivesBackEachMinuteAndCountsEachSecondIfThatIsQuick) {
   for (int second = 1; second <= 150; ++second) {
     Watch(1);
     EXPECT_EQ(given_back_, second / 60) << second;
@@ -72,7 +82,7 @@ TEST_F(SlowAllocator, GivesBackEachMinuteAndCountsEachSecondIfThatIsQuick) {
   EXPECT_EQ(counted_, 150u) << "asking does not count";
 }
 
-TEST_F(SlowAllocator, HasAThousandthOfTheTime) {
+TEST_F(ScriptedAllocator, HasAThousandthOfTheTime) {
   gives_back_for_ = 120 * sync::kMillisecond;
   counts_for_ = 5 * sync::kMillisecond;
   Watch(60);
@@ -87,34 +97,7 @@ TEST_F(SlowAllocator, HasAThousandthOfTheTime) {
   EXPECT_GE(counted_, counted + 18);
 }
 
-// The test sets the number of allocated bytes.
-class ScriptedAllocator : public ::testing::Test {
- protected:
-  ScriptedAllocator() { given_back_ = 0; }
-
-  void Look(uint64_t bytes) {
-    bytes_ = bytes;
-    clock_.Advance(sync::kSecond);
-    watch_.Look();
-  }
-
-  static inline uint64_t bytes_ = 0;
-  static inline int given_back_ = 0;
-  static inline sync::TimeNs gives_back_for_ = 0;
-  static inline sync::FakeClock clock_{sync::kSecond};
-  Logger log_{Logger::Level::kOff, Logger::Format::kText};
-  ProcessWatch watch_{clock_,
-                      log_,
-                      {.give_back =
-                           [] {
-                             ++given_back_;
-                             clock_.Advance(gives_back_for_);
-                           },
-                       .count = [] { return bytes_; }}};
-};
-
 TEST_F(ScriptedAllocator, MuchThatWasFreedIsGivenBackAtOnce) {
-  gives_back_for_ = 0;
   Look(100 << 20);
   Look(80 << 20);
   EXPECT_EQ(given_back_, 0) << "too little";
@@ -132,7 +115,6 @@ TEST_F(ScriptedAllocator, MuchThatWasFreedIsGivenBackAtOnce) {
 }
 
 TEST_F(ScriptedAllocator, WhatTheBudgetSaysIsEnough) {
-  gives_back_for_ = 0;
   bytes_ = 0;
   for (const uint64_t held : {uint64_t{100} << 20, uint64_t{69} << 20}) {
     clock_.Advance(sync::kSecond);

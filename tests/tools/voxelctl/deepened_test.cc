@@ -1,4 +1,4 @@
-// Every construct of a file that can hold itself, ever deeper: it is read, or refused with words, in 64 KiB of stack.
+// Nests each recursive construct of each format deeper and deeper: the file is read, or refused with a message, on a small stack.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ struct Construct {
   const char* name;
   const char* file;
   std::function<std::string(int)> deep;
-  bool reads = false;  // what is ten deep
+  bool reads = false;  // a file that is ten levels deep can be read
   size_t stack_bytes = kSmallStack;
 };
 
@@ -123,7 +123,7 @@ TEST_P(Deepened, IsReadOrRefusedWithWords) {
   for (const int depth : {1, 10, 100, 1'000, 10'000, 100'000}) {
     const std::string path = folder.Write(GetParam().file, GetParam().deep(depth));
     absl::Status status;
-    // The process that reads goes on with the stack of the thread that asks.
+    // The process that reads inherits the stack of the thread that calls ImportFile.
     OnSmallStack([&] { status = ImportFile(path, {}).status(); }, GetParam().stack_bytes);
     EXPECT_THAT(std::string(status.message()), Not(HasSubstr("crashed"))) << depth;
     if (depth <= 10 && GetParam().reads) {

@@ -11,7 +11,7 @@
 namespace voxeld::voxelctl {
 
 inline absl::StatusOr<Model> ReadHere(const std::string& path, const ImportOptions& options = {}) {
-  // Those that a damaged file can crash, in libraries of others, have their own process in tests too.
+  // Damaged files of other formats can crash the libraries that read them, so tests read those in a process of their own too.
   constexpr std::array<std::string_view, 25> kSafe = {
       "asc",  "csv", "ent",  "geojson", "glb",      "gltf", "gz",  "hdr", "img",
       "json", "las", "nhdr", "nii",     "nrrd",     "obj",  "pcd", "pdb", "ply",

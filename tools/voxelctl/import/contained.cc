@@ -41,7 +41,7 @@ namespace {
 constexpr rlim_t kMostSeconds = 120, kMostDescriptors = 64;
 constexpr unsigned kMostWaiting = 600;  // s
 constexpr int kNoSandbox = 2;           // exit status
-// What the reader may send: more than the largest model (kMaxModelVertices and the others).
+// Limit of what the reader may write: more than the largest model (kMaxModelVertices and the others).
 constexpr rlim_t kMostModelBytes = rlim_t{5} << 30;
 constexpr uint64_t kMostMessageBytes = 64 << 10;
 
