@@ -230,8 +230,9 @@ void Limit(int resource, rlim_t most) {
   ::setrlimit(static_cast<__rlimit_resource>(resource), &limit);
 }
 
-// Bytes of address space that this process has.
-rlim_t AddressSpace() {
+// Bytes of address space that this process has. A sanitizer's shadow memory takes too much of it to
+// be limited.
+[[maybe_unused]] rlim_t AddressSpace() {
   const daemon::Descriptor file(::open("/proc/self/statm", O_RDONLY | O_CLOEXEC));
   char text[64] = {};
   if (::read(file.get(), text, sizeof(text) - 1) <= 0) return 0;
