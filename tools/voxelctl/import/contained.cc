@@ -230,8 +230,8 @@ void Limit(int resource, rlim_t most) {
   ::setrlimit(static_cast<__rlimit_resource>(resource), &limit);
 }
 
-// Bytes of address space that this process has. A sanitizer's shadow memory takes too much of it to
-// be limited.
+// Bytes of address space that this process uses. Builds with a sanitizer do not call it: they have no
+// limit on address space.
 [[maybe_unused]] rlim_t AddressSpace() {
   const daemon::Descriptor file(::open("/proc/self/statm", O_RDONLY | O_CLOEXEC));
   char text[64] = {};
