@@ -91,7 +91,7 @@ if(VOXELD_HARDENING AND NOT VOXELD_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL "
   target_compile_options(voxeld_warnings INTERFACE -Wno-error=array-bounds -Wno-error=maybe-uninitialized -Wno-error=nonnull -Wno-error=restrict
                                                    -Wno-error=stringop-overflow -Wno-error=stringop-overread)
 endif()
-if(VOXELD_INSTRUMENTED AND CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+if((VOXELD_INSTRUMENTED OR VOXELD_QUICK) AND CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
   # What is for GCC alone stands in some sources; the checks that Clang alone has are tools/check's.
   target_compile_options(voxeld_warnings INTERFACE -Wno-unknown-warning-option)
 endif()
@@ -126,45 +126,28 @@ function(voxeld_test_options name)
   endif()
 endfunction()
 
-# Headers that most sources include are compiled once for all of them: with the options of sources that are
-# optimised, and with those of sources below voxeld_compile_quickly(). The wire messages and gRPC are not among them: loading what GCC makes
-# of those costs as much as compiling them.
-set(VOXELD_COMMON_HEADERS OFF)
-if(VOXELD_INSTRUMENTED OR VOXELD_QUICK)
-  set(VOXELD_COMMON_HEADERS ON)
-  foreach(headers voxeld_common_headers voxeld_common_headers_plain)
-    file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/headers/${headers}.cc CONTENT "int ${headers};\n" @ONLY)
-    add_library(${headers} OBJECT EXCLUDE_FROM_ALL ${CMAKE_BINARY_DIR}/headers/${headers}.cc)
-    target_precompile_headers(${headers} PRIVATE
-      <absl/container/flat_hash_map.h> <absl/container/flat_hash_set.h> <absl/status/statusor.h> <absl/strings/str_cat.h>
-      <absl/strings/str_format.h> <absl/strings/str_join.h> <absl/strings/str_split.h>
-      <algorithm> <array> <atomic> <chrono> <cmath> <condition_variable> <deque> <functional> <map> <memory> <mutex> <optional> <span>
-      <string> <thread> <utility> <variant> <vector>)
-    target_link_libraries(${headers} PRIVATE voxeld_options voxeld_warnings absl::flat_hash_map absl::flat_hash_set absl::statusor
-                                             absl::strings absl::str_format)
-    target_compile_options(${headers} PRIVATE -pthread)
-  endforeach()
-  if(VOXELD_INSTRUMENTED)
-    target_compile_options(voxeld_common_headers_plain PRIVATE -O0)
-  elseif(VOXELD_QUICK)
-    target_compile_options(voxeld_common_headers_plain PRIVATE -O1)
-  endif()
-endif()
-
 # voxeld_compile_quickly(): sources of this directory and those below take little time when they run. They are optimised less
 # where VOXELD_QUICK says so, and not at all under a sanitizer, where optimising takes longest.
-set(VOXELD_PLAIN OFF)
 macro(voxeld_compile_quickly)
   if(VOXELD_FUZZ)
     # Fuzz targets run all of it as often as possible.
   elseif(VOXELD_INSTRUMENTED)
-    set(VOXELD_PLAIN ON)
     add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-O0>)
   elseif(VOXELD_QUICK)
-    set(VOXELD_PLAIN ON)
     add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-O1>)
   endif()
 endmacro()
+
+# voxeld_unhurried(TARGET …): users wait for so little of what these do that quick builds do not optimise them at all.
+function(voxeld_unhurried)
+  if(NOT VOXELD_QUICK OR VOXELD_INSTRUMENTED)
+    return()
+  endif()
+  foreach(target ${ARGN})
+    target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-O0>)
+    set_target_properties(${target} PROPERTIES VOXELD_UNOPTIMISED ON)
+  endforeach()
+endfunction()
 
 # voxeld_unwatched(SOURCE …): sources that share nothing with other threads; ThreadSanitizer is not asked to look on.
 function(voxeld_unwatched)
@@ -215,29 +198,8 @@ function(voxeld_library name)
   endif()
   if(unwatched)
     target_compile_options(voxeld_${name} PRIVATE -fno-sanitize=thread)
-  elseif(VOXELD_COMMON_HEADERS AND NOT (ARG_KERNELS AND VOXELD_HARDENING AND NOT VOXELD_SANITIZE))  # whose flags are others
-    target_compile_options(voxeld_${name} PRIVATE -pthread)
-    if(VOXELD_PLAIN)
-      target_precompile_headers(voxeld_${name} REUSE_FROM voxeld_common_headers_plain)
-    else()
-      target_precompile_headers(voxeld_${name} REUSE_FROM voxeld_common_headers)
-    endif()
   endif()
 endfunction()
-
-# What most tests include, compiled once for all of them. Where Clang checks includes, it reads them each time.
-set(VOXELD_TEST_HEADERS OFF)
-if(VOXELD_TESTS AND (VOXELD_INSTRUMENTED OR CMAKE_CXX_COMPILER_ID STREQUAL "GNU"))
-  set(VOXELD_TEST_HEADERS ON)
-  find_package(GTest REQUIRED)
-  file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/headers/tests.cc CONTENT "int main() {}\n" @ONLY)
-  add_executable(voxeld_test_headers EXCLUDE_FROM_ALL ${CMAKE_BINARY_DIR}/headers/tests.cc)
-  target_precompile_headers(voxeld_test_headers PRIVATE
-    <gmock/gmock.h> <gtest/gtest.h> <absl/status/statusor.h> <absl/strings/str_cat.h> <algorithm> <array> <cmath> <functional>
-    <map> <memory> <optional> <random> <span> <string> <utility> <variant> <vector>)
-  target_link_libraries(voxeld_test_headers PRIVATE absl::statusor absl::strings)
-  voxeld_test_options(voxeld_test_headers)
-endif()
 
 # voxeld_test_objects(NAME [HEAVY] SOURCES … LINK …): cases that several programs run, compiled once; each links NAME.
 function(voxeld_test_objects name)
@@ -245,12 +207,6 @@ function(voxeld_test_objects name)
   add_library(${name} OBJECT ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LINK})
   voxeld_test_options(${name})
-  # As the programs are.
-  set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE OFF)
-  target_compile_options(${name} PRIVATE -fPIE)
-  if(VOXELD_TEST_HEADERS AND NOT ((VOXELD_INSTRUMENTED OR VOXELD_QUICK) AND ARG_HEAVY))
-    target_precompile_headers(${name} REUSE_FROM voxeld_test_headers)
-  endif()
 endfunction()
 
 # voxeld_deep(TEST …): these tests run in the deep tier (tools/test --deep), not in the default one.
@@ -260,9 +216,10 @@ function(voxeld_deep)
   endforeach()
 endfunction()
 
-# voxeld_test(NAME [SINGLE_THREADED] [HEAVY] [DEEP] LABELS … SOURCES … LINK … LONG … ONE_THREAD … SHARDS n TIMEOUT s): an executable
+# voxeld_test(NAME [SINGLE_THREADED] [HEAVY] [DEEP] LABELS … SOURCES … LINK … LONG … ONE_THREAD … SHARDS n TIMEOUT s COST s): an executable
 # `NAME` in bin/tests. Each of its cases is a ctest test; with VOXELD_WHOLE_TESTS all of them together are one, or SHARDS (1), which
 # may run at once.
+#   COST             how many seconds it takes, if that is long: such tests start first
 #   LABELS           host (default), gpu (needs one; named gpu.…), hil, e2e (not where VOXELD_E2E_TESTS is off)
 #   HEAVY            its own code computes much, and is optimised under a sanitizer as well
 #   DEEP             all of it runs in the deep tier
@@ -270,7 +227,7 @@ endfunction()
 #   SINGLE_THREADED  neither it nor what it tests has threads: left out of ThreadSanitizer's build
 #   ONE_THREAD       patterns of cases that have no threads: left out under ThreadSanitizer
 function(voxeld_test name)
-  cmake_parse_arguments(ARG "SINGLE_THREADED;HEAVY;DEEP" "TIMEOUT;SHARDS" "SOURCES;LINK;LABELS;LONG;ONE_THREAD" ${ARGN})
+  cmake_parse_arguments(ARG "SINGLE_THREADED;HEAVY;DEEP" "TIMEOUT;SHARDS;COST" "SOURCES;LINK;LABELS;LONG;ONE_THREAD" ${ARGN})
   if(ARG_SINGLE_THREADED AND VOXELD_SANITIZE STREQUAL "thread")
     return()
   endif()
@@ -283,12 +240,12 @@ function(voxeld_test name)
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
+  if(NOT ARG_COST)
+    set(ARG_COST 1)
+  endif()
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LINK})
   voxeld_test_options(${name})
-  if(VOXELD_TEST_HEADERS AND NOT ((VOXELD_INSTRUMENTED OR VOXELD_QUICK) AND ARG_HEAVY))
-    target_precompile_headers(${name} REUSE_FROM voxeld_test_headers)
-  endif()
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin/tests)
   if(NOT VOXELD_E2E_TESTS AND "e2e" IN_LIST ARG_LABELS)
     set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
@@ -304,10 +261,10 @@ function(voxeld_test name)
   endif()
   if(VOXELD_WHOLE_TESTS)
     string(REGEX REPLACE "\\.$" "" whole ${prefix})
-    voxeld_whole_test(${whole} ${name} "${ARG_LABELS}" "*" "${ARG_LONG};${one_thread}" ${ARG_TIMEOUT} ${ARG_SHARDS} ${ARG_DEEP})
+    voxeld_whole_test(${whole} ${name} "${ARG_LABELS}" "*" "${ARG_LONG};${one_thread}" ${ARG_TIMEOUT} ${ARG_COST} ${ARG_SHARDS} ${ARG_DEEP})
     if(ARG_LONG AND VOXELD_LONG_TESTS)
       list(JOIN ARG_LONG ":" long)
-      voxeld_whole_test(${whole}.long ${name} "${ARG_LABELS}" "${long}" "${one_thread}" ${ARG_TIMEOUT} ${ARG_SHARDS} ON)
+      voxeld_whole_test(${whole}.long ${name} "${ARG_LABELS}" "${long}" "${one_thread}" ${ARG_TIMEOUT} ${ARG_COST} ${ARG_SHARDS} ON)
     endif()
     # The default tier's build does without programs that only the deep tier runs.
     if(ARG_DEEP AND VOXELD_QUICK)
@@ -330,7 +287,7 @@ function(voxeld_test name)
 endfunction()
 
 # Registers the cases of `program` that match `filter`, without those that match `without`, as one test for each shard.
-function(voxeld_whole_test test program labels filter without timeout shards deep)
+function(voxeld_whole_test test program labels filter without timeout cost shards deep)
   list(JOIN without ":" without)
   string(REGEX REPLACE "^:|:$" "" without "${without}")
   if(without)
@@ -348,7 +305,7 @@ function(voxeld_whole_test test program labels filter without timeout shards dee
       set(each ${test}.${shard})
     endif()
     add_test(NAME ${each} COMMAND ${program} --gtest_filter=${filter} WORKING_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR})
-    set_tests_properties(${each} PROPERTIES LABELS "${labels}" TIMEOUT ${timeout}
+    set_tests_properties(${each} PROPERTIES LABELS "${labels}" TIMEOUT ${timeout} COST ${cost}
                          ENVIRONMENT "GTEST_TOTAL_SHARDS=${shards};GTEST_SHARD_INDEX=${shard}")
   endforeach()
 endfunction()

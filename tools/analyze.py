@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""Runs clang-16's analyses over translation units, as many at once as there are cores.
+"""Runs clang-16's analyses, or GCC, over translation units, as many at once as there are cores.
 
-usage: analyze.py syntax|thread-safety|tidy BUILD_DIR FILE...
-Exit 1 if any finding; each is printed once. `syntax` passes over files that the build does not compile.
+usage: analyze.py syntax|gcc|thread-safety|tidy BUILD_DIR FILE...
+Exit 1 if any finding; each is printed once. `syntax` (Clang) and `gcc` compile without writing anything, and pass over files that the
+build does not compile.
 """
 
 import concurrent.futures
@@ -28,6 +29,8 @@ def analysis_command(mode, build_dir, path, entry):
     cut = arguments.index("-o")
     del arguments[cut : cut + 2]
     arguments.remove("-c")
+    if mode == "gcc":
+        arguments = ["g++", *(argument for argument in arguments[1:] if not argument.startswith("-Wthread-safety"))]
     warnings = ["-Wthread-safety", "-Werror=thread-safety"] if mode == "thread-safety" else []
     return arguments + ["-fsyntax-only", "-w", *warnings]
 
@@ -52,7 +55,7 @@ def optional(path):
 
 
 def main():
-    if len(sys.argv) < 3 or sys.argv[1] not in ("syntax", "thread-safety", "tidy"):
+    if len(sys.argv) < 3 or sys.argv[1] not in ("syntax", "gcc", "thread-safety", "tidy"):
         print(__doc__, file=sys.stderr)
         return 2
     mode, build_dir, paths = sys.argv[1], sys.argv[2], sys.argv[3:]

@@ -29,7 +29,8 @@ play() {
   shift
   "$voxelctl" --json play "$@" >"$work/play.json"
   for display in stack rotor; do
-    "$voxelctl" --json snapshot "$work/$name-$display.png" --display "$display" >"$work/picture.json"
+    # Small pictures: drawing a large one takes a second.
+    "$voxelctl" --json snapshot "$work/$name-$display.png" --size 300x250 --display "$display" >"$work/picture.json"
     [ "$(field "$work/picture.json" 'd["lit_pixels"] > 100')" = True ] ||
       { echo "$name on $display is dark: $(cat "$work/picture.json")" >&2; exit 1; }
     [ "$(head -c 8 "$work/$name-$display.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]

@@ -1,0 +1,143 @@
+# Precompiled headers for quick and instrumented builds with Clang, which loads of them only what a source uses. (GCC takes as long to
+# load the headers of gRPC as to compile them.) Every target includes them, so no source may rely on them: tools/check compiles each
+# source without.
+#
+# Headers are precompiled once for each combination of compiler options, and of what targets with those options may include.
+
+# Sets `result` to client, grpc, wire or none: the greatest that `target` links of the client library, the gRPC stubs and the wire
+# messages.
+function(voxeld_reach target result)
+  set(${result} none PARENT_SCOPE)
+  if(NOT TARGET ${target})
+    return()
+  endif()
+  get_target_property(reach ${target} VOXELD_REACH)
+  if(NOT reach)
+    set(reach none)
+    if(target STREQUAL "voxeld_client")
+      set(reach client)
+    elseif(target STREQUAL "voxeld_proto_grpc")
+      set(reach grpc)
+    elseif(target STREQUAL "voxeld_proto")
+      set(reach wire)
+    endif()
+    set(links "")
+    foreach(property LINK_LIBRARIES INTERFACE_LINK_LIBRARIES)
+      get_target_property(some ${target} ${property})
+      if(some)
+        list(APPEND links ${some})
+      endif()
+    endforeach()
+    list(REMOVE_DUPLICATES links)
+    # Of the project's own libraries only.
+    list(FILTER links EXCLUDE REGEX "::|^[$]|^-")
+    foreach(link ${links})
+      voxeld_reach(${link} other)
+      foreach(greater client grpc wire)
+        if(reach STREQUAL greater OR other STREQUAL greater)
+          set(reach ${greater})
+          break()
+        endif()
+      endforeach()
+    endforeach()
+    set_target_properties(${target} PROPERTIES VOXELD_REACH ${reach})
+  endif()
+  set(${result} ${reach} PARENT_SCOPE)
+endfunction()
+
+# Adds the target `name` that precompiles the headers for sources of this reach and optimisation level. `hardening`: properties that
+# decide on options (VoxeldHardening.cmake), with their values.
+function(voxeld_precompiled_headers name reach level hardening)
+  file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/headers/${name}.cc CONTENT "int ${name};\n" @ONLY)
+  add_library(${name} OBJECT EXCLUDE_FROM_ALL ${CMAKE_BINARY_DIR}/headers/${name}.cc)
+  if(hardening)
+    set_target_properties(${name} PROPERTIES ${hardening})
+  endif()
+  target_compile_options(${name} PRIVATE -pthread -fPIC -${level})
+  target_link_libraries(${name} PRIVATE voxeld_options voxeld_warnings absl::flat_hash_map absl::flat_hash_set absl::statusor
+                                        absl::strings absl::str_format absl::synchronization absl::time)
+  set(headers
+    <absl/container/flat_hash_map.h> <absl/container/flat_hash_set.h> <absl/status/statusor.h> <absl/strings/str_cat.h>
+    <absl/strings/str_format.h> <absl/strings/str_join.h> <absl/strings/str_split.h> <absl/synchronization/mutex.h>
+    <absl/time/clock.h> <nlohmann/json.hpp>
+    <algorithm> <array> <atomic> <bit> <chrono> <cmath> <condition_variable> <deque> <filesystem> <fstream> <functional> <future>
+    <iostream> <limits> <map> <memory> <mutex> <numeric> <optional> <random> <regex> <set> <span> <sstream> <stop_token> <string>
+    <thread> <tuple> <unordered_map> <utility> <variant> <vector>)
+  if(VOXELD_TESTS)
+    find_package(GTest REQUIRED)
+    target_link_libraries(${name} PRIVATE GTest::gmock)
+    list(APPEND headers <gmock/gmock.h> <gtest/gtest.h>)
+  endif()
+  set(generated ${CMAKE_BINARY_DIR}/proto/generated/voxeld/v1)
+  if(NOT reach STREQUAL "none")
+    target_link_libraries(${name} PRIVATE voxeld_proto)
+    list(APPEND headers ${generated}/primitives.pb.h ${generated}/scene.pb.h ${generated}/display.pb.h)
+  endif()
+  if(reach MATCHES "grpc|client")
+    target_link_libraries(${name} PRIVATE voxeld_proto_grpc)
+    list(APPEND headers <grpcpp/grpcpp.h> ${generated}/scene.grpc.pb.h ${generated}/display.grpc.pb.h)
+  endif()
+  if(reach STREQUAL "client")
+    target_link_libraries(${name} PRIVATE voxeld_client)
+    list(APPEND headers <voxeld/client.h>)
+  endif()
+  target_precompile_headers(${name} PRIVATE ${headers})
+endfunction()
+
+# Sets `result` to the targets of `folder` and those below.
+function(voxeld_targets_below folder result)
+  get_property(targets DIRECTORY ${folder} PROPERTY BUILDSYSTEM_TARGETS)
+  get_property(folders DIRECTORY ${folder} PROPERTY SUBDIRECTORIES)
+  foreach(below ${folders})
+    voxeld_targets_below(${below} some)
+    list(APPEND targets ${some})
+  endforeach()
+  set(${result} ${targets} PARENT_SCOPE)
+endfunction()
+
+# Called when all targets are known: what a target may include depends on what its libraries link.
+function(voxeld_precompile_headers)
+  if(NOT (VOXELD_INSTRUMENTED OR VOXELD_QUICK) OR NOT CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+    return()
+  endif()
+  string(TOUPPER "CMAKE_CXX_FLAGS_${CMAKE_BUILD_TYPE}" flags)
+  voxeld_targets_below(${CMAKE_SOURCE_DIR} targets)
+  # The headers need what these generate.
+  list(REMOVE_ITEM targets voxeld_proto voxeld_proto_grpc)
+  foreach(target ${targets})
+    get_target_property(type ${target} TYPE)
+    get_target_property(sources ${target} SOURCES)
+    get_target_property(options ${target} COMPILE_OPTIONS)
+    if(NOT type MATCHES "LIBRARY|EXECUTABLE" OR NOT sources MATCHES "[.]cc(;|$)" OR options MATCHES "-fno-sanitize=thread")
+      continue()
+    endif()
+    # The last option counts. For headers it matters only whether there is optimisation at all.
+    string(REGEX MATCHALL "-O[0-3]" levels "${${flags}};${options}")
+    list(POP_BACK levels level)
+    if(level STREQUAL "-O0")
+      set(level O0)
+    else()
+      set(level O1)
+    endif()
+    voxeld_reach(${target} reach)
+    if(target STREQUAL "voxeld_client")
+      set(reach grpc)  # without its own header
+    endif()
+    set(name voxeld_headers_${level}_${reach})
+    set(hardening "")
+    foreach(property UNOPTIMISED KERNELS)
+      get_target_property(has ${target} VOXELD_${property})
+      if(has AND VOXELD_HARDENING AND NOT VOXELD_SANITIZE)
+        list(APPEND hardening VOXELD_${property} ON)
+        string(TOLOWER "_${property}" suffix)
+        string(APPEND name ${suffix})
+      endif()
+    endforeach()
+    if(NOT TARGET ${name})
+      voxeld_precompiled_headers(${name} ${reach} ${level} "${hardening}")
+    endif()
+    # Headers precompiled with -fPIC are not accepted with -fPIE, which programs have.
+    target_compile_options(${target} PRIVATE "$<$<COMPILE_LANGUAGE:C,CXX>:-pthread;-fPIC>")
+    target_precompile_headers(${target} REUSE_FROM ${name})
+  endforeach()
+endfunction()
