@@ -29,7 +29,7 @@ function(voxeld_reach target result)
       endif()
     endforeach()
     list(REMOVE_DUPLICATES links)
-    # Of the project's own libraries only.
+    # Follow only the project's own libraries.
     list(FILTER links EXCLUDE REGEX "::|^[$]|^-")
     foreach(link ${links})
       voxeld_reach(${link} other)

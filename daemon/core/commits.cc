@@ -9,6 +9,9 @@
 namespace voxeld::daemon {
 namespace {
 
+// The number of operations in one slice of a commit. They take about 2 ms, during which other owners wait.
+constexpr uint64_t kSliceOperations = 1000;
+
 // Two clocks may drift apart by so much of the time that passes.
 constexpr int64_t kDriftDivisor = 20'000;
 
@@ -30,12 +33,33 @@ std::optional<int64_t> LeastOffset(std::optional<int64_t> before, sync::TimeNs e
 void Core::Impl::PostTurn(SessionId id) {
   const auto it = sessions_.find(id);
   if (it == sessions_.end() || std::exchange(it->second.turn_posted, true)) return;
-  loop_->Post([this, id] {
-    if (const auto session = sessions_.find(id); session != sessions_.end()) {
-      session->second.turn_posted = false;
-    }
+  const uint64_t owner = it->second.owner;
+  std::deque<SessionId>& ready = owners_.at(owner).ready;
+  ready.push_back(id);
+  if (ready.size() == 1) loop_->Post([this, owner] { OwnerTurn(owner); });
+}
+
+void Core::Impl::OwnerTurn(uint64_t owner) {
+  const auto it = owners_.find(owner);
+  if (it == owners_.end()) return;
+  std::deque<SessionId>& ready = it->second.ready;
+  const SessionId id = ready.front();
+  // Until it has gone, a session that becomes ready posts no turn of its own.
+  if (const auto session = sessions_.find(id); session != sessions_.end()) {
+    session->second.turn_posted = false;
     Turn(id);
-  });
+  }
+  const auto after = owners_.find(owner);  // it may have been forgotten
+  if (after == owners_.end()) return;
+  after->second.ready.pop_front();
+  if (!after->second.ready.empty()) loop_->Post([this, owner] { OwnerTurn(owner); });
+}
+
+void Core::Impl::FinishTurns(SessionId id) {
+  while (sessions_.contains(id)) {
+    const auto under_way = under_way_.find(sessions_.at(id).owner);
+    Turn(under_way == under_way_.end() ? id : under_way->second.session);
+  }
 }
 
 bool Core::Impl::MustWait(const Session& session) const {
@@ -48,8 +72,18 @@ bool Core::Impl::MustWait(const Session& session) const {
 
 void Core::Impl::Turn(SessionId id) {
   const auto it = sessions_.find(id);
-  if (it == sessions_.end() || MustWait(it->second)) return;
+  if (it == sessions_.end()) return;
   Session& session = it->second;
+  if (const auto under_way = under_way_.find(session.owner); under_way != under_way_.end()) {
+    if (under_way->second.session == id) {
+      ApplySlice(session, under_way->second);
+      PostTurn(id);
+    } else {
+      under_way->second.waiting.insert(id);
+    }
+    return;
+  }
+  if (MustWait(session)) return;
   bool more = false;
   if (!session.due.empty()) {
     WaitingCommit commit = std::move(session.due.front());
@@ -231,17 +265,35 @@ MemoryRoom Core::Impl::RoomFor(const WaitingCommit& commit) const {
 }
 
 void Core::Impl::Apply(Session& session, WaitingCommit commit) {
-  const Limits& limits = options_.limits;
   const sync::TimeNs now = clock_.Now();
-  Stages stages = StagesOf(session, commit);
   store_.Expire(now);
   const Owner& owner = owners_.at(session.owner);
-  const Author author{session.owner,   session.writer,    owner.hidden, session.options.may_erase,
-                      owner.max_bytes, owner.max_entities};
+  UnderWay under_way;
+  under_way.session = session.id;
+  under_way.stages = StagesOf(session, commit);
+  under_way.pending = store_.Begin(
+      Author{session.owner, session.writer, owner.hidden, session.options.may_erase,
+             owner.max_bytes, owner.max_entities},
+      std::move(commit.operations), now, session.options.strict, commit.refusals.refused());
+  under_way.commit = std::move(commit);
+  ApplySlice(session, under_way_.emplace(session.owner, std::move(under_way)).first->second);
+}
+
+void Core::Impl::ApplySlice(Session& session, UnderWay& under_way) {
+  const Owner& owner = owners_.at(session.owner);
+  SceneStore::SetQuotas(*under_way.pending, owner.hidden, owner.max_bytes, owner.max_entities);
+  store_.SetMemoryRoom(RoomFor(under_way.commit));
+  if (!store_.Continue(*under_way.pending, kSliceOperations)) return PostTurn(session.id);
+  UnderWay done = std::move(under_way);
+  under_way_.erase(session.owner);
+  Conclude(session, std::move(done.commit), done.stages, store_.Finish(std::move(done.pending)));
+  for (const SessionId id : done.waiting) PostTurn(id);
+}
+
+void Core::Impl::Conclude(Session& session, WaitingCommit commit, Stages stages,
+                          CommitResult result) {
+  const Limits& limits = options_.limits;
   RefusalTally& refusals = commit.refusals;
-  store_.SetMemoryRoom(RoomFor(commit));
-  CommitResult result = store_.Apply(author, std::move(commit.operations), now,
-                                     session.options.strict, refusals.refused());
   std::string first = refusals.first();
   if (first.empty() && result.first_refusal.has_value()) {
     first = RefusalTally::Describe(*result.first_refusal);
@@ -278,6 +330,7 @@ void Core::Impl::Apply(Session& session, WaitingCommit commit) {
   session.applied_any = true;
   stages.applied_ns = clock_.Now();
   if (stages.received_ns != 0) {
+    const sync::TimeNs now = stages.applied_ns;
     if (stages.sent_ns != 0) sending_.Add(now, stages.received_ns - stages.sent_ns);
     decoding_.Add(now, stages.decoded_ns - stages.received_ns);
     applying_.Add(now, stages.applied_ns - stages.decoded_ns);

@@ -133,6 +133,16 @@ class Core::Impl {
     std::string principal;  // empty: nobody in particular
     bool hidden = false;
     uint64_t max_bytes = UINT64_MAX, max_entities = UINT64_MAX;  // as an operator set them
+    std::deque<SessionId> ready;  // sessions that wait for a turn, in order
+  };
+
+  // The commit of an owner that is being applied, a slice in each turn. The owner's other sessions wait until it is done.
+  struct UnderWay {
+    SessionId session = 0;
+    WaitingCommit commit;
+    Stages stages;
+    std::unique_ptr<SceneStore::PendingCommit> pending;
+    std::set<SessionId> waiting;  // sessions whose turn came meanwhile
   };
 
   // A commit whose client waits for it to be on the disk.
@@ -209,9 +219,13 @@ class Core::Impl {
   absl::Status TooManySessions() const;
 
   // ---- commits (commits.cc)
-  // Applies one commit of the session's, if it may have one, and asks for the next turn.
-  void Turn(SessionId id);
+  // Owners take turns, and each owner's sessions among themselves, so that many sessions do not get more than one.
   void PostTurn(SessionId id);
+  void OwnerTurn(uint64_t owner);
+  // Applies one commit of the session's, if it may have one, or a slice of it, and asks for the next turn.
+  void Turn(SessionId id);
+  // Takes turns until the session has closed, which it has been asked to.
+  void FinishTurns(SessionId id);
   bool MustWait(const Session& session) const;
   // A timed commit that is not due yet is told Scheduled and waits; one that cannot wait is refused. False: neither,
   // apply it now.
@@ -220,6 +234,8 @@ class Core::Impl {
   // Returns: by how much the scene may grow in this commit.
   MemoryRoom RoomFor(const WaitingCommit& commit) const;
   void Apply(Session& session, WaitingCommit commit);
+  void ApplySlice(Session& session, UnderWay& under_way);
+  void Conclude(Session& session, WaitingCommit commit, Stages stages, CommitResult result);
   void RefuseCommit(Session& session, const WaitingCommit& commit, uint64_t refused,
                     std::string message);
   void Ride(Session& session, const WaitingCommit& commit, const Stages& stages, bool hidden);
@@ -273,6 +289,7 @@ class Core::Impl {
   const std::shared_ptr<std::atomic<bool>> abandoned_ = std::make_shared<std::atomic<bool>>(false);
   SceneWatch scene_watch_;
   std::map<SessionId, Session> sessions_;
+  std::map<uint64_t, UnderWay> under_way_;  // by owner
   std::map<SessionId, Dormant> dormant_;
   std::map<std::string, SessionId> resume_tokens_;  // of sessions and dormant ones
   std::map<uint64_t, Owner> owners_;

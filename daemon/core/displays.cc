@@ -131,9 +131,7 @@ absl::Status Core::Impl::ExpectView(DisplaySlot& slot, const ViewOptions& view) 
   const absl::StatusOr<gpu::Affine> map = SceneToVoxel(view, slot.info.geometry.grid);
   if (!map.ok()) return map.status();
   const DisplayView coming{slot.info.name, *map};
-  if (absl::Status fits = CheckView(store_.snapshot(), coming, options_.limits); !fits.ok()) {
-    return fits;
-  }
+  if (absl::Status fits = store_.CheckNewView(coming); !fits.ok()) return fits;
   slot.coming.push_back(*map);
   UpdateViews();
   return absl::OkStatus();

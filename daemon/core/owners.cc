@@ -122,7 +122,7 @@ void Core::Impl::Evict(uint64_t owner) {
     ReleaseHold(session);
   }
   for (const SessionId id : sessions) {
-    while (sessions_.contains(id)) Turn(id);
+    FinishTurns(id);
   }
   std::erase_if(lingering_, [owner](const auto& entry) { return entry.second.owner == owner; });
   store_.RemoveLayers([owner](const OwnedName& key, const Layer&) { return key.owner == owner; },

@@ -88,7 +88,7 @@ absl::StatusOr<Core::Impl::Session> Core::Impl::TakeUp(const OpenOptions& option
     }
     session.options.on_disconnect = DisconnectPolicy::kKeep;  // its layers are the new stream's
     CloseSession(id, session.incarnation, true, nullptr);
-    while (sessions_.contains(id)) Turn(id);
+    FinishTurns(id);
   }
   const auto it = dormant_.find(id);
   if (it == dormant_.end()) {

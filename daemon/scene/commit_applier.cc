@@ -47,6 +47,17 @@ void CommitApplier::Apply(Operation& operation) {
 
 void CommitApplier::Dispatch(Operation& operation) {
   std::visit([&](auto& op) { Do(operation, op); }, operation.op);
+  // Free the rest of the operation now: freeing a large commit in one piece would delay other owners.
+  operation.op = Commit();
+}
+
+void CommitApplier::Replay() {
+  if (replayed_->next < replayed_->operations.size()) {
+    return Dispatch(*replayed_->operations[replayed_->next++]);
+  }
+  ++applied_;  // the FrameBegin
+  Applied(replayed_->layer);
+  replayed_.reset();
 }
 
 void CommitApplier::End() {
@@ -129,7 +140,7 @@ bool CommitApplier::RefusedNewLayer(const Operation& operation, const std::strin
     return refuse(absl::StrFormat("layer %s would be one more than max_layers_per_owner, %d",
                                   Quoted(layer), limits_.max_layers_per_owner));
   }
-  if (draft_.total().layers >= limits_.max_layers) {
+  if (draft_.total().layers + room_.promised.layers >= limits_.max_layers) {
     return refuse(
         absl::StrFormat("layer %s would be one more than max_layers, %d, which all "
                         "owners share; orphaned layers can be cleared",
@@ -146,6 +157,7 @@ bool CommitApplier::RefusedNewLayer(const Operation& operation, const std::strin
 std::optional<std::string> CommitApplier::OverQuota(const OwnerTally& wanted) const {
   const auto [drawables, layers, bytes, derived] = wanted;
   const OwnerTally& tally = draft_.tally(author_.owner);
+  const OwnerTally& promised = room_.promised;
   if (drawables > tally.drawables) {
     if (drawables > limits_.max_entities_per_owner || drawables > author_.max_entities) {
       return absl::StrFormat(
@@ -154,7 +166,8 @@ std::optional<std::string> CommitApplier::OverQuota(const OwnerTally& wanted) co
           MostOf(author_.max_entities, limits_.max_entities_per_owner, "max_entities_per_owner"),
           std::min(author_.max_entities, limits_.max_entities_per_owner));
     }
-    const uint64_t all = draft_.total().drawables - tally.drawables + drawables;
+    const uint64_t all =
+        draft_.total().drawables - tally.drawables + drawables + promised.drawables;
     if (all > limits_.max_entities) {
       return absl::StrFormat(
           "the scene would have %d entities (an instance counts as what it draws); max_entities, "
@@ -169,7 +182,7 @@ std::optional<std::string> CommitApplier::OverQuota(const OwnerTally& wanted) co
           MostOf(author_.max_bytes, limits_.max_bytes_per_owner, "max_bytes_per_owner"),
           std::min(author_.max_bytes, limits_.max_bytes_per_owner));
     }
-    const uint64_t all = draft_.total().bytes - tally.bytes + bytes;
+    const uint64_t all = draft_.total().bytes - tally.bytes + bytes + promised.bytes;
     if (all > limits_.max_scene_bytes) {
       return absl::StrFormat(
           "the scene would hold %d bytes; max_scene_bytes, which all owners share, is %d; orphaned "
@@ -188,8 +201,11 @@ std::optional<std::string> CommitApplier::OverMemory(const OwnerTally& wanted) c
     return static_cast<double>(draft_.total().*of) - static_cast<double>(draft_.base().total.*of) +
            static_cast<double>(wanted.*of) - static_cast<double>(tally.*of);
   };
-  const double bytes = growth(&OwnerTally::bytes) +
-                       growth(&OwnerTally::derived) * static_cast<double>(room_.engines);
+  const auto all_growth = [&](uint64_t OwnerTally::*of) {
+    return growth(of) + static_cast<double>(room_.promised.*of);
+  };
+  const double bytes = all_growth(&OwnerTally::bytes) +
+                       all_growth(&OwnerTally::derived) * static_cast<double>(room_.engines);
   if (bytes <= static_cast<double>(room_.bytes)) return std::nullopt;
   return absl::StrFormat(
       "%.0f bytes more would be held for the scene and what %d %s derive from it, and "
@@ -239,7 +255,10 @@ void CommitApplier::Do(Operation& operation, Upsert& upsert) {
   Entity entity;
   entity.sequence = operation.sequence;
   entity.expires_ns = ExpiryTime(now_, upsert.entity.lifetime_ns);
-  if (const EntityPtr* replaced = replaced_.Find(upsert.id)) entity.number = (*replaced)->number;
+  if (replayed_.has_value()) {
+    const EntityPtr* replaced = replayed_->replaced.Find(upsert.id);
+    if (replaced != nullptr) entity.number = (*replaced)->number;
+  }
   entity.data = std::move(upsert.entity);
   EditLayer(key);
   TellIfCoarse(operation, upsert.layer, upsert.id, entity.data, "upsert.entity");
@@ -387,12 +406,9 @@ void CommitApplier::Do(Operation& operation, FrameEnd& end) {
     return;
   }
   const OwnedName key = Key(end.layer);
-  replaced_ = EditLayer(key).entities;
+  touched_.insert(end.layer);
+  replayed_ = Replayed{end.layer, std::move(frame.operations), 0, EditLayer(key).entities};
   draft_.ClearLayer(key);
-  for (Operation* inner : frame.operations) Dispatch(*inner);
-  replaced_ = {};
-  ++applied_;  // the FrameBegin
-  Applied(end.layer);
 }
 
 // The core ends a commit; there is none among the operations.

@@ -4,7 +4,10 @@
 // A refused operation leaves its entity, layer or object as it was and gives one Issue. What is
 // upserted between FrameBegin and FrameEnd takes effect at FrameEnd, in place of all that the layer
 // held; a frame still open when the commit ends is discarded whole, with one Issue (OUT_OF_ORDER)
-// of its FrameBegin, and every operation in it counts as refused. Single-threaded.
+// of its FrameBegin, and every operation in it counts as refused.
+//
+// A commit can be applied piece by piece, so that a large one does not hold up others: between two calls the draft may
+// be rebased, and `room` and `author` may change. Single-threaded.
 #pragma once
 
 #include <functional>
@@ -33,6 +36,8 @@ struct Author {
 struct MemoryRoom {
   uint64_t bytes = UINT64_MAX;  // that the scene, and what engines derive from it, may grow by
   uint64_t engines = 0;         // each of which derives all of it
+  // What the unfinished commits of other owners have added so far. It counts as part of the scene.
+  OwnerTally promised;
 };
 
 // A display's map from the scene to its voxels, for range checks.
@@ -47,9 +52,15 @@ class CommitApplier {
   CommitApplier(Draft& draft, const Limits& limits, const std::vector<DisplayView>& views,
                 const MemoryRoom& room, const Author& author, sync::TimeNs now);
 
-  // Operations must have passed CheckAlone, be no Commit, and live until End.
+  // Operations must have passed CheckAlone and be no Commit. They live until End, and their content is taken. After a
+  // FrameEnd, `replaying` answers true until Replay has been called for each operation of the frame; no other may be
+  // applied meanwhile.
   void Apply(Operation& operation);
+  bool replaying() const { return replayed_.has_value(); }
+  void Replay();
   void End();
+  // The layers that have been changed, by name.
+  const std::set<std::string>& touched() const { return touched_; }
 
   const Refusals& refusals() const { return refusals_; }
   uint64_t applied() const { return applied_; }
@@ -64,6 +75,13 @@ class CommitApplier {
   struct Frame {
     uint64_t begin_sequence = 0;
     std::vector<Operation*> operations;
+  };
+  // A frame that has ended and takes effect.
+  struct Replayed {
+    std::string layer;
+    std::vector<Operation*> operations;
+    size_t next = 0;
+    EntityMap replaced;  // what the layer held before
   };
   using ObjectDataPtr = std::shared_ptr<const ObjectData>;
 
@@ -133,7 +151,7 @@ class CommitApplier {
   const sync::TimeNs now_;
 
   std::map<std::string, Frame> frames_;
-  EntityMap replaced_;  // what the layer held whose frame is being applied
+  std::optional<Replayed> replayed_;
   std::set<std::string> touched_;
   bool objects_touched_ = false;
   Refusals refusals_;

@@ -255,6 +255,91 @@ void Draft::RemoveObject(const OwnedName& key) {
   next_.objects.Erase(key);
 }
 
+void Draft::RebaseLayer(const OwnedName& key, const LayerPtr& was, const LayerPtr* is,
+                        bool edited) {
+  if (FindLayer(key) == nullptr) return;  // this draft has removed it
+  if (!edited && is == nullptr) return RemoveLayer(key);
+  const EntityMap none;
+  std::vector<std::string> removed;
+  EntityMap::Diff(was->entities, is == nullptr ? none : (*is)->entities,
+                  [&](const std::string& id, const EntityPtr* before, const EntityPtr*) {
+                    const EntityPtr* mine = FindEntity(key, id);
+                    if (before != nullptr && mine != nullptr && *mine == *before) {
+                      removed.push_back(id);
+                    }
+                  });
+  for (const std::string& id : removed) RemoveEntity(key, id);
+  if (is == nullptr) return;
+  Layer& layer = OpenLayer(key);
+  layer.suppressed = (*is)->suppressed;
+  if (!edited) layer.writer = (*is)->writer;
+}
+
+void Draft::Rebase(const SnapshotPtr& now, uint64_t owner, const std::set<std::string>& edited) {
+  const auto take = [](auto& map, const auto& key, const auto* value) {
+    if (value != nullptr) {
+      map.Put(key, *value);
+    } else {
+      map.Erase(key);
+    }
+  };
+  const auto tally_in = [owner](const Snapshot& snapshot) {
+    const OwnerTally* found = snapshot.owners.Find(owner);
+    return found == nullptr ? OwnerTally() : *found;
+  };
+  const SnapshotPtr was = std::exchange(base_, now);
+  tally(owner);  // as it was in the old base, if this draft has not changed it
+
+  // Take over the changes of other owners.
+  const OwnerTally own_was = tally_in(*was), own_is = tally_in(*now);
+  for (const auto of :
+       {&OwnerTally::drawables, &OwnerTally::layers, &OwnerTally::bytes, &OwnerTally::derived}) {
+    next_.total.*of += (now->total.*of - own_is.*of) - (was->total.*of - own_was.*of);
+  }
+  next_.entities += now->entities - was->entities;
+  decltype(next_.objects)::Diff(was->objects, now->objects,
+                                [&](const OwnedName& key, const ObjectPtr*, const ObjectPtr* is) {
+                                  if (key.owner != owner) take(next_.objects, key, is);
+                                });
+  decltype(next_.uses)::Diff(was->uses, now->uses,
+                             [&](const UseKey& key, const bool*, const bool* is) {
+                               if (key.owner != owner) take(next_.uses, key, is);
+                             });
+  decltype(next_.expiries)::Diff(
+      was->expiries, now->expiries,
+      [&](const ExpiryKey& key, const EntityPlace* before, const EntityPlace* is) {
+        const EntityPlace& place = before != nullptr ? *before : *is;
+        if (place.layer.owner != owner) take(next_.expiries, key, is);
+      });
+  decltype(next_.owners)::Diff(was->owners, now->owners,
+                               [&](uint64_t key, const OwnerTally*, const OwnerTally* is) {
+                                 if (key != owner) take(next_.owners, key, is);
+                               });
+  decltype(next_.layers)::Diff(
+      was->layers, now->layers,
+      [&](const OwnedName& key, const LayerPtr* before, const LayerPtr* is) {
+        if (key.owner != owner) return take(next_.layers, key, is);
+        const uint64_t held = is == nullptr ? 0 : (*is)->entities.size();
+        next_.entities += (*before)->entities.size() - held;  // those are counted as they go
+        RebaseLayer(key, *before, is, edited.contains(key.name));
+      });
+}
+
+void Draft::Suppress(uint64_t owner, bool suppressed) {
+  for (auto& [key, layer] : open_) {
+    if (key.owner == owner && layer.has_value()) layer->suppressed = suppressed;
+  }
+}
+
+OwnerTally Draft::Growth() const {
+  OwnerTally growth;
+  for (const auto of :
+       {&OwnerTally::drawables, &OwnerTally::layers, &OwnerTally::bytes, &OwnerTally::derived}) {
+    if (next_.total.*of > base_->total.*of) growth.*of = next_.total.*of - base_->total.*of;
+  }
+  return growth;
+}
+
 SnapshotPtr Draft::Finish(uint64_t number) && {
   for (auto& [key, layer] : open_) {
     if (layer.has_value()) {

@@ -2,11 +2,15 @@
 // bounds) in step with each change; checks nothing that a client may get wrong, quotas included:
 // that is CommitApplier's.
 //
+// A draft of one owner's changes can be in the making while others publish snapshots: Rebase puts its changes on top
+// of theirs.
+//
 // Single-threaded. Dropping a draft undoes it.
 #pragma once
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "daemon/scene/snapshot.h"
@@ -72,6 +76,17 @@ class Draft {
   // No entity refers to it any more, and no object.
   void RemoveObject(const OwnedName& key);
 
+  // Replaces the base by `now`, a later snapshot. Requires that this draft changes only `owner`, and that `now` differs from
+  // the base only in other owners, except that entities and layers of `owner` may have been removed, and its layers
+  // hidden or given another writer. An entity of `owner` that was removed stays if this draft has replaced it. A
+  // layer of `owner` that was removed stays if `edited` has its name: the layers that this draft changes. Costs as
+  // much as there are differences between the base and `now`.
+  void Rebase(const SnapshotPtr& now, uint64_t owner, const std::set<std::string>& edited);
+  // Hides or shows the layers of `owner` that this draft has changed.
+  void Suppress(uint64_t owner, bool suppressed);
+  // Returns: how much the draft adds to each total of its base; 0 for a total that it reduces.
+  OwnerTally Growth() const;
+
   // The finished snapshot. The draft is spent.
   SnapshotPtr Finish(uint64_t number) &&;
 
@@ -81,10 +96,13 @@ class Draft {
   // Returns: what an entity of this layer counts against quotas.
   OwnerTally CountOf(const OwnedName& layer, const Entity& entity) const;
   Layer& OpenLayer(const OwnedName& key);
+  // The part of Rebase for one layer of the draft's owner, which was `was` in the old base and is `is` (null: removed) in
+  // the new one.
+  void RebaseLayer(const OwnedName& key, const LayerPtr& was, const LayerPtr* is, bool edited);
   void Index(const OwnedName& layer, const std::string& id, const Entity& entity);
   void Unindex(const OwnedName& layer, const std::string& id, const Entity& entity);
 
-  const SnapshotPtr base_;
+  SnapshotPtr base_;
   uint64_t& next_number_;
   Snapshot next_;
   // Layers and tallies under change, put into next_ when finished; nullopt: removed.

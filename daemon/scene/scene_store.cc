@@ -1,7 +1,10 @@
 #include "daemon/scene/scene_store.h"
 
+#include <algorithm>
 #include <set>
 #include <utility>
+
+#include "daemon/scene/view_check.h"
 
 namespace voxeld::daemon {
 namespace {
@@ -12,7 +15,34 @@ SnapshotPtr FirstSnapshot() {
   return std::make_shared<const Snapshot>(std::move(empty));
 }
 
+// How much work an operation is, in operations on one primitive.
+uint64_t WorkOf(const Operation& operation) {
+  size_t parts = 0;
+  if (const auto* upsert = std::get_if<Upsert>(&operation.op)) {
+    const auto* group = std::get_if<GroupPtr>(&upsert->entity.content);
+    if (group != nullptr) parts = (*group)->parts.size();
+  } else if (const auto* define = std::get_if<DefineObject>(&operation.op)) {
+    parts = define->data->parts.size();
+  }
+  return std::max<uint64_t>(1, parts);
+}
+
 }  // namespace
+
+SceneStore::PendingCommit::PendingCommit(SceneStore& store, Author author,
+                                         std::vector<Operation> operations, sync::TimeNs now,
+                                         bool strict, uint64_t refused_before)
+    : store_(store),
+      author_(std::move(author)),
+      operations_(std::move(operations)),
+      strict_(strict),
+      refused_before_(refused_before),
+      draft_(store.snapshot_, store.next_number_),
+      applier_(draft_, store.limits_, store.views_, store.room_, author_, now) {
+  store_.pending_.insert(this);
+}
+
+SceneStore::PendingCommit::~PendingCommit() { store_.pending_.erase(this); }
 
 SceneStore::SceneStore(const Limits& limits) : limits_(limits), snapshot_(FirstSnapshot()) {}
 
@@ -22,21 +52,89 @@ void SceneStore::Publish(Draft draft) {
 
 CommitResult SceneStore::Apply(const Author& author, std::vector<Operation> operations,
                                sync::TimeNs now, bool strict, uint64_t refused_before) {
-  Draft draft(snapshot_, next_number_);
-  CommitApplier applier(draft, limits_, views_, room_, author, now);
-  CommitResult result;
-  for (Operation& operation : operations) {
-    if (abandoned_) break;
-    applier.Apply(operation);
+  std::unique_ptr<PendingCommit> pending =
+      Begin(author, std::move(operations), now, strict, refused_before);
+  while (!Continue(*pending, UINT64_MAX)) {
   }
+  return Finish(std::move(pending));
+}
+
+std::unique_ptr<SceneStore::PendingCommit> SceneStore::Begin(Author author,
+                                                             std::vector<Operation> operations,
+                                                             sync::TimeNs now, bool strict,
+                                                             uint64_t refused_before) {
+  return std::make_unique<PendingCommit>(*this, std::move(author), std::move(operations), now,
+                                         strict, refused_before);
+}
+
+OwnerTally SceneStore::PromisedBeside(const PendingCommit& pending) const {
+  OwnerTally promised;
+  for (const PendingCommit* other : pending_) {
+    if (other == &pending) continue;
+    const OwnerTally growth = other->draft_.Growth();
+    promised.drawables += growth.drawables;
+    promised.layers += growth.layers;
+    promised.bytes += growth.bytes;
+    promised.derived += growth.derived;
+  }
+  return promised;
+}
+
+bool SceneStore::Continue(PendingCommit& pending, uint64_t operations) {
+  CommitApplier& applier = pending.applier_;
+  if (pending.draft_.base().number != snapshot_->number) {
+    pending.draft_.Rebase(snapshot_, pending.author_.owner, applier.touched());
+  }
+  room_.promised = PromisedBeside(pending);
+  uint64_t work = 0;
+  while (work < operations) {
+    if (abandoned_) return true;
+    if (applier.replaying()) {
+      applier.Replay();
+      ++work;
+    } else if (pending.next_ < pending.operations_.size()) {
+      Operation& operation = pending.operations_[pending.next_++];
+      work += WorkOf(operation);
+      applier.Apply(operation);
+    } else {
+      return true;
+    }
+  }
+  return false;
+}
+
+void SceneStore::SetQuotas(PendingCommit& pending, bool suppressed, uint64_t max_bytes,
+                           uint64_t max_entities) {
+  pending.author_.suppressed = suppressed;
+  pending.author_.max_bytes = max_bytes;
+  pending.author_.max_entities = max_entities;
+}
+
+absl::Status SceneStore::CheckNewView(const DisplayView& view) const {
+  uint64_t none = 0;
+  absl::Status status = CheckView(Draft(snapshot_, none), view, limits_);
+  for (const PendingCommit* pending : pending_) {
+    status.Update(CheckView(pending->draft_, view, limits_));
+  }
+  return status;
+}
+
+CommitResult SceneStore::Finish(std::unique_ptr<PendingCommit> pending) {
+  Draft& draft = pending->draft_;
+  CommitApplier& applier = pending->applier_;
+  if (draft.base().number != snapshot_->number) {
+    draft.Rebase(snapshot_, pending->author_.owner, applier.touched());
+  }
+  draft.Suppress(pending->author_.owner, pending->author_.suppressed);
   applier.End();
 
+  CommitResult result;
   result.issues = applier.refusals().issues;
   result.first_refusal = applier.refusals().first;
   result.more_issues = applier.refusals().more + applier.refusals().more_applied;
-  result.refused_operations = applier.refused() + refused_before;
+  result.refused_operations = applier.refused() + pending->refused_before_;
   result.abandoned = abandoned_;
-  if (result.abandoned || (strict && result.refused_operations > 0)) return result;
+  if (result.abandoned || (pending->strict_ && result.refused_operations > 0)) return result;
   result.applied = true;
   result.applied_operations = applier.applied();
   result.hidden = applier.hidden();

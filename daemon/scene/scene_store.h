@@ -1,5 +1,6 @@
-// The truth about the scene: applies commits one after another,
-// each making one immutable snapshot or none.
+// The truth about the scene: applies commits, each making one immutable snapshot or none. Commits of different owners
+// can be under way at the same time, each in slices; a commit takes its place in the order of snapshots when it
+// is finished.
 //
 // Single-threaded but for Abandon; the snapshots that it gives away may be used anywhere.
 #pragma once
@@ -8,9 +9,12 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
+#include <set>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "daemon/scene/commit_applier.h"
 #include "daemon/scene/operation.h"
 #include "daemon/scene/snapshot.h"
@@ -42,7 +46,8 @@ class SceneStore {
   // What coordinates are checked against from now on.
   void SetViews(std::vector<DisplayView> views) { views_ = std::move(views); }
 
-  // How much the scene may grow in the commits that follow; without it, by any amount.
+  // How much the scene may grow from now on beside what commits under way have added; without it, by any amount.
+  // `promised` of it is worked out here.
   void SetMemoryRoom(const MemoryRoom& room) { room_ = room; }
 
   // Applies `operations`, which have passed CheckAlone, as one commit.
@@ -50,6 +55,26 @@ class SceneStore {
   // refuses it whole. Call Expire(now) first.
   CommitResult Apply(const Author& author, std::vector<Operation> operations, sync::TimeNs now,
                      bool strict = false, uint64_t refused_before = 0);
+
+  // The same in slices: Begin, Continue until it returns true, Finish. A PendingCommit must not outlive the store.
+  // Destroying one that is not finished leaves the scene as it was. While an owner has a pending commit, the
+  // scene of that owner may change only in that entities expire, layers are removed or hidden, and layers get another
+  // writer.
+  class PendingCommit;
+  std::unique_ptr<PendingCommit> Begin(Author author, std::vector<Operation> operations,
+                                       sync::TimeNs now, bool strict = false,
+                                       uint64_t refused_before = 0);
+  // Rebases the commit onto the newest snapshot and applies up to `operations` more. A group, and the definition of an
+  // object, count as many operations as they have parts. Returns: true if there is nothing left to apply, or after Abandon.
+  bool Continue(PendingCommit& pending, uint64_t operations);
+  // Ends a commit for which Continue has returned true.
+  CommitResult Finish(std::unique_ptr<PendingCommit> pending);
+  // Sets what an operator may change while the commit is being applied.
+  static void SetQuotas(PendingCommit& pending, bool suppressed, uint64_t max_bytes,
+                        uint64_t max_entities);
+
+  // FailedPrecondition, as CheckView has it, if the scene, or what a commit under way has made of it, does not fit `view`.
+  absl::Status CheckNewView(const DisplayView& view) const;
 
   // Any thread. From now on no commit is applied, and one under way is given up between two of its
   // operations: for a daemon that must end in time.
@@ -82,6 +107,8 @@ class SceneStore {
 
  private:
   void Publish(Draft draft);
+  // Returns: what all pending commits except `pending` have added.
+  OwnerTally PromisedBeside(const PendingCommit& pending) const;
 
   const Limits limits_;
   std::vector<DisplayView> views_;
@@ -89,6 +116,28 @@ class SceneStore {
   std::atomic<bool> abandoned_ = false;
   uint64_t next_number_ = 1;
   SnapshotPtr snapshot_;
+  std::set<PendingCommit*> pending_;
+};
+
+class SceneStore::PendingCommit {
+ public:
+  PendingCommit(SceneStore& store, Author author, std::vector<Operation> operations,
+                sync::TimeNs now, bool strict, uint64_t refused_before);
+  ~PendingCommit();
+  PendingCommit(const PendingCommit&) = delete;
+  PendingCommit& operator=(const PendingCommit&) = delete;
+
+ private:
+  friend class SceneStore;
+
+  SceneStore& store_;
+  Author author_;
+  std::vector<Operation> operations_;
+  const bool strict_;
+  const uint64_t refused_before_;
+  size_t next_ = 0;
+  Draft draft_;
+  CommitApplier applier_;
 };
 
 }  // namespace voxeld::daemon

@@ -3,16 +3,13 @@
 #include <string>
 
 #include "absl/strings/str_format.h"
-#include "daemon/scene/draft.h"
 #include "daemon/scene/quoted.h"
 
 namespace voxeld::daemon {
 
-absl::Status CheckView(const SnapshotPtr& scene, const DisplayView& view, const Limits& limits) {
-  uint64_t none = 0;
-  const Draft whole(scene, none);
+absl::Status CheckView(const Draft& scene, const DisplayView& view, const Limits& limits) {
   absl::Status status;
-  whole.ForEachLayer([&](const OwnedName& key, const Layer& layer) {
+  scene.ForEachLayer([&](const OwnedName& key, const Layer& layer) {
     if (!status.ok()) return;
     const gpu::Affine map = gpu::Compose(view.scene_to_voxel, layer.transform);
     const auto reach = [&](const Bounds& bounds) {
@@ -22,7 +19,7 @@ absl::Status CheckView(const SnapshotPtr& scene, const DisplayView& view, const 
     if (reach(layer.bounds) <= limits.max_coordinate_voxels) return;
     layer.entities.ForEach([&](const std::string& id, const EntityPtr& entity) {
       const double largest =
-          reach(MapBounds(entity->data.transform, whole.BoundsOf(key.owner, entity->data.content)));
+          reach(MapBounds(entity->data.transform, scene.BoundsOf(key.owner, entity->data.content)));
       if (largest <= limits.max_coordinate_voxels || !status.ok()) return;
       status = absl::FailedPreconditionError(absl::StrFormat(
           "through this view entity %s of layer %s of owner %d would reach %g voxels on "

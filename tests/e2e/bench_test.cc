@@ -132,6 +132,18 @@ TEST(Bench, FairnessSaysWhatEachGot) {
   EXPECT_LE(Figure(report, "slowest_of_mean")["max"], 1);
 }
 
+TEST(Bench, BesideMeasuresAloneAndBesideAnUpload) {
+  const nlohmann::json report =
+      RunBench({"beside", "--rounds", "1", "--seconds", "1", "--rate", "10", "--entities", "20000",
+                "--display", "size=16x16x8"});
+  ExpectExact(report["commits"]);
+  EXPECT_EQ(report["commits"]["sent"], 20);
+  EXPECT_GT(report["uploads"], 0);
+  for (const char* name : {"alone.accepted.p99", "beside.accepted.p99", "alone.lit.p99"}) {
+    EXPECT_GT(Figure(report, name)["median"], 0) << name;
+  }
+}
+
 TEST(Bench, OverloadCountsEveryFrameAndEveryOutcome) {
   const absl::StatusOr<child::TemporaryFolder> folder = child::TemporaryFolder::Make("voxeld-e2e");
   ASSERT_TRUE(folder.ok()) << folder.status();

@@ -14,7 +14,6 @@
 #include "absl/strings/str_cat.h"
 #include "daemon/scene/clip.h"
 #include "daemon/scene/quoted.h"
-#include "daemon/scene/view_check.h"
 #include "tests/daemon/scene/store_fixture.h"
 
 namespace voxeld::daemon {
@@ -225,16 +224,14 @@ TEST(Rules, OfAnObjectWithVeryManyInstancesTheFirstAreLookedAt) {
 }
 
 TEST(Rules, AViewIsRefusedForTheFirstThatItWouldThrowOut) {
-  StoreFixture f;
+  StoreFixture f(Limits{.max_coordinate_voxels = 100});
   f.Commit(Put("a", "1", 5), Put("a", "2", 7), Put("b", "3", 9));
-  const Limits limits{.max_coordinate_voxels = 100};
-  const absl::Status status = CheckView(f.store.snapshot(), {"disp", Scale(50, 1, 1)}, limits);
+  const absl::Status status = f.store.CheckNewView({"disp", Scale(50, 1, 1)});
   EXPECT_EQ(status.message(),
             "through this view entity \"1\" of layer \"a\" of owner 1 would reach 250 voxels on "
             "display \"disp\"; it must "
             "stay within ±100");
-  EXPECT_TRUE(CheckView(f.store.snapshot(), {"disp", Scale(100.0 / 9, 1, 1)}, limits).ok())
-      << "up to the limit";
+  EXPECT_TRUE(f.store.CheckNewView({"disp", Scale(100.0 / 9, 1, 1)}).ok()) << "up to the limit";
 }
 
 TEST(Quoted, IsCutBetweenCharacters) {

@@ -12,7 +12,6 @@
 #include <limits>
 #include <span>
 
-#include "daemon/scene/view_check.h"
 #include "tests/daemon/scene/store_fixture.h"
 
 namespace voxeld::daemon {
@@ -355,20 +354,20 @@ TEST(SceneStore, LifetimesEndInOrderOfTime) {
 }
 
 TEST(SceneStore, AViewIsCheckedAgainstWhatIsThere) {
-  StoreFixture f;
-  f.Commit(Put("a", "near"), Put("a", "far", Entity1(Dots(3, 1, 1))), SetLayer("a", true));
   Limits limits;
   limits.max_coordinate_voxels = 100;
+  StoreFixture f(limits);
+  f.Commit(Put("a", "near"), Put("a", "far", Entity1(Dots(3, 1, 1))), SetLayer("a", true));
   DisplayView view{"disp", gpu::Affine()};
-  EXPECT_TRUE(CheckView(f.store.snapshot(), view, limits).ok());
+  EXPECT_TRUE(f.store.CheckNewView(view).ok());
   for (int axis = 0; axis < 3; ++axis) view.scene_to_voxel.m[axis * 5] = 1000;
-  const absl::Status wrong = CheckView(f.store.snapshot(), view, limits);
+  const absl::Status wrong = f.store.CheckNewView(view);
   EXPECT_EQ(wrong.code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(wrong.message(), HasSubstr("layer \"a\" of owner 1"));
   EXPECT_THAT(wrong.message(), HasSubstr("must stay within ±100"));
   // The bounds of a layer stay wide when something in it goes; that refuses nothing.
   f.Commit(DeleteId("a", "far"));
-  EXPECT_TRUE(CheckView(f.store.snapshot(), view, limits).ok());
+  EXPECT_TRUE(f.store.CheckNewView(view).ok());
 }
 
 TEST(SceneStore, HiddenMeansThatEveryOperationWasInAHiddenLayer) {

@@ -78,7 +78,8 @@ TEST(CommandLine, WhatIsWrongIsSaid) {
 
 TEST(CommandLine, HelpNamesThemAll) {
   const std::string help = ParseCommandLine({"--help"})->print_and_exit;
-  for (const char* name : {"ingest", "latency", "fairness", "overload", "idle", "paper", "frame"}) {
+  for (const char* name :
+       {"ingest", "latency", "fairness", "beside", "overload", "idle", "paper", "frame"}) {
     EXPECT_THAT(help, HasSubstr(name));
   }
 }
@@ -89,6 +90,7 @@ TEST(CommandLine, TheDefaultsOfEachFitIntoTwoMinutes) {
   EXPECT_LE(2 * total(IngestOptions()) * static_cast<double>(IngestCases().size()), 90);
   EXPECT_LE(total(LatencyOptions()), 90);
   EXPECT_LE(total(FairnessOptions()), 90);
+  EXPECT_LE(2 * total(BesideOptions()), 90);
   EXPECT_LE(OverloadOptions().seconds, 90);
   EXPECT_LE(3 * total(IdleOptions()), 90);
 }

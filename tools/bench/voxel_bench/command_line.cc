@@ -97,6 +97,19 @@ CLI::App* AddFairness(CLI::App& app, FairnessOptions& options) {
   return command;
 }
 
+CLI::App* AddBeside(CLI::App& app, BesideOptions& options) {
+  CLI::App* command = app.add_subcommand(
+      "beside", "One line now and then, while another owner uploads a large scene");
+  AddRounds(*command, options.rounds);
+  AddSeconds(*command, options.seconds, "Of each round, alone and beside the upload");
+  AddRate(*command, "--rate", options.rate, "Commits of one line a second");
+  AddCount(*command, "--entities", options.entities, "Of the upload, each a line, in one commit",
+           1'000'000);
+  AddRate(*command, "--volumes-per-second", options.volumes_per_second, "The display's");
+  AddDisplay(*command, options.display);
+  return command;
+}
+
 CLI::App* AddOverload(CLI::App& app, OverloadOptions& options) {
   CLI::App* command = app.add_subcommand(
       "overload", "More frames than the display takes: latency, memory and outcomes over time");
@@ -212,6 +225,7 @@ absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arg
   IngestOptions ingest;
   LatencyOptions latency;
   FairnessOptions fairness;
+  BesideOptions beside;
   OverloadOptions overload;
   IdleOptions idle;
   PaperOptions paper;
@@ -220,6 +234,7 @@ absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arg
   CLI::App* const ingest_command = AddIngest(app, ingest);
   CLI::App* const latency_command = AddLatency(app, latency);
   CLI::App* const fairness_command = AddFairness(app, fairness);
+  CLI::App* const beside_command = AddBeside(app, beside);
   CLI::App* const overload_command = AddOverload(app, overload);
   CLI::App* const idle_command = AddIdle(app, idle);
   CLI::App* const paper_command = AddPaper(app, paper);
@@ -249,6 +264,7 @@ absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arg
   if (ingest_command->parsed()) out.command = ingest;
   if (latency_command->parsed()) out.command = latency;
   if (fairness_command->parsed()) out.command = fairness;
+  if (beside_command->parsed()) out.command = beside;
   if (overload_command->parsed()) out.command = overload;
   if (idle_command->parsed()) out.command = idle;
   if (paper_command->parsed()) out.command = paper;

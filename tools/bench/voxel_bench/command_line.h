@@ -17,8 +17,8 @@ struct SinkOptions {
 struct CommandLine {
   bool json = false;
   std::string daemon;
-  std::variant<IngestOptions, LatencyOptions, FairnessOptions, OverloadOptions, IdleOptions,
-               PaperOptions, FrameOptions, SinkOptions>
+  std::variant<IngestOptions, LatencyOptions, FairnessOptions, BesideOptions, OverloadOptions,
+               IdleOptions, PaperOptions, FrameOptions, SinkOptions>
       command;
   // Not empty: to be printed, and that is all.
   std::string print_and_exit;

@@ -38,6 +38,7 @@ absl::StatusOr<nlohmann::json> Run(const CommandLine& line) {
         if constexpr (std::is_same_v<Options, IngestOptions>) return RunIngest(options, with);
         if constexpr (std::is_same_v<Options, LatencyOptions>) return RunLatency(options, with);
         if constexpr (std::is_same_v<Options, FairnessOptions>) return RunFairness(options, with);
+        if constexpr (std::is_same_v<Options, BesideOptions>) return RunBeside(options, with);
         if constexpr (std::is_same_v<Options, OverloadOptions>) return RunOverload(options, with);
         if constexpr (std::is_same_v<Options, IdleOptions>) return RunIdle(options, with);
         if constexpr (std::is_same_v<Options, PaperOptions>) return RunPaper(options, with);

@@ -53,6 +53,16 @@ struct FairnessOptions {
 absl::StatusOr<nlohmann::json> RunFairness(const FairnessOptions& options,
                                            const Surroundings& with);
 
+struct BesideOptions {
+  int rounds = 3;
+  double seconds = 15;
+  double rate = 20;  // commits of one line a second
+  int entities = 1'000'000;
+  double volumes_per_second = 60;
+  std::string display = "size=64x64x64,format=rgb888";
+};
+absl::StatusOr<nlohmann::json> RunBeside(const BesideOptions& options, const Surroundings& with);
+
 struct OverloadOptions {
   double seconds = 60;
   double factor = 10;  // times what the display takes, all clients together

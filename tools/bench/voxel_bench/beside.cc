@@ -1,0 +1,153 @@
+// A client that commits one line now and then, alone and beside another owner that uploads a large scene again and again.
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "tools/bench/voxel_bench/content.h"
+#include "tools/bench/voxel_bench/feed.h"
+#include "tools/bench/voxel_bench/pace.h"
+#include "tools/bench/voxel_bench/report.h"
+#include "tools/bench/voxel_bench/run.h"
+#include "tools/bench/voxel_bench/servers.h"
+#include "tools/bench/voxel_bench/session.h"
+
+namespace voxeld::bench {
+namespace {
+
+constexpr int kEntitiesAMessage = 10'000;
+constexpr int kVariants = 4;  // of the line
+constexpr sync::TimeNs kSettleLimit = 120 * sync::kSecond;
+
+// One frame: every entity is a line of its own, and all are committed at once.
+Frames LargeFrame(int entities) {
+  std::vector<Message> messages;
+  for (int first = 0; first < entities; first += kEntitiesAMessage) {
+    std::vector<Put> puts;
+    for (int i = first; i < std::min(first + kEntitiesAMessage, entities); ++i) {
+      puts.push_back({"large",
+                      absl::StrCat(i),
+                      {.form = LineForm::k24Bytes, .length = 0.1, .seed = uint64_t(i) + 1}});
+    }
+    messages.push_back(Message(BatchOf(puts)));
+  }
+  return {std::move(messages)};
+}
+
+Frames LineFrames() {
+  Frames frames;
+  for (int variant = 1; variant <= kVariants; ++variant) {
+    frames.push_back({Message(UpsertOf(
+        "small", "line", EntityOf({.form = LineForm::k24Bytes, .seed = uint64_t(variant)})))});
+  }
+  return frames;
+}
+
+v1::Open OpenAsked() {
+  v1::Open open;
+  open.set_client_name("voxel-bench beside");
+  return open;
+}
+
+struct Client {
+  Client(Loop& loop, const std::string& target, Frames frames)
+      : connection(target),
+        session(loop, connection, OpenAsked()),
+        sender(session, std::move(frames), FrameSender::WhenBehind::kWait) {}
+
+  Connection connection;
+  Session session;
+  FrameSender sender;
+};
+
+struct Latencies {
+  std::vector<double> accepted_ms, lit_volumes;
+};
+
+}  // namespace
+
+absl::StatusOr<nlohmann::json> RunBeside(const BesideOptions& options, const Surroundings& with) {
+  nlohmann::json report = ReportOf("beside", {{"rounds", options.rounds},
+                                              {"seconds", options.seconds},
+                                              {"commits_per_s", options.rate},
+                                              {"entities", options.entities},
+                                              {"volumes_per_s", options.volumes_per_second},
+                                              {"display", options.display}});
+  absl::StatusOr<std::unique_ptr<ServerProcess>> daemon = ServerProcess::StartDaemon(
+      {.program = with.daemon,
+       .displays = {
+           absl::StrCat("sim=simulated,rate=", options.volumes_per_second, ",", options.display)}});
+  if (!daemon.ok()) return daemon.status();
+  Loop loop(with.interrupted);
+  Client small(loop, (*daemon)->unix_target(), LineFrames());
+  Client large(loop, (*daemon)->unix_target(), LargeFrame(options.entities));
+  Latencies* now = nullptr;
+  small.session.OnReceipt([&](const v1::Receipt& receipt) {
+    if (now == nullptr) return;
+    const double ms =
+        static_cast<double>(Now() - small.sender.SentAt(receipt.frame_id())) / sync::kMillisecond;
+    if (receipt.has_accepted()) now->accepted_ms.push_back(ms);
+    // One that a newer commit has superseded is seen with that.
+    if (receipt.has_outcome() && receipt.outcome().has_presented()) {
+      now->lit_volumes.push_back(ms / 1000 * options.volumes_per_second);
+    }
+  });
+  for (Client* client : {&small, &large}) {
+    if (absl::Status opened = client->session.WaitOpened(); !opened.ok()) return opened;
+  }
+
+  const auto run = [&](Latencies& latencies) -> absl::Status {
+    now = &latencies;
+    const sync::TimeNs begin = Now();
+    const auto end = begin + static_cast<sync::TimeNs>(options.seconds * sync::kSecond);
+    Pace pace(begin, options.rate);
+    while (pace.due() < end) {
+      if (absl::Status ran = loop.RunTo(pace.due()); !ran.ok()) return ran;
+      small.sender.Due(pace.Take(Now()));
+      for (const Client* client : {&small, &large}) {
+        if (!client->session.status().ok()) return client->session.status();
+      }
+    }
+    const absl::Status settled = loop.RunUntil(Now() + kSettleLimit, [&] {
+      return (small.sender.idle() && small.session.tally().Settled()) ||
+             !small.session.status().ok();
+    });
+    now = nullptr;
+    return settled.ok() ? small.session.status() : settled;
+  };
+
+  std::vector<double> accepted[2], lit[2];
+  uint64_t uploads = 0;
+  for (int round = 0; round < options.rounds; ++round) {
+    for (const bool beside : {false, true}) {
+      const uint64_t before = large.session.tally().accepted;
+      large.sender.SetEndless(beside);
+      Latencies latencies;
+      if (absl::Status ran = run(latencies); !ran.ok()) return ran;
+      large.sender.SetEndless(false);
+      const absl::Status drained = loop.RunUntil(Now() + kSettleLimit, [&] {
+        return (large.sender.idle() && large.session.tally().Settled()) ||
+               !large.session.status().ok();
+      });
+      if (!drained.ok()) return drained;
+      if (!large.session.status().ok()) return large.session.status();
+      accepted[beside].push_back(QuantileOf(latencies.accepted_ms, 0.99));
+      lit[beside].push_back(QuantileOf(latencies.lit_volumes, 0.99));
+      uploads += large.session.tally().accepted - before;
+      with.progress(absl::StrFormat(
+          "beside: %s: accepted p50 %.1f ms, p99 %.1f ms; lit p50 %.1f volumes, p99 %.1f",
+          beside ? "beside an upload" : "alone", QuantileOf(latencies.accepted_ms, 0.5),
+          accepted[beside].back(), QuantileOf(latencies.lit_volumes, 0.5), lit[beside].back()));
+    }
+  }
+  AddFigure(report, "alone.accepted.p99", "ms", SpreadOf(accepted[0]));
+  AddFigure(report, "beside.accepted.p99", "ms", SpreadOf(accepted[1]));
+  AddFigure(report, "alone.lit.p99", "volumes", SpreadOf(lit[0]));
+  AddFigure(report, "beside.lit.p99", "volumes", SpreadOf(lit[1]));
+  report["uploads"] = uploads;
+  report["commits"] = ToJson(small.session.tally());
+  return report;
+}
+
+}  // namespace voxeld::bench
