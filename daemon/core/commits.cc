@@ -9,8 +9,10 @@
 namespace voxeld::daemon {
 namespace {
 
-// The number of operations in one slice of a commit. They take about 2 ms, during which other owners wait.
+// A slice of a commit ends after so many operations, or after so much time; until then other owners wait.
 constexpr uint64_t kSliceOperations = 1000;
+constexpr sync::TimeNs kSliceTime = 2 * sync::kMillisecond;
+constexpr uint64_t kBetweenLooks = 10;  // operations between two looks at the clock
 
 // Two clocks may drift apart by so much of the time that passes.
 constexpr int64_t kDriftDivisor = 20'000;
@@ -283,7 +285,11 @@ void Core::Impl::ApplySlice(Session& session, UnderWay& under_way) {
   const Owner& owner = owners_.at(session.owner);
   SceneStore::SetQuotas(*under_way.pending, owner.hidden, owner.max_bytes, owner.max_entities);
   store_.SetMemoryRoom(RoomFor(under_way.commit));
-  if (!store_.Continue(*under_way.pending, kSliceOperations)) return PostTurn(session.id);
+  const sync::TimeNs until = clock_.Now() + kSliceTime;
+  for (uint64_t applied = 0; !store_.Continue(*under_way.pending, kBetweenLooks);) {
+    applied += kBetweenLooks;
+    if (applied >= kSliceOperations || clock_.Now() >= until) return PostTurn(session.id);
+  }
   UnderWay done = std::move(under_way);
   under_way_.erase(session.owner);
   Conclude(session, std::move(done.commit), done.stages, store_.Finish(std::move(done.pending)));
