@@ -1,5 +1,6 @@
 #include "daemon/http/http_server.h"
 
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -18,8 +19,10 @@
 #include <cstring>
 #include <exception>
 #include <limits>
+#include <map>
 #include <optional>
 #include <set>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -28,6 +31,7 @@
 #include "daemon/http/connection_stream.h"
 #include "daemon/http/response_message.h"
 #include "daemon/http/web_socket_session.h"
+#include "daemon/listen/peer.h"
 
 namespace voxeld::daemon::http {
 namespace {
@@ -49,6 +53,17 @@ Response Plain(unsigned status, std::string text) { return PlainResponse(status,
 
 std::string_view View(boost::beast::string_view text) { return {text.data(), text.size()}; }
 
+// Returns: the address of the client without the port; empty for a unix socket, and if the client has gone.
+std::string AddressOf(const Stream::socket_type& socket) {
+  error_code error;
+  const auto endpoint = socket.remote_endpoint(error);
+  sockaddr_storage address = {};
+  if (error || endpoint.size() > sizeof(address)) return "";
+  std::memcpy(&address, endpoint.data(), endpoint.size());
+  if (address.ss_family == AF_UNIX) return "";
+  return listen::PeerOf(address, static_cast<socklen_t>(endpoint.size())).address;
+}
+
 // Who answers, and who takes over what a connection here does not serve itself.
 class Connection;
 
@@ -56,8 +71,9 @@ struct Served {
   const Handler handler;
   const Upgrade upgrade;
   const Receive receive;
-  // Gives a connection a place for a request of this path, and closes an idle one for it if necessary. Returns: whether there was one.
-  std::function<bool(Connection&, std::string_view path)> admit;
+  // Gives a connection a place for a request of this path, and closes an idle one for it if necessary. Returns: why there is none;
+  // nothing if it has one.
+  std::function<std::optional<std::string>(Connection&, std::string_view path)> refused;
   std::function<void(Stream, const RequestMessage&, const ServeWebSocket&)> upgraded;
   std::function<void(Stream, beast::flat_buffer, std::unique_ptr<BodyParser>, Reception)> received;
 };
@@ -68,6 +84,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
              const ServerOptions& options, const Served& served,
              std::function<void(Connection*)> closed)
       : io_(std::move(io)),
+        address_(AddressOf(socket)),
         stream_(std::move(socket)),
         timer_(io_->get_executor()),
         options_(options),
@@ -89,6 +106,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
   // Whether it waits for a request, and since when.
   bool waits() const { return waits_; }
   std::chrono::steady_clock::time_point since() const { return since_; }
+  // The address of its client without the port (listen::Peer::address); empty for a unix socket.
+  const std::string& address() const { return address_; }
   // Whether it has a place.
   bool placed() const { return placed_; }
   void Place() { placed_ = true; }
@@ -105,11 +124,9 @@ class Connection : public std::enable_shared_from_this<Connection> {
   // Takes a place for the request that has come. Returns: false if there was none, and the request has been answered with 503.
   bool Admitted() {
     waits_ = false;
-    if (served_.admit(*this, Asked().path)) return true;
-    Write(Plain(503, absl::StrCat(options_.max_connections,
-                                  " requests and WebSockets are being served, which is "
-                                  "max_http_connections; try again later")),
-          true);
+    std::optional<std::string> why = served_.refused(*this, Asked().path);
+    if (!why.has_value()) return true;
+    Write(Plain(503, *std::move(why)), true);
     return false;
   }
 
@@ -233,6 +250,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   }
 
   const std::shared_ptr<asio::io_context> io_;
+  const std::string address_;
   Stream stream_;
   asio::steady_timer timer_;
   const ServerOptions& options_;
@@ -271,7 +289,7 @@ class Server::Impl {
         served_{std::move(handler),
                 Bounded(std::move(upgrade)),
                 std::move(receive),
-                [this](Connection& asking, std::string_view path) { return Admit(asking, path); },
+                [this](Connection& asking, std::string_view path) { return Refused(asking, path); },
                 [this](Stream stream, const RequestMessage& request, const ServeWebSocket& serve) {
                   OnUpgraded(std::move(stream), request, serve);
                 },
@@ -294,10 +312,10 @@ class Server::Impl {
       retry_.cancel();
       const std::set<std::shared_ptr<Connection>> connections = connections_;
       for (const auto& connection : connections) connection->Close();
-      const std::set<std::shared_ptr<WebSocketSession>> sockets = sockets_;
-      for (const auto& socket : sockets) socket->Close();
-      const std::set<std::shared_ptr<BodySession>> bodies = bodies_;
-      for (const auto& body : bodies) body->Close();
+      const auto sockets = sockets_;
+      for (const auto& [socket, address] : sockets) socket->Close();
+      const auto bodies = bodies_;
+      for (const auto& [body, address] : bodies) body->Close();
     });
     thread_.join();
   }
@@ -372,31 +390,68 @@ class Server::Impl {
                              [](const auto& connection) { return connection->placed(); }));
   }
 
-  bool Admit(Connection& asking, std::string_view path) {
-    const auto& reserved = options_.reserved_paths;
-    const size_t places =
-        options_.max_connections +
-        (std::find(reserved.begin(), reserved.end(), path) == reserved.end() ? 0 : kReservedPlaces);
-    const size_t mine = asking.placed() ? 1 : 0;
-    while (Placed() - mine >= options_.max_connections && CloseLongestIdle(true)) {
-    }
-    if (Placed() - mine >= places) return false;
-    asking.Place();
-    return true;
+  // Returns: how many places the clients at `address` have that are not `asking`.
+  size_t PlacedFor(const std::string& address, const Connection& asking) const {
+    const auto is_there = [&](const auto& session) { return session.second == address; };
+    return static_cast<size_t>(
+        std::count_if(sockets_.begin(), sockets_.end(), is_there) +
+        std::count_if(bodies_.begin(), bodies_.end(), is_there) +
+        std::count_if(connections_.begin(), connections_.end(), [&](const auto& connection) {
+          return connection.get() != &asking && connection->placed() &&
+                 connection->address() == address;
+        }));
   }
 
-  // Closes the connection that has waited for a request longest. `placed`: among those with a place, or else among those without one
-  // that have had kFirstRequest. Returns: whether there was one.
-  bool CloseLongestIdle(bool placed) {
+  // The most places that the clients at one address may have.
+  size_t Share() const { return (size_t{options_.max_connections} * 3 + 3) / 4; }
+
+  std::optional<std::string> Refused(Connection& asking, std::string_view path) {
+    const auto& reserved = options_.reserved_paths;
+    const bool is_reserved = std::find(reserved.begin(), reserved.end(), path) != reserved.end();
+    const size_t mine = asking.placed() ? 1 : 0;
+    const std::string& address = asking.address();
+    if (!is_reserved && !address.empty() && Share() < options_.max_connections) {
+      while (PlacedFor(address, asking) >= Share() && CloseLongestIdle(true, &address)) {
+      }
+      if (PlacedFor(address, asking) >= Share()) {
+        return absl::StrCat(Share(), " requests and WebSockets from ", address,
+                            " are being served, which is three quarters of max_http_connections, "
+                            "the most for one address; try again later");
+      }
+    }
+    const size_t places = options_.max_connections + (is_reserved ? kReservedPlaces : 0);
+    while (Placed() - mine >= options_.max_connections && CloseLongestIdle(true)) {
+    }
+    if (Placed() - mine >= places) {
+      return absl::StrCat(options_.max_connections,
+                          " requests and WebSockets are being served, which is "
+                          "max_http_connections; try again later");
+    }
+    asking.Place();
+    return std::nullopt;
+  }
+
+  // Closes the connection that has waited for a request longest, of the address that has most that wait. `placed`: among those with a
+  // place, or else among those without one that have had kFirstRequest. `address`: among those of this address only; null: of any.
+  // Returns: whether there was one.
+  bool CloseLongestIdle(bool placed, const std::string* address = nullptr) {
     const auto before =
         std::chrono::steady_clock::now() - std::chrono::nanoseconds(placed ? 0 : kFirstRequest);
-    std::shared_ptr<Connection> longest;
+    std::map<std::string, std::pair<size_t, std::shared_ptr<Connection>>> idle;  // by address
     for (const auto& connection : connections_) {
       if (!connection->waits() || connection->placed() != placed) continue;
       if (connection->since() > before) continue;
+      if (address != nullptr && connection->address() != *address) continue;
+      auto& [count, longest] = idle[connection->address()];
+      ++count;
       if (longest == nullptr || connection->since() < longest->since()) longest = connection;
     }
-    if (longest == nullptr) return false;
+    const auto most = std::max_element(idle.begin(), idle.end(), [](const auto& a, const auto& b) {
+      return std::pair(a.second.first, b.second.second->since()) <
+             std::pair(b.second.first, a.second.second->since());
+    });
+    if (most == idle.end()) return false;
+    const std::shared_ptr<Connection> longest = most->second.second;
     longest->Close();
     return true;
   }
@@ -406,10 +461,9 @@ class Server::Impl {
     if (!upgrade) return nullptr;
     return [this, upgrade = std::move(upgrade)](
                const Request& request) -> absl::StatusOr<ServeWebSocket> {
-      const size_t most = (options_.max_connections * 3 + 3) / 4;
-      if (sockets_.size() < most) return upgrade(request);
+      if (sockets_.size() < Share()) return upgrade(request);
       return absl::ResourceExhaustedError(absl::StrCat(
-          most, " WebSockets are open, which is three quarters of max_http_connections"));
+          Share(), " WebSockets are open, which is three quarters of max_http_connections"));
     };
   }
 
@@ -434,23 +488,30 @@ class Server::Impl {
   }
 
   void OnUpgraded(Stream stream, const RequestMessage& request, const ServeWebSocket& serve) {
-    sockets_.insert(StartWebSocket(
-        io_, std::move(stream), request, std::chrono::nanoseconds(options_.message_limit_ns), serve,
-        [this](WebSocketSession* closed) {
-          std::erase_if(sockets_, [closed](const auto& socket) { return socket.get() == closed; });
-          Accept();
-        }));
+    std::string address = AddressOf(stream.socket());
+    sockets_.emplace(StartWebSocket(io_, std::move(stream), request,
+                                    std::chrono::nanoseconds(options_.message_limit_ns), serve,
+                                    [this](WebSocketSession* closed) {
+                                      std::erase_if(sockets_, [closed](const auto& socket) {
+                                        return socket.first.get() == closed;
+                                      });
+                                      Accept();
+                                    }),
+                     std::move(address));
   }
 
   void OnReceived(Stream stream, beast::flat_buffer buffer, std::unique_ptr<BodyParser> parser,
                   Reception reception) {
-    bodies_.insert(StartBody(io_, std::move(stream), std::move(buffer), std::move(parser),
-                             std::move(reception), options_, [this](BodySession* closed) {
-                               std::erase_if(bodies_, [closed](const auto& body) {
-                                 return body.get() == closed;
-                               });
-                               Accept();
-                             }));
+    std::string address = AddressOf(stream.socket());
+    bodies_.emplace(StartBody(io_, std::move(stream), std::move(buffer), std::move(parser),
+                              std::move(reception), options_,
+                              [this](BodySession* closed) {
+                                std::erase_if(bodies_, [closed](const auto& body) {
+                                  return body.first.get() == closed;
+                                });
+                                Accept();
+                              }),
+                    std::move(address));
   }
 
   ServerOptions options_;
@@ -459,8 +520,9 @@ class Server::Impl {
   Acceptor acceptor_;
   asio::steady_timer retry_;
   std::set<std::shared_ptr<Connection>> connections_;
-  std::set<std::shared_ptr<WebSocketSession>> sockets_;
-  std::set<std::shared_ptr<BodySession>> bodies_;
+  // With the addresses of their clients.
+  std::map<std::shared_ptr<WebSocketSession>, std::string> sockets_;
+  std::map<std::shared_ptr<BodySession>, std::string> bodies_;
   bool accepting_ = false, accept_failed_ = false, stopping_ = false;
   std::thread thread_;
 };

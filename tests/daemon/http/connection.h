@@ -21,6 +21,14 @@ class Connection {
  public:
   explicit Connection(const Address& address) : fd_(Made(address.unix_socket)) { Connect(address); }
   Connection() : fd_(Made(false)) {}  // not connected yet
+  // From the local address `from`, for example "127.0.0.2".
+  Connection(const Address& address, const char* from) : fd_(Made(false)) {
+    sockaddr_in name = {};
+    name.sin_family = AF_INET;
+    inet_pton(AF_INET, from, &name.sin_addr);
+    EXPECT_EQ(bind(fd_, reinterpret_cast<sockaddr*>(&name), sizeof(name)), 0);
+    Connect(address);
+  }
   ~Connection() { close(fd_); }
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;

@@ -414,6 +414,56 @@ TEST_F(HttpServer, WhereAllAreAtWorkARequestIsRefusedButForReservedPaths) {
   EXPECT_THAT(Ask(Get("/nothing")), StartsWith("HTTP/1.1 404 ")) << "there are places again";
 }
 
+TEST_F(HttpServer, OneAddressHasThreeQuartersOfThePlaces) {
+  Start({.max_connections = 8, .reserved_paths = {"/hello"}});
+  std::vector<std::unique_ptr<Connection>> greedy;
+  std::vector<Done> work;
+  for (int i = 0; i < 6; ++i) {
+    greedy.push_back(std::make_unique<Connection>(server_->address(), "127.0.0.2"));
+    greedy.back()->Send(Get("/later"));
+    work.push_back(TakeWaiting());
+  }
+  Connection seventh(server_->address(), "127.0.0.2");
+  seventh.Send(Get("/later"));
+  const std::string refused = absl::StrCat(seventh.ReadTo("\r\n\r\n"), seventh.ReadTo("\n"));
+  EXPECT_THAT(refused, StartsWith("HTTP/1.1 503 "));
+  EXPECT_THAT(refused, HasSubstr("6 requests and WebSockets from 127.0.0.2 are being served, which "
+                                 "is three quarters of max_http_connections"));
+  // Its health is still told, and others are served.
+  Connection health(server_->address(), "127.0.0.2");
+  health.Send(Get("/hello"));
+  EXPECT_THAT(health.ReadTo("hello\n"), StartsWith("HTTP/1.1 200 "));
+  Connection other(server_->address(), "127.0.0.3");
+  other.Send(Get("/later"));
+  work.push_back(TakeWaiting());
+  for (Done& done : work) done({.body = "done\n"});
+  EXPECT_THAT(other.ReadTo("done\n"), StartsWith("HTTP/1.1 200 "));
+  // An idle connection of the same address gives up its place.
+  EXPECT_THAT(greedy[0]->ReadTo("done\n"), StartsWith("HTTP/1.1 200 "));
+  Connection next(server_->address(), "127.0.0.2");
+  next.Send(Get("/later"));
+  TakeWaiting()({.body = "done\n"});
+  EXPECT_THAT(next.ReadTo("done\n"), StartsWith("HTTP/1.1 200 "));
+}
+
+TEST_F(HttpServer, TheAddressWithMostIdleConnectionsGivesUpAPlace) {
+  Start({.max_connections = 4});
+  const auto served = [this](const char* from) {
+    auto connection = std::make_unique<Connection>(server_->address(), from);
+    connection->Send(Get("/hello"));
+    EXPECT_THAT(connection->ReadTo("hello\n"), StartsWith("HTTP/1.1 200 "));
+    return connection;
+  };
+  const auto modest = served("127.0.0.2");  // idle longest, but alone
+  const auto first = served("127.0.0.3");
+  std::vector<std::unique_ptr<Connection>> many;
+  for (int i = 0; i < 2; ++i) many.push_back(served("127.0.0.3"));
+  const auto fifth = served("127.0.0.4");
+  EXPECT_EQ(first->ReadAll(), "") << "it was closed";
+  modest->Send(Get("/hello"));
+  EXPECT_THAT(modest->ReadTo("hello\n"), StartsWith("HTTP/1.1 200 "));
+}
+
 TEST_F(HttpServer, ThePortIsThereForTheNextAtOnce) {
   Start();
   Connection open(
