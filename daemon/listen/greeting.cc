@@ -24,15 +24,6 @@ uint32_t BigEndian(std::string_view bytes) {
 
 }  // namespace
 
-std::string Greeting::RefusalFrames() {
-  constexpr char kGoaway = 7, kEnhanceYourCalm = 0xb;
-  std::string frames(kServerSettings);
-  const size_t length = 8 + kNoRoom.size();
-  frames += {0, static_cast<char>(length >> 8), static_cast<char>(length), kGoaway, 0, 0, 0, 0, 0};
-  frames += {0, 0, 0, 0, 0, 0, 0, kEnhanceYourCalm};  // no stream was looked at
-  return frames += kNoRoom;
-}
-
 Greeting::Verdict Greeting::Read(std::string_view received) {
   received = received.substr(0, kMostBytes);
   if (at_ == 0) {

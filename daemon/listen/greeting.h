@@ -29,10 +29,12 @@ class Greeting {
   // Empty SETTINGS: HTTP/2's defaults, until gRPC sends its own.
   static constexpr std::string_view kServerSettings{"\0\0\0\x04\0\0\0\0\0", 9};
 
-  // Clients recognise a full daemon by these words.
-  static constexpr std::string_view kNoRoom = "voxeld has no room for another connection";
-  // Returns: SETTINGS, and GOAWAY with kNoRoom, to send to an HTTP/2 client before its connection is closed.
-  static std::string RefusalFrames();
+  // The answer to a client for which there is no room, before its connection is closed: a 503 of HTTP/1.1. An HTTP/2 client takes
+  // it for a failed connection and waits before it tries again. After SETTINGS and GOAWAY it would try again at once, for as long
+  // as its call may take.
+  static constexpr std::string_view kRefusal =
+      "HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\nContent-Length: 42\r\n"
+      "Connection: close\r\n\r\nvoxeld has no room for another connection\n";
 
   enum class Verdict : uint8_t {
     kMore,   // as it should be so far

@@ -214,8 +214,8 @@ class Listener::Impl {
     const absl::Status may = own ? absl::OkStatus() : guard_.MayEnter(peer);
     if (!may.ok()) {
       if (!accepted.tls && absl::IsResourceExhausted(may)) {
-        const std::string frames = Greeting::RefusalFrames();
-        send(connection.get(), frames.data(), frames.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+        constexpr std::string_view kAnswer = Greeting::kRefusal;
+        send(connection.get(), kAnswer.data(), kAnswer.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
       }
       if (refusals_++ == 0) refusing_since_ = clock_.Now();
       return true;

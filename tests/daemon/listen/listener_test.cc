@@ -290,8 +290,7 @@ TEST_F(ListenerTest, OverTheLimitIsClosedAtOnceAndAPlaceThatGetsFreeIsFree) {
   ASSERT_TRUE(Await([&] { return served() == 3; }));
   for (const Descriptor& client : clients) guard_->OnAnswer(NameOf(client.get()), true);
   const Descriptor refused = Connect(names[0]);
-  const std::string frames = Greeting::RefusalFrames();
-  EXPECT_EQ(ReadBytes(refused.get(), frames.size()), frames);
+  EXPECT_EQ(ReadBytes(refused.get(), Greeting::kRefusal.size()), Greeting::kRefusal);
   EXPECT_TRUE(Ends(refused.get()));
   EXPECT_EQ(counters_.Read().refused_by_address, 1u);
   clients.clear();

@@ -31,9 +31,10 @@ std::string WhyUnreachable(absl::string_view grpc_says, const std::string& addre
     return "its host's name is not known to this machine";
   }
   if (says("connection refused")) return "nobody listens there";
-  if (says("no room for another connection")) {
-    return "it has no room for another connection; max_connections and "
-           "max_connections_per_address are its limits";
+  if (says("http1.x server")) {
+    return "it answers in HTTP/1.1: it has no room for another connection (max_connections and "
+           "max_connections_per_address are its limits), or this is its http port or another "
+           "server";
   }
   if (!absl::StartsWith(address, "tls:")) return "nobody listens there, or what does is no voxeld";
   if (says("is not in peer certificate")) {
