@@ -12,31 +12,51 @@
 
 namespace voxeld::e2e {
 
-HttpConnection::HttpConnection(const std::string& address) {
+namespace {
+
+int Connected(const std::string& address) {
   const auto parsed = daemon::ParseAddress(address);
   EXPECT_TRUE(parsed.ok()) << parsed.status();
-  fd_ = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in name = {};
   name.sin_family = AF_INET;
   name.sin_port = htons(parsed->port);
   EXPECT_EQ(inet_pton(AF_INET, parsed->host.c_str(), &name.sin_addr), 1);
-  EXPECT_EQ(connect(fd_, reinterpret_cast<sockaddr*>(&name), sizeof(name)), 0);
   const timeval limit = {60, 0};
-  setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof(limit));
+  setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof(limit));
+  if (connect(fd, reinterpret_cast<sockaddr*>(&name), sizeof(name)) == 0) return fd;
+  close(fd);
+  return -1;
+}
+
+// What was answered, as far as it came.
+std::string Exchange(int fd, const std::string& path) {
+  const std::string request =
+      absl::StrCat("GET ", path, " HTTP/1.1\r\nHost: test\r\nConnection: close\r\n\r\n");
+  if (send(fd, request.data(), request.size(), MSG_NOSIGNAL) < 0) return "";
+  std::string answer;
+  char buffer[4096];
+  for (ssize_t n; (n = recv(fd, buffer, sizeof(buffer), 0)) > 0;) {
+    answer.append(buffer, static_cast<size_t>(n));
+  }
+  return answer;
+}
+
+}  // namespace
+
+HttpConnection::HttpConnection(const std::string& address) : fd_(Connected(address)) {
+  EXPECT_GE(fd_, 0) << "nobody listens on " << address;
 }
 
 HttpConnection::~HttpConnection() { close(fd_); }
 
-std::string HttpConnection::Get(const std::string& path) {
-  const std::string request =
-      absl::StrCat("GET ", path, " HTTP/1.1\r\nHost: test\r\nConnection: close\r\n\r\n");
-  EXPECT_EQ(send(fd_, request.data(), request.size(), MSG_NOSIGNAL),
-            static_cast<ssize_t>(request.size()));
-  std::string answer;
-  char buffer[4096];
-  for (ssize_t n; (n = recv(fd_, buffer, sizeof(buffer), 0)) > 0;) {
-    answer.append(buffer, static_cast<size_t>(n));
-  }
+std::string HttpConnection::Get(const std::string& path) { return Exchange(fd_, path); }
+
+std::string HttpGetIfThere(const std::string& address, const std::string& path) {
+  const int fd = Connected(address);
+  if (fd < 0) return "";
+  std::string answer = Exchange(fd, path);
+  close(fd);
   return answer;
 }
 

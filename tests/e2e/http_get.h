@@ -17,8 +17,11 @@ class HttpConnection {
   std::string Get(const std::string& path);
 
  private:
-  int fd_ = -1;
+  const int fd_;
 };
+
+// The same from a server that may end meanwhile; empty if it does.
+std::string HttpGetIfThere(const std::string& address, const std::string& path);
 
 // Head and body.
 inline std::string HttpGet(const std::string& address, const std::string& path) {

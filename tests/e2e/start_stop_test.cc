@@ -4,10 +4,15 @@
 #include <signal.h>
 #include <sys/socket.h>
 
+#include <atomic>
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <future>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <thread>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "daemon/version/version.h"
@@ -152,6 +157,31 @@ TEST(Http, HealthAndMetricsOfTheRunningDaemon) {
   EXPECT_THAT(HttpGet(daemon.http(), "/other"), StartsWith("HTTP/1.1 404 "));
 }
 
+TEST(Full, AFurtherClientIsToldSoAtOnce) {
+  const Folder folder;
+  Daemon daemon(
+      {"--config", folder.File("full.toml", "[server]\nmax_connections_per_address = 2\n")});
+  // Each with a connection of its own.
+  const auto channel = [&] {
+    grpc::ChannelArguments arguments;
+    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+    return grpc::CreateCustomChannel(daemon.tcp_target(), grpc::InsecureChannelCredentials(),
+                                     arguments);
+  };
+  const auto first = v1::SceneService::NewStub(channel());
+  const auto second = v1::SceneService::NewStub(channel());
+  Client one(*first), other(*second);
+  one.Open();
+  other.Open();
+  const auto third = v1::SceneService::NewStub(channel());
+  grpc::ClientContext context;
+  SetDeadline(context);
+  v1::ListEntitiesResponse entities;
+  const grpc::Status refused = third->ListEntities(&context, {}, &entities);
+  EXPECT_EQ(refused.error_code(), grpc::StatusCode::UNAVAILABLE);
+  EXPECT_THAT(refused.error_message(), HasSubstr("http1.x server"));
+}
+
 class Stop : public ::testing::TestWithParam<int> {};
 
 TEST_P(Stop, WithClientsConnectedEndsInTimeAndWell) {
@@ -199,9 +229,8 @@ INSTANTIATE_TEST_SUITE_P(Signal, Stop, ::testing::Values(SIGTERM, SIGINT), [](co
   return std::string(info.param == SIGTERM ? "SIGTERM" : "SIGINT");
 });
 
-TEST(Stop, WithALongCommitUnderWayEndsInTimeAndWell) {
-  Daemon daemon;
-  const auto scene = v1::SceneService::NewStub(Channel(daemon.tcp_target()));
+// A commit that takes minutes to apply: each of its last operations looks at every instance.
+v1::ApplyUpdateRequest LongCommit() {
   v1::ApplyUpdateRequest request;
   const v1::Entity ball = SphereIn("", "").upsert().entity();
   const auto define = [&] {
@@ -217,40 +246,12 @@ TEST(Stop, WithALongCommitUnderWayEndsInTimeAndWell) {
     upsert->set_id(absl::StrCat(i));
     upsert->mutable_entity()->mutable_primitive()->mutable_instance()->set_object("object");
   }
-  for (int i = 0; i < kMany; ++i) define();  // each looks at every instance
-  grpc::ClientContext small;                 // a first call over TCP may not be large
-  SetDeadline(small);
-  v1::ListEntitiesResponse nothing;
-  ASSERT_TRUE(scene->ListEntities(&small, {}, &nothing).ok());
-  grpc::ClientContext update;
-  SetDeadline(update);
-  v1::ApplyUpdateResponse response;
-  std::promise<grpc::Status> updated;
-  scene->async()->ApplyUpdate(&update, &request, &response,
-                              [&](grpc::Status status) { updated.set_value(std::move(status)); });
-  grpc::Status listed;
-  do {  // until the commit keeps the core from answering
-    grpc::ClientContext list;
-    list.set_deadline(std::chrono::system_clock::now() + std::chrono::milliseconds(500));
-    v1::ListEntitiesResponse entities;
-    listed = scene->ListEntities(&list, {}, &entities);
-  } while (listed.ok());
-  ASSERT_EQ(listed.error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
-
-  const auto begin = std::chrono::steady_clock::now();
-  daemon.process().Signal(SIGTERM);
-  const std::optional<int> code = daemon.process().Wait();
-  EXPECT_LT(std::chrono::steady_clock::now() - begin, kPromised);
-  EXPECT_EQ(code, 0) << daemon.process().output();
-  EXPECT_EQ(updated.get_future().get().error_code(), grpc::StatusCode::UNAVAILABLE);
+  for (int i = 0; i < kMany; ++i) define();
+  return request;
 }
 
-TEST(Stop, WithAHeavySceneBeingDrawnEndsInTimeAndWell) {
-  Daemon daemon;
-  const auto scene = v1::SceneService::NewStub(Channel(daemon.unix_target()));
-  Client client(*scene);
-  client.Open();
-  // 8⁶ balls.
+// Commits 8⁶ balls.
+void PutHeavyScene(Client& client) {
   const v1::Entity ball = SphereIn("", "").upsert().entity();
   std::string inner;
   for (int depth = 0; depth < 6; ++depth) {
@@ -276,13 +277,133 @@ TEST(Stop, WithAHeavySceneBeingDrawnEndsInTimeAndWell) {
   client.Send(put);
   client.Commit(1);
   while (client.answers.empty()) ASSERT_TRUE(client.Read().has_value());
+}
 
+// The commit of LongCommit under way in a call of its own. Destroy after the daemon has ended.
+class LongCall {
+ public:
+  explicit LongCall(v1::SceneService::Stub& scene) : request_(LongCommit()) {
+    grpc::ClientContext small;  // a first call over TCP may not be large
+    SetDeadline(small);
+    v1::ListEntitiesResponse nothing;
+    EXPECT_TRUE(scene.ListEntities(&small, {}, &nothing).ok());
+    SetDeadline(context_);
+    scene.async()->ApplyUpdate(&context_, &request_, &response_, [this](grpc::Status status) {
+      updated_.set_value(std::move(status));
+    });
+  }
+
+  grpc::Status Wait() { return updated_.get_future().get(); }
+
+ private:
+  grpc::ClientContext context_;
+  const v1::ApplyUpdateRequest request_;
+  v1::ApplyUpdateResponse response_;
+  std::promise<grpc::Status> updated_;
+};
+
+void ExpectEndsWell(Daemon& daemon) {
   const auto begin = std::chrono::steady_clock::now();
   daemon.process().Signal(SIGTERM);
   const std::optional<int> code = daemon.process().Wait();
   EXPECT_LT(std::chrono::steady_clock::now() - begin, kPromised);
   EXPECT_EQ(code, 0) << daemon.process().output();
 }
+
+TEST(Stop, WithALongCommitUnderWayEndsInTimeAndWell) {
+  Daemon daemon;
+  const auto scene = v1::SceneService::NewStub(Channel(daemon.tcp_target()));
+  LongCall call(*scene);
+  // Others are answered meanwhile.
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(2);
+  while (std::chrono::steady_clock::now() < until) {
+    grpc::ClientContext list;
+    SetDeadline(list);
+    v1::ListEntitiesResponse entities;
+    ASSERT_TRUE(scene->ListEntities(&list, {}, &entities).ok());
+    ASSERT_EQ(entities.total(), 0u) << "nothing of it is seen";
+  }
+  ExpectEndsWell(daemon);
+  EXPECT_EQ(call.Wait().error_code(), grpc::StatusCode::UNAVAILABLE);
+}
+
+TEST(Stop, WithAHeavySceneBeingDrawnEndsInTimeAndWell) {
+  Daemon daemon;
+  const auto scene = v1::SceneService::NewStub(Channel(daemon.unix_target()));
+  Client client(*scene);
+  client.Open();
+  PutHeavyScene(client);
+  ExpectEndsWell(daemon);
+}
+
+// VOXELD_STOPS: how often under each load.
+class StopUnderLoad : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(StopUnderLoad, EndsInTimeAndWell) {
+  const char* wanted = std::getenv("VOXELD_STOPS");
+  const int stops = wanted == nullptr ? 17 : std::atoi(wanted);
+  for (int i = 0; i < stops && !HasFailure(); ++i) {
+    Daemon daemon;
+    const auto scene = v1::SceneService::NewStub(Channel(daemon.unix_target()));
+    std::atomic<bool> ended = false;
+    std::atomic<uint64_t> work = 0;  // done by the load
+    std::vector<std::thread> load;
+    std::unique_ptr<LongCall> call;
+    Client client(*scene);
+    const auto commit_on = [&] {
+      Client busy(*scene);
+      busy.Open();
+      for (uint64_t frame = 1; !ended; ++frame) {
+        if (!busy.Send(SphereIn("layer", absl::StrCat(frame % 1000))) || !busy.Commit(frame)) break;
+        ++work;
+      }
+    };
+    if (GetParam() == "Streams") {
+      for (int k = 0; k < 3; ++k) load.emplace_back(commit_on);
+    } else if (GetParam() == "LongCommit") {
+      call = std::make_unique<LongCall>(*scene);
+      work = 1;
+    } else if (GetParam() == "HeavyScene") {
+      client.Open();
+      PutHeavyScene(client);
+      work = 1;
+    } else if (GetParam() == "Watches") {
+      load.emplace_back(commit_on);
+      load.emplace_back([&] {
+        grpc::ClientContext context;
+        SetDeadline(context);
+        const auto watch = scene->WatchScene(&context, {});
+        v1::WatchSceneResponse change;
+        while (watch->Read(&change)) ++work;
+      });
+      load.emplace_back([&] {
+        const auto displays = v1::DisplayService::NewStub(Channel(daemon.unix_target()));
+        grpc::ClientContext context;
+        SetDeadline(context);
+        const auto watch = displays->WatchVolume(&context, {});
+        v1::WatchVolumeResponse volume;
+        while (watch->Read(&volume)) ++work;
+      });
+    } else if (GetParam() == "Http") {
+      load.emplace_back([&] {
+        // Once it has ended there is no answer.
+        while (!ended && HttpGetIfThere(daemon.http(), "/metrics").starts_with("HTTP/1.1 200 "))
+          ++work;
+      });
+    }
+    // At another moment of the load each time.
+    while (!load.empty() && work < 20 + 37 * static_cast<uint64_t>(i)) std::this_thread::yield();
+    ExpectEndsWell(daemon);
+    ended = true;
+    for (std::thread& thread : load) thread.join();
+    if (call != nullptr) EXPECT_EQ(call->Wait().error_code(), grpc::StatusCode::UNAVAILABLE);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Load, StopUnderLoad,
+                         ::testing::Values("Nothing", "Streams", "LongCommit", "HeavyScene",
+                                           "Watches", "Http"),
+                         [](const auto& info) { return std::string(info.param); });
 
 TEST(Stop, AndStartAgainOnTheSameSocketEvenAfterAKill) {
   const Folder folder;
