@@ -381,7 +381,7 @@ TEST_P(StopUnderLoad, EndsInTimeAndWell) {
         grpc::ClientContext context;
         SetDeadline(context);
         const auto watch = displays->WatchVolume(&context, {});
-        v1::WatchVolumeResponse volume;
+        v1::VolumeChunk volume;
         while (watch->Read(&volume)) ++work;
       });
     } else if (GetParam() == "Http") {
