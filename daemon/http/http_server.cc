@@ -402,8 +402,13 @@ class Server::Impl {
         }));
   }
 
-  // The most places that the clients at one address may have.
-  size_t Share() const { return (size_t{options_.max_connections} * 3 + 3) / 4; }
+  // The most WebSockets. The other places are for those that come and go.
+  size_t MostSockets() const { return (size_t{options_.max_connections} * 3 + 3) / 4; }
+
+  // The most places that the clients at one address may have: half of the places that WebSockets leave are for other addresses.
+  size_t Share() const {
+    return MostSockets() + (options_.max_connections - MostSockets() + 1) / 2;
+  }
 
   std::optional<std::string> Refused(Connection& asking, std::string_view path) {
     const auto& reserved = options_.reserved_paths;
@@ -415,8 +420,8 @@ class Server::Impl {
       }
       if (PlacedFor(address, asking) >= Share()) {
         return absl::StrCat(Share(), " requests and WebSockets from ", address,
-                            " are being served, which is three quarters of max_http_connections, "
-                            "the most for one address; try again later");
+                            " are being served, which is the most of max_http_connections that "
+                            "one address may have; try again later");
       }
     }
     const size_t places = options_.max_connections + (is_reserved ? kReservedPlaces : 0);
@@ -456,14 +461,13 @@ class Server::Impl {
     return true;
   }
 
-  // A part of the connections is for those that come and go.
   Upgrade Bounded(Upgrade upgrade) {
     if (!upgrade) return nullptr;
     return [this, upgrade = std::move(upgrade)](
                const Request& request) -> absl::StatusOr<ServeWebSocket> {
-      if (sockets_.size() < Share()) return upgrade(request);
+      if (sockets_.size() < MostSockets()) return upgrade(request);
       return absl::ResourceExhaustedError(absl::StrCat(
-          Share(), " WebSockets are open, which is three quarters of max_http_connections"));
+          MostSockets(), " WebSockets are open, which is three quarters of max_http_connections"));
     };
   }
 

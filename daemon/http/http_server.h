@@ -73,7 +73,7 @@ struct ServerOptions {
   Address listen;
   // Number of places. Requests, connections that are kept open after one, and WebSockets take a place each. If none is free, the
   // connection that has been idle longest is closed, of the address that has most idle ones; if all are at work, the request is
-  // answered with 503. One address has at most three quarters of the places; unix sockets, which have no address, may have all.
+  // answered with 503. One address has at most seven eighths of the places; unix sockets, which have no address, may have all.
   uint32_t max_connections = 64;
   // These paths have kReservedPlaces of their own, so that health can always be read.
   std::vector<std::string> reserved_paths;
