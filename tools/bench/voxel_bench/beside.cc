@@ -17,8 +17,8 @@ namespace voxeld::bench {
 namespace {
 
 constexpr int kEntitiesAMessage = 10'000;
-constexpr int kVariants = 4;  // of the line
-constexpr sync::TimeNs kSettleLimit = 120 * sync::kSecond;
+constexpr int kLineVariants = 4;  // of the line
+constexpr sync::TimeNs kQuietLimit = 120 * sync::kSecond;
 
 // One frame: every entity is a line of its own, and all are committed at once.
 Frames LargeFrame(int entities) {
@@ -35,25 +35,25 @@ Frames LargeFrame(int entities) {
   return {std::move(messages)};
 }
 
-Frames LineFrames() {
+Frames OneLine() {
   Frames frames;
-  for (int variant = 1; variant <= kVariants; ++variant) {
+  for (int variant = 1; variant <= kLineVariants; ++variant) {
     frames.push_back({Message(UpsertOf(
         "small", "line", EntityOf({.form = LineForm::k24Bytes, .seed = uint64_t(variant)})))});
   }
   return frames;
 }
 
-v1::Open OpenAsked() {
+v1::Open OpenBeside() {
   v1::Open open;
   open.set_client_name("voxel-bench beside");
   return open;
 }
 
-struct Client {
-  Client(Loop& loop, const std::string& target, Frames frames)
+struct Party {
+  Party(Loop& loop, const std::string& target, Frames frames)
       : connection(target),
-        session(loop, connection, OpenAsked()),
+        session(loop, connection, OpenBeside()),
         sender(session, std::move(frames), FrameSender::WhenBehind::kWait) {}
 
   Connection connection;
@@ -76,12 +76,14 @@ absl::StatusOr<nlohmann::json> RunBeside(const BesideOptions& options, const Sur
                                               {"display", options.display}});
   absl::StatusOr<std::unique_ptr<ServerProcess>> daemon = ServerProcess::StartDaemon(
       {.program = with.daemon,
-       .displays = {
-           absl::StrCat("sim=simulated,rate=", options.volumes_per_second, ",", options.display)}});
+       .displays = {absl::StrCat("sim=simulated,rate=", options.volumes_per_second, ",",
+                                 options.display)},
+       // A million entities are more than a commit may bring by default.
+       .config = "[limits]\nmax_uncommitted_bytes = 1_073_741_824\n"});
   if (!daemon.ok()) return daemon.status();
   Loop loop(with.interrupted);
-  Client small(loop, (*daemon)->unix_target(), LineFrames());
-  Client large(loop, (*daemon)->unix_target(), LargeFrame(options.entities));
+  Party small(loop, (*daemon)->unix_target(), OneLine());
+  Party large(loop, (*daemon)->unix_target(), LargeFrame(options.entities));
   Latencies* now = nullptr;
   small.session.OnReceipt([&](const v1::Receipt& receipt) {
     if (now == nullptr) return;
@@ -93,7 +95,7 @@ absl::StatusOr<nlohmann::json> RunBeside(const BesideOptions& options, const Sur
       now->lit_volumes.push_back(ms / 1000 * options.volumes_per_second);
     }
   });
-  for (Client* client : {&small, &large}) {
+  for (Party* client : {&small, &large}) {
     if (absl::Status opened = client->session.WaitOpened(); !opened.ok()) return opened;
   }
 
@@ -105,11 +107,11 @@ absl::StatusOr<nlohmann::json> RunBeside(const BesideOptions& options, const Sur
     while (pace.due() < end) {
       if (absl::Status ran = loop.RunTo(pace.due()); !ran.ok()) return ran;
       small.sender.Due(pace.Take(Now()));
-      for (const Client* client : {&small, &large}) {
+      for (const Party* client : {&small, &large}) {
         if (!client->session.status().ok()) return client->session.status();
       }
     }
-    const absl::Status settled = loop.RunUntil(Now() + kSettleLimit, [&] {
+    const absl::Status settled = loop.RunUntil(Now() + kQuietLimit, [&] {
       return (small.sender.idle() && small.session.tally().Settled()) ||
              !small.session.status().ok();
     });
@@ -126,7 +128,7 @@ absl::StatusOr<nlohmann::json> RunBeside(const BesideOptions& options, const Sur
       Latencies latencies;
       if (absl::Status ran = run(latencies); !ran.ok()) return ran;
       large.sender.SetEndless(false);
-      const absl::Status drained = loop.RunUntil(Now() + kSettleLimit, [&] {
+      const absl::Status drained = loop.RunUntil(Now() + kQuietLimit, [&] {
         return (large.sender.idle() && large.session.tally().Settled()) ||
                !large.session.status().ok();
       });
