@@ -85,14 +85,18 @@ absl::StatusOr<nlohmann::json> RunBeside(const BesideOptions& options, const Sur
   Party small(loop, (*daemon)->unix_target(), OneLine());
   Party large(loop, (*daemon)->unix_target(), LargeFrame(options.entities));
   Latencies* now = nullptr;
+  uint64_t seen = 0;  // the newest frame that has been seen
   small.session.OnReceipt([&](const v1::Receipt& receipt) {
+    const auto took_ms = [&](uint64_t frame_id) {
+      return static_cast<double>(Now() - small.sender.SentAt(frame_id)) / sync::kMillisecond;
+    };
     if (now == nullptr) return;
-    const double ms =
-        static_cast<double>(Now() - small.sender.SentAt(receipt.frame_id())) / sync::kMillisecond;
-    if (receipt.has_accepted()) now->accepted_ms.push_back(ms);
-    // One that a newer commit has superseded is seen with that.
+    if (receipt.has_accepted()) now->accepted_ms.push_back(took_ms(receipt.frame_id()));
     if (receipt.has_outcome() && receipt.outcome().has_presented()) {
-      now->lit_volumes.push_back(ms / 1000 * options.volumes_per_second);
+      // A commit that this one has superseded is seen with it.
+      for (; seen < receipt.frame_id(); ++seen) {
+        now->lit_volumes.push_back(took_ms(seen + 1) / 1000 * options.volumes_per_second);
+      }
     }
   });
   for (Party* client : {&small, &large}) {
