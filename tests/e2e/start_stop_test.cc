@@ -396,7 +396,8 @@ TEST_P(StopUnderLoad, EndsInTimeAndWell) {
     ExpectEndsWell(daemon);
     ended = true;
     for (std::thread& thread : load) thread.join();
-    if (call != nullptr) EXPECT_EQ(call->Wait().error_code(), grpc::StatusCode::UNAVAILABLE);
+    // A call of which not all has been received is cancelled.
+    if (call != nullptr) EXPECT_FALSE(call->Wait().ok());
   }
 }
 
