@@ -71,8 +71,8 @@ struct Served {
   const Handler handler;
   const Upgrade upgrade;
   const Receive receive;
-  // Gives a connection a place for a request of this path, and closes an idle one for it if necessary. Returns: why there is none;
-  // nothing if it has one.
+  // Assigns a place to a connection whose request has this path; if none is free, an idle connection is closed. Returns: the reason
+  // if there is no place; nothing if the connection has one.
   std::function<std::optional<std::string>(Connection&, std::string_view path)> refused;
   std::function<void(Stream, const RequestMessage&, const ServeWebSocket&)> upgraded;
   std::function<void(Stream, beast::flat_buffer, std::unique_ptr<BodyParser>, Reception)> received;

@@ -29,9 +29,9 @@ class Greeting {
   // Empty SETTINGS: HTTP/2's defaults, until gRPC sends its own.
   static constexpr std::string_view kServerSettings{"\0\0\0\x04\0\0\0\0\0", 9};
 
-  // The answer to a client for which there is no room, before its connection is closed: a 503 of HTTP/1.1. An HTTP/2 client takes
-  // it for a failed connection and waits before it tries again. After SETTINGS and GOAWAY it would try again at once, for as long
-  // as its call may take.
+  // Sent to a client when there is no room for its connection, which is then closed: HTTP/1.1 status 503. HTTP/2 clients treat
+  // this as a failed connection and retry with a delay. After SETTINGS and GOAWAY they would reconnect at once until the
+  // deadline of the call.
   static constexpr std::string_view kRefusal =
       "HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\nContent-Length: 42\r\n"
       "Connection: close\r\n\r\nvoxeld has no room for another connection\n";

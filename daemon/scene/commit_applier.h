@@ -36,7 +36,7 @@ struct Author {
 struct MemoryRoom {
   uint64_t bytes = UINT64_MAX;  // that the scene, and what engines derive from it, may grow by
   uint64_t engines = 0;         // each of which derives all of it
-  // What the unfinished commits of other owners have added so far. It counts as part of the scene.
+  // The growth by unfinished commits of other owners. It counts as part of the scene.
   OwnerTally promised;
 };
 
@@ -57,6 +57,11 @@ class CommitApplier {
   // applied meanwhile.
   void Apply(Operation& operation);
   bool replaying() const { return replayed_.has_value(); }
+  // Returns: the operation that the next Replay applies; null: it ends the frame.
+  const Operation* next_replayed() const {
+    const bool is_last = replayed_->next == replayed_->operations.size();
+    return is_last ? nullptr : replayed_->operations[replayed_->next];
+  }
   void Replay();
   void End();
   // The layers that have been changed, by name.

@@ -67,6 +67,11 @@ std::unique_ptr<SceneStore::PendingCommit> SceneStore::Begin(Author author,
                                          strict, refused_before);
 }
 
+void SceneStore::Rebase(PendingCommit& pending) {
+  if (pending.draft_.base().number == snapshot_->number) return;
+  pending.draft_.Rebase(snapshot_, pending.author_.owner, pending.applier_.touched());
+}
+
 OwnerTally SceneStore::PromisedBeside(const PendingCommit& pending) const {
   OwnerTally promised;
   for (const PendingCommit* other : pending_) {
@@ -82,16 +87,15 @@ OwnerTally SceneStore::PromisedBeside(const PendingCommit& pending) const {
 
 bool SceneStore::Continue(PendingCommit& pending, uint64_t operations) {
   CommitApplier& applier = pending.applier_;
-  if (pending.draft_.base().number != snapshot_->number) {
-    pending.draft_.Rebase(snapshot_, pending.author_.owner, applier.touched());
-  }
+  Rebase(pending);
   room_.promised = PromisedBeside(pending);
   uint64_t work = 0;
   while (work < operations) {
     if (abandoned_) return true;
     if (applier.replaying()) {
+      const Operation* operation = applier.next_replayed();
+      work += operation == nullptr ? 1 : WorkOf(*operation);
       applier.Replay();
-      ++work;
     } else if (pending.next_ < pending.operations_.size()) {
       Operation& operation = pending.operations_[pending.next_++];
       work += WorkOf(operation);
@@ -110,10 +114,11 @@ void SceneStore::SetQuotas(PendingCommit& pending, bool suppressed, uint64_t max
   pending.author_.max_entities = max_entities;
 }
 
-absl::Status SceneStore::CheckNewView(const DisplayView& view) const {
+absl::Status SceneStore::CheckNewView(const DisplayView& view) {
   uint64_t none = 0;
   absl::Status status = CheckView(Draft(snapshot_, none), view, limits_);
-  for (const PendingCommit* pending : pending_) {
+  for (PendingCommit* pending : pending_) {
+    Rebase(*pending);
     status.Update(CheckView(pending->draft_, view, limits_));
   }
   return status;
@@ -122,9 +127,7 @@ absl::Status SceneStore::CheckNewView(const DisplayView& view) const {
 CommitResult SceneStore::Finish(std::unique_ptr<PendingCommit> pending) {
   Draft& draft = pending->draft_;
   CommitApplier& applier = pending->applier_;
-  if (draft.base().number != snapshot_->number) {
-    draft.Rebase(snapshot_, pending->author_.owner, applier.touched());
-  }
+  Rebase(*pending);
   draft.Suppress(pending->author_.owner, pending->author_.suppressed);
   applier.End();
 

@@ -74,7 +74,7 @@ class SceneStore {
                         uint64_t max_entities);
 
   // FailedPrecondition, as CheckView has it, if the scene, or what a commit under way has made of it, does not fit `view`.
-  absl::Status CheckNewView(const DisplayView& view) const;
+  absl::Status CheckNewView(const DisplayView& view);
 
   // Any thread. From now on no commit is applied, and one under way is given up between two of its
   // operations: for a daemon that must end in time.
@@ -107,6 +107,8 @@ class SceneStore {
 
  private:
   void Publish(Draft draft);
+  // Puts the commit on top of the newest snapshot.
+  void Rebase(PendingCommit& pending);
   // Returns: what all pending commits except `pending` have added.
   OwnerTally PromisedBeside(const PendingCommit& pending) const;
 

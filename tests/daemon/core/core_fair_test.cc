@@ -27,6 +27,20 @@ void Hand(Simulation::Client& client, int entities, const std::string& layer = "
   client.info.intake->Take({std::move(all), {}, 100});
 }
 
+// Hands over a large commit and lets the core apply its first slice.
+void BeginLarge(Simulation& sim, Simulation::Client& client) {
+  Hand(client, kLarge);
+  sim.core->Turn(0);
+  sim.core->Turn(0);
+}
+
+// Another session of the client's owner.
+Simulation::Client OpenAgain(Simulation& sim, const Simulation::Client& client) {
+  OpenOptions same;
+  same.owner_token = client.info.owner_token;
+  return sim.Open(same);
+}
+
 size_t CommitsAccepted(const Simulation::Client& client) {
   return client.sink->Of<Accepted>().size();
 }
@@ -45,9 +59,7 @@ TEST(CoreFair, ASmallCommitPassesAnothersLargeOne) {
   Simulation sim;
   sim.Start();
   auto large = sim.Open(), small = sim.Open();
-  Hand(large, kLarge);
-  sim.core->Turn(0);
-  sim.core->Turn(0);
+  BeginLarge(sim, large);
   Hand(small, 1, "b");
   EXPECT_LE(TurnsUntil(sim, small, 1), 3);
   EXPECT_EQ(CommitsAccepted(large), 0u);
@@ -62,9 +74,7 @@ TEST(CoreFair, ManySessionsOfOneOwnerGetOneTurnBetweenThem) {
   Simulation sim;
   sim.Start();
   std::vector<Simulation::Client> many = {sim.Open()};
-  OpenOptions same;
-  same.owner_token = many[0].info.owner_token;
-  while (many.size() < 50) many.push_back(sim.Open(same));
+  while (many.size() < 50) many.push_back(OpenAgain(sim, many[0]));
   auto other = sim.Open();
   for (auto& client : many) {
     for (int i = 0; i < 3; ++i) Hand(client, 1, absl::StrCat("a", client.info.session));
@@ -79,12 +89,8 @@ TEST(CoreFair, AnOwnersOtherSessionsWaitForItsLargeCommit) {
   Simulation sim;
   sim.Start();
   auto large = sim.Open();
-  OpenOptions same;
-  same.owner_token = large.info.owner_token;
-  auto second = sim.Open(same);
-  Hand(large, kLarge);
-  sim.core->Turn(0);
-  sim.core->Turn(0);
+  auto second = OpenAgain(sim, large);
+  BeginLarge(sim, large);
   Hand(second, 1);  // replaces one of the others
   Hand(large, 2, "c");
   sim.core->Step();
@@ -102,12 +108,8 @@ TEST(CoreFair, ALargeCommitOfASessionThatEndsIsAppliedFirst) {
     OpenOptions keep;
     keep.on_disconnect = DisconnectPolicy::kKeep;
     auto large = sim.Open(keep);
-    OpenOptions same;
-    same.owner_token = large.info.owner_token;
-    auto second = sim.Open(same);
-    Hand(large, kLarge);
-    sim.core->Turn(0);
-    sim.core->Turn(0);
+    auto second = OpenAgain(sim, large);
+    BeginLarge(sim, large);
     Hand(second, 1, "b");
     if (taken_up) {
       OpenOptions resume;
@@ -127,12 +129,8 @@ TEST(CoreFair, AnOwnerIsEvictedInTheMidstOfItsCommit) {
   Simulation sim;
   sim.Start();
   auto large = sim.Open(), other = sim.Open();
-  OpenOptions same;
-  same.owner_token = large.info.owner_token;
-  auto second = sim.Open(same);
-  Hand(large, kLarge);
-  sim.core->Turn(0);
-  sim.core->Turn(0);
+  auto second = OpenAgain(sim, large);
+  BeginLarge(sim, large);
   Hand(second, 1);
   Hand(other, 1, "b");
   OwnerControl control;
@@ -151,9 +149,7 @@ TEST(CoreFair, WhatAnOperatorSetsMeanwhileHoldsForTheRest) {
   Simulation sim;
   sim.Start();
   auto large = sim.Open();
-  Hand(large, kLarge);
-  sim.core->Turn(0);
-  sim.core->Turn(0);
+  BeginLarge(sim, large);
   OwnerControl control;
   control.owner = large.info.owner;
   control.max_entities = 10'000;

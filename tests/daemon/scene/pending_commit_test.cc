@@ -118,6 +118,18 @@ TEST(PendingCommit, AGroupCountsAsWhatItHas) {
   EXPECT_TRUE(f.store.Continue(*pending, 1));
 }
 
+TEST(PendingCommit, AGroupInAFrameCountsAsWhatItHas) {
+  StoreFixture f;
+  auto group = std::make_shared<GroupData>();
+  group->parts.resize(100, GroupData::Part{Dots(0), {}});
+  Pending pending =
+      Start(f, Begin("a"), Put("a", "x", Entity1(GroupPtr(group))), Put("a", "y"), End("a"));
+  EXPECT_FALSE(f.store.Continue(*pending, 103));  // to the end of the frame
+  EXPECT_FALSE(f.store.Continue(*pending, 50));   // the group takes effect
+  EXPECT_FALSE(f.store.Continue(*pending, 2));    // the other entity and the end
+  EXPECT_TRUE(f.store.Continue(*pending, 1));
+}
+
 TEST(PendingCommit, WhatExpiresMeanwhileGoesUnlessItWasReplaced) {
   StoreFixture f;
   const auto brief = [] {
@@ -219,6 +231,15 @@ TEST(PendingCommit, ANewViewMustFitWhatItHasBroughtSoFar) {
   EXPECT_THAT(std::string(f.store.CheckNewView({"disp", Scale(2, 1, 1)}).message()),
               HasSubstr("120 voxels"));
   pending.reset();
+  EXPECT_TRUE(f.store.CheckNewView({"disp", Scale(2, 1, 1)}).ok());
+
+  // What others have removed since the last slice does not count.
+  const Author other = MakeAuthor(2, 22);
+  f.Commit(other, Put("b", "far", 60));
+  pending = Start(f, Put("a", "near", 1));
+  EXPECT_TRUE(f.store.Continue(*pending, 10));
+  EXPECT_FALSE(f.store.CheckNewView({"disp", Scale(2, 1, 1)}).ok());
+  f.Commit(other, DeleteAllOf("b"));
   EXPECT_TRUE(f.store.CheckNewView({"disp", Scale(2, 1, 1)}).ok());
 }
 
