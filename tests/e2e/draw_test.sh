@@ -29,7 +29,7 @@ draws() {
   shift 2
   "$voxelctl" --json draw "$@" >"$work/draw.json"
   # At once: a picture is of all that is up when it is asked for.
-  "$voxelctl" --json snapshot "$work/picture.png" >"$work/picture.json"
+  "$voxelctl" --json snapshot "$work/picture.png" --size 300x250 >"$work/picture.json"
   lit=$(field "$work/picture.json" 'd["lit_pixels"]')
   [ "$lit" -ge "$least" ] && [ "$lit" -le "$most" ] || fail "$*: $lit lit pixels, not $least to $most"
 }

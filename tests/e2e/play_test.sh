@@ -79,7 +79,7 @@ for d in stats["displays"]:
 EOT
 
 "$voxelctl" pattern corners
-"$voxelctl" --json snapshot "$work/corners.png" >"$work/picture.json"
+"$voxelctl" --json snapshot "$work/corners.png" --size 300x250 >"$work/picture.json"
 [ "$(field "$work/picture.json" 'd["lit_pixels"] > 100')" = True ]
 # What is played is seen: it ends the pattern.
 play unveiled "$models/OBJ/spider.obj"
