@@ -8,7 +8,7 @@
 #include "tests/conformance/conformance_test.h"
 
 namespace voxeld::gpu::conformance {
-namespace {
+namespace cells_test {
 
 constexpr uint32_t kRed = 0xFF0000, kGreen = 0x00FF00;
 constexpr int32_t kSide = 40;
@@ -102,5 +102,5 @@ TEST_P(Cells, SmallerThanVoxelsAreStillSeen) {
   EXPECT_EQ(Count(Draw(), kRed), 1u) << "flattened to one place";
 }
 
-}  // namespace
+}  // namespace cells_test
 }  // namespace voxeld::gpu::conformance

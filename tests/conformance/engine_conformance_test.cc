@@ -6,7 +6,7 @@
 #include "tests/conformance/conformance_test.h"
 
 namespace voxeld::gpu::conformance {
-namespace {
+namespace engine_conformance_test {
 
 constexpr int kSize = 24;
 
@@ -196,5 +196,5 @@ TEST_P(EngineConformance, NewTargetsDrawTheSameSceneAnew) {
   }
 }
 
-}  // namespace
+}  // namespace engine_conformance_test
 }  // namespace voxeld::gpu::conformance

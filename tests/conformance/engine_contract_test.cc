@@ -7,7 +7,7 @@
 #include "tests/conformance/conformance_test.h"
 
 namespace voxeld::gpu::conformance {
-namespace {
+namespace engine_contract_test {
 
 // A stack of slices, a voxel a pixel: 48 × 48 × 32, so 3 × 3 × 2 tiles of 16.
 Target StackTarget() {
@@ -375,5 +375,5 @@ TEST_P(EngineContract, EveryCallIsAnsweredOnceAndInOrder) {
   for (int i = 0; i < 200; ++i) EXPECT_EQ(answers[static_cast<size_t>(i)], i);
 }
 
-}  // namespace
+}  // namespace engine_contract_test
 }  // namespace voxeld::gpu::conformance

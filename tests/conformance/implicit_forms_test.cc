@@ -23,7 +23,7 @@
 #include "tests/conformance/placed.h"
 
 namespace voxeld::gpu::conformance {
-namespace {
+namespace implicit_forms_test {
 
 constexpr int32_t kSize = 48;
 // Voxels: a dozen roundings of 2⁻²⁴ (docs/expressions.md) of numbers below 100. Places are snapped to 2⁻⁸ voxel
@@ -323,5 +323,5 @@ TEST_P(ImplicitForms, AreTheSurfaces) {
   }
 }
 
-}  // namespace
+}  // namespace implicit_forms_test
 }  // namespace voxeld::gpu::conformance

@@ -6,7 +6,7 @@
 #include "tests/conformance/conformance_test.h"
 
 namespace voxeld::gpu::conformance {
-namespace {
+namespace mask_test {
 
 constexpr uint32_t kRed = 0xFF0000, kBlue = 0x0000FF;
 constexpr uint64_t kSide = 40, kFace = kSide * kSide, kMaskFace = 20 * 20;
@@ -187,5 +187,5 @@ TEST_P(Masks, AHiddenMaskOfNoneIsNotDrawn) {
   EXPECT_GT(drawn(), 0u);
 }
 
-}  // namespace
+}  // namespace mask_test
 }  // namespace voxeld::gpu::conformance

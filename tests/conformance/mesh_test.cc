@@ -8,7 +8,7 @@
 #include "tests/conformance/conformance_test.h"
 
 namespace voxeld::gpu::conformance {
-namespace {
+namespace mesh_test {
 
 Target StackOf(int32_t width, int32_t height, int32_t slices, display::PixelFormat format) {
   Target target;
@@ -252,5 +252,5 @@ TEST_P(Meshes, AsTheyChangeInLayersEqualTheOracle) {
   }
 }
 
-}  // namespace
+}  // namespace mesh_test
 }  // namespace voxeld::gpu::conformance

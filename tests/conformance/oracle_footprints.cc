@@ -8,7 +8,7 @@ namespace voxeld::gpu::conformance {
 namespace {
 
 // In units of 2⁻¹⁶ voxel, as display/geometry/footprint.h has it: whole numbers, held exactly.
-double Units(double mm, double pitch_mm) { return std::floor(mm / pitch_mm * 65536 + 0.5); }
+double ToUnits(double mm, double pitch_mm) { return std::floor(mm / pitch_mm * 65536 + 0.5); }
 
 // Cells of an axis that are in a light's box, and the one that the light is in; −1: none.
 struct Cells {
@@ -17,7 +17,7 @@ struct Cells {
 };
 
 Cells CellsOf(double light_mm, double cell_mm, int32_t count, double pitch_mm, double origin_mm) {
-  const double at = Units(light_mm - origin_mm, pitch_mm), size = Units(cell_mm, pitch_mm);
+  const double at = ToUnits(light_mm - origin_mm, pitch_mm), size = ToUnits(cell_mm, pitch_mm);
   Cells cells;
   for (int32_t cell = 0; cell < count; ++cell) {
     const double low = cell * 65536.0, centre = low + 32768;

@@ -86,11 +86,11 @@ void PlotSteps(const OracleLine& line, int64_t n, const DenseVolume& grid, const
 }
 
 // When a coordinate crosses a face: units / length of the way, then the axis.
-struct Moment {
+struct Crossing {
   Int128 units, length;
   int axis;
 };
-bool operator<(const Moment& a, const Moment& b) {
+bool operator<(const Crossing& a, const Crossing& b) {
   const Int128 left = a.units * b.length, right = b.units * a.length;
   return left != right ? left < right : a.axis < b.axis;
 }
@@ -114,7 +114,7 @@ void PlotCells(OracleLine line, const DenseVolume& grid, const Plot& plot) {
     for (int64_t y = low[1]; y <= high[1]; ++y) {
       for (int64_t x = low[0]; x <= high[0]; ++x) {
         const int64_t cell[3] = {x, y, z};
-        std::vector<Moment> entered, left;
+        std::vector<Crossing> entered, left;
         Int128 k = 0;
         for (int a = 0; a < 3; ++a) {
           const int64_t s = line.s.v[a], e = line.e.v[a];

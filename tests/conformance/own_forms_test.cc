@@ -15,7 +15,7 @@
 #include "tests/conformance/conformance_test.h"
 
 namespace voxeld::gpu::conformance {
-namespace {
+namespace own_forms_test {
 
 using implicit::FieldShape;
 using implicit::Graph;
@@ -206,5 +206,5 @@ TEST_P(OwnForms, SurfacesAreWithinAVoxelOfOneAnother) {
 INSTANTIATE_TEST_SUITE_P(Engines, OwnForms, testing::ValuesIn(EngineCases()),
                          [](const auto& info) { return info.param.name; });
 
-}  // namespace
+}  // namespace own_forms_test
 }  // namespace voxeld::gpu::conformance

@@ -22,7 +22,7 @@
 #include "tests/conformance/conformance_test.h"
 
 namespace voxeld::gpu::conformance {
-namespace {
+namespace shapes_test {
 
 using implicit::FieldShape;
 using implicit::Graph;
@@ -480,5 +480,5 @@ TEST_P(MeasuredShapes, PolygonsHaveHoles) {
 INSTANTIATE_TEST_SUITE_P(Engines, MeasuredShapes, testing::ValuesIn(EngineCases()),
                          [](const auto& info) { return info.param.name; });
 
-}  // namespace
+}  // namespace shapes_test
 }  // namespace voxeld::gpu::conformance

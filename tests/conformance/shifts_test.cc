@@ -21,7 +21,7 @@
 #include "tests/conformance/placed.h"
 
 namespace voxeld::gpu::conformance {
-namespace {
+namespace shifts_test {
 
 constexpr int32_t kSize = 64;
 constexpr int32_t kBy[3] = {17, -9, 23};
@@ -222,5 +222,5 @@ TEST_P(Shifts, ByWholeVoxelsShiftEverything) {
   }
 }
 
-}  // namespace
+}  // namespace shifts_test
 }  // namespace voxeld::gpu::conformance

@@ -9,7 +9,7 @@
 #include "tests/conformance/conformance_test.h"
 
 namespace voxeld::gpu::conformance {
-namespace {
+namespace solids_test {
 
 constexpr int32_t kSize = 32;
 constexpr double kPi = 3.14159265358979323846;
@@ -210,5 +210,5 @@ TEST_P(Solids, HaveTheVolumesOfTheirShapes) {
 INSTANTIATE_TEST_SUITE_P(Engines, Solids, testing::ValuesIn(EngineCases()),
                          [](const auto& info) { return info.param.name; });
 
-}  // namespace
+}  // namespace solids_test
 }  // namespace voxeld::gpu::conformance

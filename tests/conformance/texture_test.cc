@@ -9,7 +9,7 @@
 #include "tests/conformance/conformance_test.h"
 
 namespace voxeld::gpu::conformance {
-namespace {
+namespace texture_test {
 
 constexpr int32_t kSide = 40;
 constexpr float kPlane = 20.5f;  // a layer of voxels' centres
@@ -136,5 +136,5 @@ TEST_P(Textures, AnotherPictureTakesTheFirstsPlace) {
   ExpectLikeOracle(engine, scene, target);
 }
 
-}  // namespace
+}  // namespace texture_test
 }  // namespace voxeld::gpu::conformance

@@ -15,7 +15,7 @@
 #include "tests/conformance/placed.h"
 
 namespace voxeld::gpu::conformance {
-namespace {
+namespace thick_triangles_test {
 
 using implicit::Dot;
 using implicit::Length;
@@ -321,5 +321,5 @@ TEST_P(ThickTriangles, AmongThinOnesEqualTheOracle) {
   ExpectLikeOracle(engine, scene, target);
 }
 
-}  // namespace
+}  // namespace thick_triangles_test
 }  // namespace voxeld::gpu::conformance

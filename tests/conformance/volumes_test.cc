@@ -16,7 +16,7 @@
 #include "tests/conformance/placed.h"
 
 namespace voxeld::gpu::conformance {
-namespace {
+namespace volumes_test {
 
 constexpr int32_t kSize = 80;
 constexpr double kPi = std::numbers::pi;
@@ -204,5 +204,5 @@ TEST_P(Volumes, IsosurfacesAreWhereTheLevelIsAndNothingGetsThrough) {
   }
 }
 
-}  // namespace
+}  // namespace volumes_test
 }  // namespace voxeld::gpu::conformance

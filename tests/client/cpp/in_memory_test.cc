@@ -10,7 +10,7 @@
 #include "voxeld/v1/scene.pb.h"
 
 namespace voxeld::client {
-namespace {
+namespace in_memory_test {
 
 template <typename T>
 std::vector<T> Counting(size_t count) {
@@ -146,5 +146,5 @@ TEST(InMemory, WhatIsNoRequestIsLeftAlone) {
   EXPECT_FALSE(MoveToMemory(request, 1).has_value());
 }
 
-}  // namespace
+}  // namespace in_memory_test
 }  // namespace voxeld::client

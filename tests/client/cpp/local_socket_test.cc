@@ -20,7 +20,7 @@
 #include "voxeld/v1/local.pb.h"
 
 namespace voxeld::client {
-namespace {
+namespace local_socket_test {
 
 using namespace std::chrono_literals;  // NOLINT
 using Answer = MemoryChannel::Answer;
@@ -346,5 +346,5 @@ TEST_F(Channel, WhoDoesNotAnswerIsGivenUp) {
   channel_.reset();
 }
 
-}  // namespace
+}  // namespace local_socket_test
 }  // namespace voxeld::client

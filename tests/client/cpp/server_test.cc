@@ -17,7 +17,7 @@
 #include "voxeld/client.h"
 
 namespace voxeld::client {
-namespace {
+namespace server_test {
 
 using namespace std::chrono_literals;  // NOLINT
 using ::testing::ElementsAre;
@@ -352,5 +352,5 @@ TEST(WithFakeServer, AServerThatComesBackGetsEverythingAgain) {
   EXPECT_EQ((*session)->GetTally().connections, 2u);
 }
 
-}  // namespace
+}  // namespace server_test
 }  // namespace voxeld::client

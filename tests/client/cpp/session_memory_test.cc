@@ -6,7 +6,7 @@
 #include "tests/client/cpp/fake_transport.h"
 
 namespace voxeld::client {
-namespace {
+namespace session_memory_test {
 
 using ::testing::Contains;
 using ::testing::ElementsAre;
@@ -202,5 +202,5 @@ TEST(SessionMemory, WhatIsSmallGoesOverTheStream) {
   EXPECT_THAT(session.TakeWords(), Contains("commit 1"));
 }
 
-}  // namespace
+}  // namespace session_memory_test
 }  // namespace voxeld::client

@@ -5,7 +5,7 @@
 #include "tests/client/cpp/fake_transport.h"
 
 namespace voxeld::client {
-namespace {
+namespace session_reconnect_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -329,5 +329,5 @@ TEST_F(Reconnect, ADeadConnectionIsNoticedByItsPings) {
   EXPECT_EQ(session.started(), 2u);
 }
 
-}  // namespace
+}  // namespace session_reconnect_test
 }  // namespace voxeld::client

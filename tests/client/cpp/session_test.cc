@@ -6,7 +6,7 @@
 #include "tests/client/cpp/fake_transport.h"
 
 namespace voxeld::client {
-namespace {
+namespace session_test {
 
 using ::testing::Contains;
 using ::testing::ElementsAre;
@@ -248,5 +248,5 @@ TEST(Session, PingsEstimateTheClock) {
   EXPECT_EQ(*session->ServerNow(), session.clock().Now() + 1'000'000);
 }
 
-}  // namespace
+}  // namespace session_test
 }  // namespace voxeld::client

@@ -15,7 +15,7 @@
 #include "daemon/suggest/suggest.h"
 
 namespace voxeld::daemon {
-namespace {
+namespace config_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -457,5 +457,5 @@ TEST(Config, WhatTheParserQuotesIsPrintable) {
   for (const char c : message) EXPECT_FALSE(c >= 0 && c < 32) << message;
 }
 
-}  // namespace
+}  // namespace config_test
 }  // namespace voxeld::daemon

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 
 namespace voxeld::daemon {
-namespace {
+namespace display_config_test {
 
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -63,5 +63,5 @@ TEST(DisplayOption, MessagesArePrintable) {
   }
 }
 
-}  // namespace
+}  // namespace display_config_test
 }  // namespace voxeld::daemon

@@ -10,7 +10,7 @@
 #include "tests/daemon/drawn/drawn.h"
 
 namespace voxeld::daemon::drawn {
-namespace {
+namespace grids_test {
 
 using gpu::implicit::Cross;
 using gpu::implicit::Dot;
@@ -370,5 +370,5 @@ TEST_F(DrawnGrids, IsosurfacesHaveTheColoursOfTheirPlaces) {
   }
 }
 
-}  // namespace
+}  // namespace grids_test
 }  // namespace voxeld::daemon::drawn

@@ -11,7 +11,7 @@
 #include "tests/daemon/drawn/drawn.h"
 
 namespace voxeld::daemon::drawn {
-namespace {
+namespace surfaces_test {
 
 using gpu::implicit::Cross;
 using gpu::implicit::Dot;
@@ -267,5 +267,5 @@ TEST_F(DrawnSurfaces, NothingGetsThroughBezierSurfaces) {
   ExpectNothingGetsThrough(BezierSurface(points, v1::SURFACE_RULE_COVER), true, 5, f);
 }
 
-}  // namespace
+}  // namespace surfaces_test
 }  // namespace voxeld::daemon::drawn

@@ -10,7 +10,7 @@
 #include "tests/daemon/drawn/drawn.h"
 
 namespace voxeld::daemon::drawn {
-namespace {
+namespace text_test {
 
 constexpr int32_t kSize = 64;
 constexpr double kScale = 4;
@@ -251,5 +251,5 @@ TEST_F(DrawnText, ColouredLettersHaveTheColoursOfTheirPlaces) {
   }
 }
 
-}  // namespace
+}  // namespace text_test
 }  // namespace voxeld::daemon::drawn

@@ -24,7 +24,7 @@
 #include "daemon/listen/greeting.h"
 
 namespace voxeld::daemon::listen {
-namespace {
+namespace listener_test {
 
 using std::chrono::steady_clock;
 using ::testing::HasSubstr;
@@ -437,5 +437,5 @@ TEST_F(ListenerTest, AcceptsAgainWhenDescriptorsComeBack) {
   }
 }
 
-}  // namespace
+}  // namespace listener_test
 }  // namespace voxeld::daemon::listen

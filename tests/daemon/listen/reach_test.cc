@@ -12,7 +12,7 @@
 #include "daemon/listen/probe.h"
 
 namespace voxeld::daemon::listen {
-namespace {
+namespace reach_test {
 
 using ::testing::HasSubstr;
 
@@ -84,5 +84,5 @@ TEST_F(ReachTest, WhereNobodyListensNobodyIsReached) {
   EXPECT_THAT(std::string(status.message()), HasSubstr("connect"));
 }
 
-}  // namespace
+}  // namespace reach_test
 }  // namespace voxeld::daemon::listen

@@ -15,7 +15,7 @@
 #include "tests/refused_calls.h"
 
 namespace voxeld::daemon::listen {
-namespace {
+namespace watcher_test {
 
 // Until it holds; false after a generous time.
 bool Await(const std::function<bool()>& holds) {
@@ -161,5 +161,5 @@ TEST_F(WatcherTest, WhoeverIsThereAtItsEndIsForgotten) {
   EXPECT_EQ(counters_.Read().open, 0u);
 }
 
-}  // namespace
+}  // namespace watcher_test
 }  // namespace voxeld::daemon::listen

@@ -21,8 +21,8 @@ using ::testing::Not;
 
 constexpr uint64_t kMost = std::numeric_limits<uint64_t>::max();
 
-struct Held {
-  explicit Held(const LocalLimits& limits = {}, std::shared_ptr<Budget> budget = nullptr)
+struct HeldMemory {
+  explicit HeldMemory(const LocalLimits& limits = {}, std::shared_ptr<Budget> budget = nullptr)
       : memory(limits, mapped, std::move(budget)) {}
 
   absl::Status Hold(uint64_t id, std::string_view bytes) {
@@ -34,7 +34,7 @@ struct Held {
 };
 
 TEST(LocalMemory, FindsWhatWasSealed) {
-  Held held;
+  HeldMemory held;
   std::string bytes(10'000, '\0');
   for (size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<char>(i * 7 + i / 256);
   ASSERT_TRUE(held.Hold(7, bytes).ok());
@@ -59,7 +59,7 @@ TEST(LocalMemory, EveryMissingSealIsNamed) {
   for (int set = 0; set < 8; ++set) {
     int flags = 0;
     for (int i = 0; i < 3; ++i) flags |= (set >> i & 1) != 0 ? seals[i].flag : 0;
-    Held held;
+    HeldMemory held;
     const absl::Status status = held.memory.Hold(1, 4, MakeMemfd("four", flags).get());
     if (set == 7) {
       EXPECT_TRUE(status.ok()) << status;
@@ -79,14 +79,14 @@ TEST(LocalMemory, EveryMissingSealIsNamed) {
     EXPECT_EQ(*held.mapped, 0u);
   }
   // Against later writes alone: what is mapped for writing already still writes.
-  Held held;
+  HeldMemory held;
   const int future = F_SEAL_SHRINK | F_SEAL_GROW | 0x10;  // F_SEAL_FUTURE_WRITE
   const absl::Status status = held.memory.Hold(1, 4, MakeMemfd("four", future).get());
   EXPECT_THAT(std::string(status.message()), HasSubstr("not sealed with F_SEAL_WRITE;"));
 }
 
 TEST(LocalMemory, IsMemoryAndNothingElse) {
-  Held held;
+  HeldMemory held;
   int ends[2];
   ASSERT_EQ(pipe(ends), 0);
   const Descriptor in(ends[0]), out(ends[1]), null(open("/dev/null", O_RDWR)),
@@ -104,7 +104,7 @@ TEST(LocalMemory, IsMemoryAndNothingElse) {
 }
 
 TEST(LocalMemory, HasTheSizeThatIsSaid) {
-  Held held;
+  HeldMemory held;
   const Descriptor four = MakeMemfd("four"), none = MakeMemfd("");
   for (const uint64_t size : {uint64_t{3}, uint64_t{5}, uint64_t{4096}, kMost, kMost / 2 + 1}) {
     const absl::Status status = held.memory.Hold(9, size, four.get());
@@ -120,7 +120,7 @@ TEST(LocalMemory, HasTheSizeThatIsSaid) {
 }
 
 TEST(LocalMemory, RangesLieWithin) {
-  Held held;
+  HeldMemory held;
   ASSERT_TRUE(held.Hold(3, "0123456789ab").ok());
   for (const auto& [offset, size] :
        std::vector<std::pair<uint64_t, uint64_t>>{{0, 13},
@@ -144,7 +144,7 @@ TEST(LocalMemory, RangesLieWithin) {
 }
 
 TEST(LocalMemory, StaysWhileItIsInUse) {
-  Held held;
+  HeldMemory held;
   ASSERT_TRUE(held.Hold(1, "first bytes of all").ok());
   auto found = held.memory.Find(1, 0, 18);
   ASSERT_TRUE(found.ok());
@@ -165,7 +165,7 @@ TEST(LocalMemory, StaysWhileItIsInUse) {
 }
 
 TEST(LocalMemory, CountsAndBytesAreLimited) {
-  Held held({.max_memories = 3, .max_bytes = 100});
+  HeldMemory held({.max_memories = 3, .max_bytes = 100});
   ASSERT_TRUE(held.Hold(1, std::string(60, 'a')).ok());
   EXPECT_TRUE(absl::IsAlreadyExists(held.Hold(1, "again")));
   absl::Status status = held.Hold(2, std::string(41, 'b'));
@@ -203,7 +203,7 @@ TEST(LocalMemory, WhatIsMappedIsChargedToTheBudget) {
   const auto budget = std::make_shared<Budget>(100);
   ASSERT_TRUE(budget->Charge(Budget::Use::kScene, 30));
   {
-    Held one({}, budget), other({}, budget);
+    HeldMemory one({}, budget), other({}, budget);
     ASSERT_TRUE(one.Hold(1, std::string(40, 'a')).ok());
     ASSERT_TRUE(other.Hold(1, std::string(20, 'b')).ok());
     EXPECT_EQ(budget->used_bytes(kLocal), 60u);
@@ -245,7 +245,7 @@ TEST(LocalMemory, WhatIsReleasedIsNotMappedAnyMore) {
     }
     return found;
   };
-  Held held;
+  HeldMemory held;
   ASSERT_EQ(mapped(), 0u);
   ASSERT_TRUE(held.Hold(1, "one").ok());
   EXPECT_EQ(mapped(), 1u);
@@ -261,7 +261,7 @@ TEST(LocalMemory, ThatCannotBeMappedCostsNothing) {
   ASSERT_EQ(fcntl(fd.get(), F_ADD_SEALS, kAllSeals), 0);
   const auto budget = std::make_shared<Budget>(kMost);
   for (const auto& charged : {budget, std::shared_ptr<Budget>()}) {
-    Held held({.max_bytes = kMost}, charged);
+    HeldMemory held({.max_bytes = kMost}, charged);
     const absl::Status status = held.memory.Hold(4, kHuge, fd.get());
     EXPECT_TRUE(absl::IsResourceExhausted(status)) << status;
     EXPECT_THAT(std::string(status.message()),
@@ -275,7 +275,7 @@ TEST(LocalMemory, ThatCannotBeMappedCostsNothing) {
 }
 
 TEST(LocalMemory, TakesNothingOnceEnded) {
-  Held held;
+  HeldMemory held;
   ASSERT_TRUE(held.Hold(1, "x").ok());
   EXPECT_FALSE(held.memory.ended());
   held.memory.End();
@@ -286,7 +286,7 @@ TEST(LocalMemory, TakesNothingOnceEnded) {
 }
 
 TEST(LocalMemory, IsReadWhileItComesAndGoes) {
-  Held held;
+  HeldMemory held;
   const std::string bytes[] = {std::string(20'000, 'a'), std::string(20'000, 'b')};
   const Descriptor fds[] = {MakeMemfd(bytes[0]), MakeMemfd(bytes[1])};
   std::atomic<bool> done = false;

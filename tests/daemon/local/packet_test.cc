@@ -14,7 +14,7 @@
 #include "voxeld/v1/local.pb.h"
 
 namespace voxeld::daemon::local {
-namespace {
+namespace packet_test {
 
 using ::testing::HasSubstr;
 
@@ -153,5 +153,5 @@ TEST(LocalMessages, AnswersSayWhatTheyAreToSay) {
   EXPECT_EQ(answer.refused().message(), "why");
 }
 
-}  // namespace
+}  // namespace packet_test
 }  // namespace voxeld::daemon::local

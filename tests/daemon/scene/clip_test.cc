@@ -6,7 +6,7 @@
 #include <random>
 
 namespace voxeld::daemon {
-namespace {
+namespace clip_test {
 
 // Whether a point of the scene lies in all that the record has.
 bool Has(const gpu::LayerRecord& record, const double (&p)[3]) {
@@ -118,5 +118,5 @@ TEST_F(ClipTest, WhatHasNoInsideIsNotSound) {
   EXPECT_EQ(record.plane_count + record.cylinder_count, 0u);
 }
 
-}  // namespace
+}  // namespace clip_test
 }  // namespace voxeld::daemon

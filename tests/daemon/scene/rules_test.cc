@@ -17,7 +17,7 @@
 #include "tests/daemon/scene/store_fixture.h"
 
 namespace voxeld::daemon {
-namespace {
+namespace rules_test {
 
 using testing::CheckIndices;
 using testing::Define;
@@ -295,5 +295,5 @@ TEST(PutClip, KnowsWhatIsNotSound) {
   EXPECT_FALSE(cylinders({{{kInfinity, 0, 0}, {0, 0, 1}, 1}}));
 }
 
-}  // namespace
+}  // namespace rules_test
 }  // namespace voxeld::daemon

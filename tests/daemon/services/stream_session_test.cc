@@ -11,7 +11,7 @@
 #include "voxeld/v1/scene.pb.h"
 
 namespace voxeld::daemon::services {
-namespace {
+namespace stream_session_test {
 
 using testing::Simulation;
 
@@ -235,5 +235,5 @@ TEST_F(StreamSessionTest, WhatWaitsWhenTheClientIsGoneIsDroppedAndGivenBack) {
   session_ = nullptr;
 }
 
-}  // namespace
+}  // namespace stream_session_test
 }  // namespace voxeld::daemon::services

@@ -14,7 +14,7 @@
 #include "tests/daemon/fakes/simulation.h"
 
 namespace voxeld::daemon::viewer {
-namespace {
+namespace viewer_socket_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -409,5 +409,5 @@ TEST_F(ViewerSocketTest, AClearedLayerIsFollowedByThoseThatAreLeft) {
   EXPECT_EQ(layers[0]["total"], "0");
 }
 
-}  // namespace
+}  // namespace viewer_socket_test
 }  // namespace voxeld::daemon::viewer

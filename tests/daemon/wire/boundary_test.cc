@@ -15,7 +15,7 @@
 #include "voxeld/v1/primitives.pb.h"
 
 namespace voxeld::daemon::wire {
-namespace {
+namespace boundary_test {
 
 using ::testing::HasSubstr;
 
@@ -203,5 +203,5 @@ TEST(Boundaries, WhatIsWrongIsSaid) {
   ExpectFaults(cases, [](const P& p, Content* content) { return FaultOf(p, content); });
 }
 
-}  // namespace
+}  // namespace boundary_test
 }  // namespace voxeld::daemon::wire

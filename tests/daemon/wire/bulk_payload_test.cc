@@ -11,7 +11,7 @@
 #include "tests/daemon/wire/requests.h"
 
 namespace voxeld::daemon::wire {
-namespace {
+namespace bulk_payload_test {
 
 // Large payloads, cut as gRPC cuts them, lie in the pool as they were sent.
 TEST(Bulk, PayloadsLieInThePool) {
@@ -68,5 +68,5 @@ TEST(Bulk, WhatThePoolCannotHoldIsRefusedByItself) {
   EXPECT_THAT(issue.message, testing::HasSubstr("limit 16384"));
 }
 
-}  // namespace
+}  // namespace bulk_payload_test
 }  // namespace voxeld::daemon::wire

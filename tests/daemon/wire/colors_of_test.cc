@@ -12,7 +12,7 @@
 #include "voxeld/v1/primitives.pb.h"
 
 namespace voxeld::daemon::wire {
-namespace {
+namespace colors_of_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -261,5 +261,5 @@ TEST(PatchFills, SolidIsRefused) {
   EXPECT_EQ(fault->field, "primitive.bezier_surface.fill");
 }
 
-}  // namespace
+}  // namespace colors_of_test
 }  // namespace voxeld::daemon::wire

@@ -16,7 +16,7 @@
 #include "voxeld/v1/primitives.pb.h"
 
 namespace voxeld::daemon::wire {
-namespace {
+namespace curves_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -327,5 +327,5 @@ TEST_F(CurvesTest, AMessageMakesNoMoreThanMayWait) {
   EXPECT_THAT(decoded.refused.issues[0].message, HasSubstr("max_uncommitted_bytes is 1000000"));
 }
 
-}  // namespace
+}  // namespace curves_test
 }  // namespace voxeld::daemon::wire

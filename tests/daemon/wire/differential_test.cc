@@ -21,7 +21,7 @@
 #include "tests/daemon/wire/requests.h"
 
 namespace voxeld::daemon::wire {
-namespace {
+namespace differential_test {
 
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
@@ -478,5 +478,5 @@ TEST(Skeleton, IsNotWorthWhileForSmallThings) {
   EXPECT_EQ(DecodeBytes(bytes).operations.size(), 20'000u);
 }
 
-}  // namespace
+}  // namespace differential_test
 }  // namespace voxeld::daemon::wire

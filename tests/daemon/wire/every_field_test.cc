@@ -14,7 +14,7 @@
 #include "tests/daemon/wire/full_primitives.h"
 
 namespace voxeld::daemon::wire {
-namespace {
+namespace every_field_test {
 
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
@@ -178,5 +178,5 @@ TEST(EveryField, AColourBeyond24BitsIsRefusedByName) {
   EXPECT_GT(tried, 10);
 }
 
-}  // namespace
+}  // namespace every_field_test
 }  // namespace voxeld::daemon::wire

@@ -11,7 +11,7 @@
 #include "voxeld/v1/primitives.pb.h"
 
 namespace voxeld::daemon::wire {
-namespace {
+namespace expression_tree_test {
 
 using ::testing::HasSubstr;
 using P = v1::Primitive;
@@ -235,5 +235,5 @@ TEST(ExpressionTree, NamesAreLimited) {
   EXPECT_THAT(fault->message, HasSubstr("has more than max_expression_nodes, 1"));
 }
 
-}  // namespace
+}  // namespace expression_tree_test
 }  // namespace voxeld::daemon::wire

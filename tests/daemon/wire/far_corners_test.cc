@@ -21,7 +21,7 @@
 #include "tests/daemon/wire/full_primitives.h"
 
 namespace voxeld::daemon::wire {
-namespace {
+namespace far_corners_test {
 
 using ::testing::Each;
 using ::testing::ElementsAre;
@@ -491,5 +491,5 @@ TEST(ElementCount, BreaksOffWhereAMessageIsBroken) {
   EXPECT_EQ(count(std::string{0x08, 0x02, 0x12, 0x00}), 0u);
 }
 
-}  // namespace
+}  // namespace far_corners_test
 }  // namespace voxeld::daemon::wire

@@ -21,7 +21,7 @@
 #include "tests/daemon/wire/requests.h"
 
 namespace voxeld::daemon::wire {
-namespace {
+namespace far_requests_test {
 
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -361,5 +361,5 @@ TEST(FarConversions, LayoutsOfFramesBothWays) {
   EXPECT_TRUE(absl::IsInvalidArgument(FromWire(message).status()));
 }
 
-}  // namespace
+}  // namespace far_requests_test
 }  // namespace voxeld::daemon::wire

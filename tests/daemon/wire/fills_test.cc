@@ -17,7 +17,7 @@
 #include "tests/daemon/wire/full_primitives.h"
 
 namespace voxeld::daemon::wire {
-namespace {
+namespace fills_test {
 
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
@@ -199,5 +199,5 @@ TEST(Fills, WhatCannotBeKeptIsRefusedWhereverMemoryEnds) {
   EXPECT_GT(refused, 100);
 }
 
-}  // namespace
+}  // namespace fills_test
 }  // namespace voxeld::daemon::wire

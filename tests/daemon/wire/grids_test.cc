@@ -17,7 +17,7 @@
 #include "voxeld/v1/primitives.pb.h"
 
 namespace voxeld::daemon::wire {
-namespace {
+namespace grids_test {
 
 using ::testing::ElementsAre;
 using ::testing::FloatEq;
@@ -288,5 +288,5 @@ TEST(Grids, ShellsInUnitsAreOfThePrimitives) {
   EXPECT_FLOAT_EQ(GroupOf(content).parts[0].geometry->record.thickness, 0.5f) << "a cell is 2 wide";
 }
 
-}  // namespace
+}  // namespace grids_test
 }  // namespace voxeld::daemon::wire

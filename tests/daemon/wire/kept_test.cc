@@ -13,7 +13,7 @@
 #include "voxeld/v1/state.pb.h"
 
 namespace voxeld::daemon::wire {
-namespace {
+namespace kept_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -158,5 +158,5 @@ TEST(Kept, ALifetimeOfCenturiesIsNotOverAfterwards) {
   EXPECT_EQ(decoded(*kept).lifetime_ns, kLast - now.unix_ns) << "until the last time that there is";
 }
 
-}  // namespace
+}  // namespace kept_test
 }  // namespace voxeld::daemon::wire

@@ -15,7 +15,7 @@
 #include "tests/daemon/wire/requests.h"
 
 namespace voxeld::daemon::wire {
-namespace {
+namespace named_ranges_test {
 
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -442,5 +442,5 @@ TEST(NamedRanges, OfAssetsThatAreWrong) {
               HasSubstr("this call has no local socket"));
 }
 
-}  // namespace
+}  // namespace named_ranges_test
 }  // namespace voxeld::daemon::wire

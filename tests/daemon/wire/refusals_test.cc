@@ -9,7 +9,7 @@
 #include "tests/daemon/wire/requests.h"
 
 namespace voxeld::daemon::wire {
-namespace {
+namespace refusals_test {
 
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -424,5 +424,5 @@ TEST_P(Refusals, NamesFieldReasonAndValue) {
 INSTANTIATE_TEST_SUITE_P(Field, Refusals, ::testing::ValuesIn(kCases),
                          [](const auto& info) { return std::string(info.param.name); });
 
-}  // namespace
+}  // namespace refusals_test
 }  // namespace voxeld::daemon::wire

@@ -17,7 +17,7 @@
 #include "voxeld/v1/primitives.pb.h"
 
 namespace voxeld::daemon::wire {
-namespace {
+namespace shapes_test {
 
 using ::testing::HasSubstr;
 
@@ -417,5 +417,5 @@ TEST(Shapes, CellsHaveNoThickness) {
   EXPECT_THAT(fault->message, HasSubstr("is 2; cells have none"));
 }
 
-}  // namespace
+}  // namespace shapes_test
 }  // namespace voxeld::daemon::wire

@@ -16,7 +16,7 @@
 #include "voxeld/v1/primitives.pb.h"
 
 namespace voxeld::daemon::wire {
-namespace {
+namespace texture_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -166,5 +166,5 @@ TEST(Texture, IsGivenBackAsItWasSent) {
   }
 }
 
-}  // namespace
+}  // namespace texture_test
 }  // namespace voxeld::daemon::wire

@@ -14,7 +14,7 @@
 #include "tests/display/drivers/made_up_device.h"
 
 namespace voxeld::display::voxlink {
-namespace {
+namespace capabilities_shapes_test {
 
 using ::testing::HasSubstr;
 using Block = std::vector<std::byte>;
@@ -303,5 +303,5 @@ TEST(CapabilitiesShapes, ABitmapFitsAPayload) {
             "a bitmap of 8066 pictures is longer than the device's 1024 bytes of payload");
 }
 
-}  // namespace
+}  // namespace capabilities_shapes_test
 }  // namespace voxeld::display::voxlink

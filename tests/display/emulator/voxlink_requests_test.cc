@@ -8,7 +8,7 @@
 #include "tests/display/emulator/bench.h"
 
 namespace voxeld::display::emulator {
-namespace {
+namespace voxlink_requests_test {
 
 using voxlink::Request;
 
@@ -75,5 +75,5 @@ TEST(VoxlinkRequests, DataThatAreNotInTheTableAreStalled) {
   EXPECT_TRUE(bench.device().screen().running());
 }
 
-}  // namespace
+}  // namespace voxlink_requests_test
 }  // namespace voxeld::display::emulator

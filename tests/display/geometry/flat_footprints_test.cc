@@ -16,7 +16,7 @@
 #include "tests/display/geometry/table_reader.h"
 
 namespace voxeld::display {
-namespace {
+namespace flat_footprints_test {
 
 struct Parameter {
   GeometryCase c;
@@ -190,5 +190,5 @@ TEST(FlatFootprintsOfProducts, AreTheProducts) {
   }
 }
 
-}  // namespace
+}  // namespace flat_footprints_test
 }  // namespace voxeld::display

@@ -19,7 +19,7 @@ GeometryCase WithGrid(std::string name, Shape shape, VoxelGrid grid) {
   return {std::move(name), {std::move(shape), grid}};
 }
 
-PlanarStack Stack(int width, int height, std::vector<double> positions) {
+PlanarStack StackAt(int width, int height, std::vector<double> positions) {
   PlanarStack stack;
   stack.width_px = width;
   stack.height_px = height;
@@ -62,14 +62,14 @@ Rotor Vortex(int slices_per_turn) {
 
 std::vector<GeometryCase> StackCases() {
   std::vector<GeometryCase> cases;
-  const PlanarStack even = Stack(24, 18, EvenPositions(12, 1));
+  const PlanarStack even = StackAt(24, 18, EvenPositions(12, 1));
   cases.push_back(WithDefaultGrid("Even", even));
 
-  PlanarStack standing = Stack(24, 18, EvenPositions(12, 1.5, 4));
+  PlanarStack standing = StackAt(24, 18, EvenPositions(12, 1.5, 4));
   standing.normal = PlanarStack::Normal::kY;
   cases.push_back(WithDefaultGrid("Standing", standing));
 
-  const PlanarStack listed = Stack(10, 9, {-7, -6.25, -3, -2.875, 0.5, 4, 4.75, 9});
+  const PlanarStack listed = StackAt(10, 9, {-7, -6.25, -3, -2.875, 0.5, 4, 4.75, 9});
   cases.push_back(WithDefaultGrid("Listed", listed));
   cases.push_back(WithGrid("ListedCoarseGrid", listed, CentredGrid(5, 4, 3, {2.1, 2.3, 6})));
 
@@ -77,7 +77,7 @@ std::vector<GeometryCase> StackCases() {
   cases.push_back(WithGrid("FinerGrid", even, CentredGrid(61, 48, 40, {0.4, 0.37, 0.3})));
   cases.push_back(WithGrid("TwiceFinerGrid", even, CentredGrid(48, 36, 24, {0.5, 0.5, 0.5})));
 
-  PlanarStack oblong = Stack(31, 17, EvenPositions(9, 0.9));
+  PlanarStack oblong = StackAt(31, 17, EvenPositions(9, 0.9));
   oblong.pitch_u_mm = 0.31;
   oblong.pitch_v_mm = 0.47;
   oblong.mirror_u = true;
@@ -90,14 +90,14 @@ std::vector<GeometryCase> StackCases() {
   beside.origin_mm = {-4.05, -9.85, -6.65};
   cases.push_back(WithGrid("StandingGridBesidePicture", standing, beside));
 
-  cases.push_back(WithGrid("DenserThanVoxels", Stack(8, 8, EvenPositions(40, 0.23)),
+  cases.push_back(WithGrid("DenserThanVoxels", StackAt(8, 8, EvenPositions(40, 0.23)),
                            CentredGrid(8, 8, 10, {1, 1, 1})));
-  PlanarStack strokes = Stack(11, 9, {4, 2.5, 1.25, 0, -2, -2, 0.5, 1, 3, 4.5});
+  PlanarStack strokes = StackAt(11, 9, {4, 2.5, 1.25, 0, -2, -2, 0.5, 1, 3, 4.5});
   strokes.strokes = 2;
   cases.push_back(WithDefaultGrid("TwoStrokes", strokes));
-  cases.push_back(
-      WithGrid("Descending", Stack(10, 9, {6, 3, 2.5, -1, -4}), CentredGrid(10, 9, 13, {1, 1, 1})));
-  PlanarStack single = Stack(12, 10, {2});
+  cases.push_back(WithGrid("Descending", StackAt(10, 9, {6, 3, 2.5, -1, -4}),
+                           CentredGrid(10, 9, 13, {1, 1, 1})));
+  PlanarStack single = StackAt(12, 10, {2});
   single.thickness_mm = 5.3;
   cases.push_back(WithGrid("SingleSlice", single, CentredGrid(12, 10, 16, {1, 1, 1})));
   return cases;

@@ -10,7 +10,7 @@
 #include "tests/display/geometry/table_reader.h"
 
 namespace voxeld::display {
-namespace {
+namespace lattice_test {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
@@ -109,5 +109,5 @@ TEST(LatticeTest, LightsInOnePlaceStandForTheSame) {
   }
 }
 
-}  // namespace
+}  // namespace lattice_test
 }  // namespace voxeld::display

@@ -7,7 +7,7 @@
 #include "tests/display/geometry/table_reader.h"
 
 namespace voxeld::display {
-namespace {
+namespace rotor_test {
 
 using testing::Contains;
 using testing::Each;
@@ -242,5 +242,5 @@ TEST(RotorTest, ALargeRotorsTableIsBuilt) {
   EXPECT_LE(table.outer.entries.size(), 1024u * 512u + 2u * 514u * 514u);
 }
 
-}  // namespace
+}  // namespace rotor_test
 }  // namespace voxeld::display

@@ -11,7 +11,7 @@
 namespace voxeld::display {
 namespace {
 
-constexpr double kFullTurn = 2 * std::numbers::pi;
+constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kSlack = 2e-3;  // pixels, slices
 constexpr double kFar = std::numeric_limits<double>::infinity();
 
@@ -134,7 +134,7 @@ void SweptFlat::AddRotor(const Rotor& rotor, const Vec3& p, std::vector<Pass>& o
         FromEdge(w, panel.pitch_v_mm, rotor.height_px, panel.shift_v_mm, panel.mirror_v);
     for (const double sign : {1.0, -1.0}) {
       const double a = sign * std::sqrt(rho * rho - e * e);
-      double turn = (std::atan2(p.y, p.x) - std::atan2(e, a)) / kFullTurn - panel.phase_turns;
+      double turn = (std::atan2(p.y, p.x) - std::atan2(e, a)) / kTurn - panel.phase_turns;
       if (rotor.clockwise) turn = -turn;
       const double steps = (turn - std::floor(turn)) * n, below = std::floor(steps);
       const double u =
@@ -155,8 +155,8 @@ void SweptFlat::AddHelix(const Helix& helix, const Vec3& p, std::vector<Pass>& o
   if (inside < -pitch_) return;
   for (int32_t blade = 0; blade < helix.blades; ++blade) {
     const double risen = share * helix.span_turns * (helix.left_handed ? -1 : 1);
-    double turn = std::atan2(p.y, p.x) / kFullTurn - risen -
-                  blade / static_cast<double>(helix.blades) - helix.phase_turns;
+    double turn = std::atan2(p.y, p.x) / kTurn - risen - blade / static_cast<double>(helix.blades) -
+                  helix.phase_turns;
     if (helix.clockwise) turn = -turn;
     const double steps = (turn - std::floor(turn)) * helix.slices_per_turn,
                  below = std::floor(steps);

@@ -6,7 +6,7 @@
 namespace voxeld::display {
 namespace {
 
-struct Interval {
+struct Extent {
   double low, high;
   bool Holds(double x, double slack) const { return x >= low - slack && x < high + slack; }
 };
@@ -16,14 +16,14 @@ class SweptStack : public SweptSolid {
   SweptStack(const PlanarStack& stack, const VoxelGrid& grid) : stack_(stack), grid_(grid) {}
 
   Where Locate(const Vec3& point) const override {
-    Interval depth = Slab(0);
+    Extent depth = Slab(0);
     for (size_t s = 0; s < stack_.positions_mm.size(); ++s) {
       depth = {std::min(depth.low, Slab(s).low), std::max(depth.high, Slab(s).high)};
     }
-    const Interval u{-0.5 * stack_.width_px * stack_.pitch_u_mm,
-                     0.5 * stack_.width_px * stack_.pitch_u_mm};
-    const Interval v{-0.5 * stack_.height_px * stack_.pitch_v_mm,
-                     0.5 * stack_.height_px * stack_.pitch_v_mm};
+    const Extent u{-0.5 * stack_.width_px * stack_.pitch_u_mm,
+                   0.5 * stack_.width_px * stack_.pitch_u_mm};
+    const Extent v{-0.5 * stack_.height_px * stack_.pitch_v_mm,
+                   0.5 * stack_.height_px * stack_.pitch_v_mm};
     const auto all = [&](double sign) {
       return u.Holds(point.x, sign * SlackX()) && v.Holds(Across(point), sign * SlackAcross()) &&
              depth.Holds(Normal(point), sign * SlackNormal());
@@ -58,11 +58,11 @@ class SweptStack : public SweptSolid {
                     int reach) const override {
     const size_t s = static_cast<size_t>(slice);
     const Vec3 voxel = VoxelCentre(grid_, entry.x, entry.y, entry.z);
-    const Interval pixel = PixelU(u);
+    const Extent pixel = PixelU(u);
     const double middle = 0.5 * (pixel.low + pixel.high);
     const bool shows_x = pixel.Holds(voxel.x, SlackX()) ||
                          std::abs(middle - voxel.x) <= 0.5 * grid_.pitch_mm.x + SlackX();
-    Interval depth = Slab(s);
+    Extent depth = Slab(s);
     const size_t count = stack_.positions_mm.size() / static_cast<size_t>(stack_.strokes);
     for (const size_t beside : {s - 1, s + 1}) {
       if (reach < 2 || beside / count != s / count || beside >= stack_.positions_mm.size())
@@ -77,7 +77,7 @@ class SweptStack : public SweptSolid {
 
   bool MayShowInner(int32_t, int32_t v, const FootprintEntry& entry) const override {
     const double voxel = Across(VoxelCentre(grid_, entry.x, entry.y, entry.z));
-    const Interval pixel = PixelV(v);
+    const Extent pixel = PixelV(v);
     const double half = 0.5 * Across(grid_.pitch_mm) + SlackAcross();
     return pixel.Holds(voxel, SlackAcross()) ||
            std::abs(0.5 * (pixel.low + pixel.high) - voxel) <= half;
@@ -91,17 +91,17 @@ class SweptStack : public SweptSolid {
   double SlackAcross() const { return kMargin * Across(grid_.pitch_mm); }
   double SlackNormal() const { return kMargin * Normal(grid_.pitch_mm); }
 
-  Interval PixelU(int32_t u) const {
+  Extent PixelU(int32_t u) const {
     const double from_left = stack_.mirror_u ? stack_.width_px - 1 - u : u;
     const double low = (from_left - stack_.width_px / 2.0) * stack_.pitch_u_mm;
     return {low, low + stack_.pitch_u_mm};
   }
-  Interval PixelV(int32_t v) const {
+  Extent PixelV(int32_t v) const {
     const double from_low = stack_.mirror_v ? stack_.height_px - 1 - v : v;
     const double low = (from_low - stack_.height_px / 2.0) * stack_.pitch_v_mm;
     return {low, low + stack_.pitch_v_mm};
   }
-  Interval Slab(size_t s) const {
+  Extent Slab(size_t s) const {
     const std::vector<double>& p = stack_.positions_mm;
     if (p.size() == 1) return {p[0] - stack_.thickness_mm / 2, p[0] + stack_.thickness_mm / 2};
     const size_t count = p.size() / static_cast<size_t>(stack_.strokes);

@@ -14,7 +14,7 @@
 #include "tests/display/usb/transport_rig.h"
 
 namespace voxeld::display {
-namespace {
+namespace replay_transport_test {
 
 using sync::kMillisecond;
 using sync::kSecond;
@@ -354,5 +354,5 @@ TEST(Replay, DamagedRecordingsDoNoHarm) {
   EXPECT_GT(played, 100);
 }
 
-}  // namespace
+}  // namespace replay_transport_test
 }  // namespace voxeld::display

@@ -10,12 +10,12 @@
 namespace voxeld::e2e {
 namespace {
 
-std::filesystem::path Folder(pid_t process) {
+std::filesystem::path ProcFolder(pid_t process) {
   return std::filesystem::path("/proc") / std::to_string(process);
 }
 
-uint64_t Figure(pid_t process, const char* name) {
-  std::ifstream status(Folder(process) / "status");
+uint64_t ProcFigure(pid_t process, const char* name) {
+  std::ifstream status(ProcFolder(process) / "status");
   std::string word;
   while (status >> word) {
     uint64_t kib = 0;
@@ -26,13 +26,13 @@ uint64_t Figure(pid_t process, const char* name) {
 
 }  // namespace
 
-uint64_t ResidentKib(pid_t process) { return Figure(process, "VmRSS:"); }
-uint64_t MostResidentKib(pid_t process) { return Figure(process, "VmHWM:"); }
+uint64_t ResidentKib(pid_t process) { return ProcFigure(process, "VmRSS:"); }
+uint64_t MostResidentKib(pid_t process) { return ProcFigure(process, "VmHWM:"); }
 
 bool LeaveDescriptors(pid_t process, size_t spare) {
   std::set<size_t> used;
   std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(Folder(process) / "fd", error)) {
+  for (const auto& entry : std::filesystem::directory_iterator(ProcFolder(process) / "fd", error)) {
     used.insert(std::stoul(entry.path().filename().string()));
   }
   size_t most = 0;

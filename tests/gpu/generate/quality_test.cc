@@ -13,7 +13,7 @@
 #include "tests/gpu/generate/segment_samples.h"
 
 namespace voxeld::gpu::generate {
-namespace {
+namespace quality_test {
 
 using testing::Adversarial;
 using testing::SegmentD;
@@ -264,5 +264,5 @@ TEST(Quality, CoverMovesOverOneFaceAtATime) {
   }
 }
 
-}  // namespace
+}  // namespace quality_test
 }  // namespace voxeld::gpu::generate

@@ -13,7 +13,7 @@
 #include "tests/gpu/primitives/voxel_set.h"
 
 namespace voxeld::gpu {
-namespace {
+namespace surface_test {
 
 constexpr int32_t kSize = 56;
 const Box3 kBox = Cube(0, kSize);
@@ -281,5 +281,5 @@ TEST(Triangle, ColoursFollowTheWeights) {
   EXPECT_EQ((colors[{3, 3, 0}]), 0x6A4A4Au);
 }
 
-}  // namespace
+}  // namespace surface_test
 }  // namespace voxeld::gpu

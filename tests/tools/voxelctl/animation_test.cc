@@ -19,7 +19,7 @@
 #include "tools/voxelctl/import/importer.h"
 
 namespace voxeld::voxelctl {
-namespace {
+namespace animation_test {
 
 using ::testing::AnyOf;
 using ::testing::HasSubstr;
@@ -166,5 +166,5 @@ TEST(Animations, ThatAreNotThere) {
               HasSubstr("No such file"));
 }
 
-}  // namespace
+}  // namespace animation_test
 }  // namespace voxeld::voxelctl

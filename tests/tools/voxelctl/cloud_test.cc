@@ -16,7 +16,7 @@
 #include "tools/voxelctl/import/importer.h"
 
 namespace voxeld::voxelctl {
-namespace {
+namespace cloud_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -299,5 +299,5 @@ TEST_F(Clouds, DamagedOnesEndWell) {
   }
 }
 
-}  // namespace
+}  // namespace cloud_test
 }  // namespace voxeld::voxelctl

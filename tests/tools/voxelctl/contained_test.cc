@@ -32,7 +32,7 @@
 #include "tools/voxelctl/import/sandbox.h"
 
 namespace voxeld::voxelctl {
-namespace {
+namespace contained_test {
 
 using ::testing::HasSubstr;
 
@@ -287,5 +287,5 @@ TEST(Contained, EndsWithWhoAsked) {
   ::close(reader);
 }
 
-}  // namespace
+}  // namespace contained_test
 }  // namespace voxeld::voxelctl

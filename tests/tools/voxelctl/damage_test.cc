@@ -27,7 +27,7 @@ extern "C" const char* __lsan_default_suppressions();  // NOLINT: its name
 extern "C" const char* __lsan_default_suppressions() { return "leak:libassimp"; }  // NOLINT
 
 namespace voxeld::voxelctl {
-namespace {
+namespace damage_test {
 
 struct Sample {
   std::string name;    // the file's, with the extension that decides who reads it
@@ -442,5 +442,5 @@ TEST_F(Damage, HugeOnesTakeLittleMemory) {
   }
 }
 
-}  // namespace
+}  // namespace damage_test
 }  // namespace voxeld::voxelctl

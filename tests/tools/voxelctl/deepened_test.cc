@@ -11,7 +11,7 @@
 #include "tools/voxelctl/import/importer.h"
 
 namespace voxeld::voxelctl {
-namespace {
+namespace deepened_test {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -138,5 +138,5 @@ TEST_P(Deepened, IsReadOrRefusedWithWords) {
 INSTANTIATE_TEST_SUITE_P(Constructs, Deepened, ::testing::ValuesIn(kConstructs),
                          [](const auto& info) { return std::string(info.param.name); });
 
-}  // namespace
+}  // namespace deepened_test
 }  // namespace voxeld::voxelctl

@@ -17,7 +17,7 @@
 #include "tests/tools/voxelctl/volume_files.h"
 
 namespace voxeld::voxelctl {
-namespace {
+namespace dicom_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -327,5 +327,5 @@ TEST_F(Volumes, DicomThatIsWrong) {
               HasSubstr("none of its 0 files is DICOM"));
 }
 
-}  // namespace
+}  // namespace dicom_test
 }  // namespace voxeld::voxelctl

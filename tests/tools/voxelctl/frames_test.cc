@@ -9,7 +9,7 @@
 #include "tools/voxelctl/scene/placement.h"
 
 namespace voxeld::voxelctl {
-namespace {
+namespace frames_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -71,5 +71,5 @@ TEST(Sequences, HaveOnePlace) {
   }
 }
 
-}  // namespace
+}  // namespace frames_test
 }  // namespace voxeld::voxelctl

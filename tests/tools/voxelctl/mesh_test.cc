@@ -15,7 +15,7 @@
 #include "tools/voxelctl/scene/placement.h"
 
 namespace voxeld::voxelctl {
-namespace {
+namespace mesh_test {
 
 std::string ModelFile(const std::string& name) {
   return std::string(VOXELD_MODELS_DIR) + "/" + name;
@@ -387,5 +387,5 @@ TEST(BadMeshes, TruncatedAnywhereNeverCrashes) {
   }
 }
 
-}  // namespace
+}  // namespace mesh_test
 }  // namespace voxeld::voxelctl

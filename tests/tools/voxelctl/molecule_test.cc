@@ -15,7 +15,7 @@
 #include "tools/voxelctl/scene/placement.h"
 
 namespace voxeld::voxelctl {
-namespace {
+namespace molecule_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -151,5 +151,5 @@ TEST_F(Molecules, BallsStayWithinTheDisplay) {
   EXPECT_EQ(points.thickness.unit, client::Thickness::Unit::kUnits);
 }
 
-}  // namespace
+}  // namespace molecule_test
 }  // namespace voxeld::voxelctl

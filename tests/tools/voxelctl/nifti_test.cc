@@ -20,7 +20,7 @@
 #include "tools/voxelctl/import/inflate.h"
 
 namespace voxeld::voxelctl {
-namespace {
+namespace nifti_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -211,5 +211,5 @@ TEST_F(Volumes, RealBrains) {
     EXPECT_THAT(ReadHere(absl::StrCat(kTemplates, name), {}), IsOk()) << name;
 }
 
-}  // namespace
+}  // namespace nifti_test
 }  // namespace voxeld::voxelctl

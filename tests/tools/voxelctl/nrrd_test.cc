@@ -12,7 +12,7 @@
 #include "tests/tools/voxelctl/volume_files.h"
 
 namespace voxeld::voxelctl {
-namespace {
+namespace nrrd_test {
 
 using ::testing::AllOf;
 using ::testing::ElementsAre;
@@ -169,5 +169,5 @@ TEST_F(Volumes, RawAsItIsTold) {
               HasSubstr("has 1048576 samples along an axis"));
 }
 
-}  // namespace
+}  // namespace nrrd_test
 }  // namespace voxeld::voxelctl

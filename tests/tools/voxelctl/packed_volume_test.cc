@@ -14,7 +14,7 @@
 #include "tools/voxelctl/scene/volume.h"
 
 namespace voxeld::voxelctl {
-namespace {
+namespace packed_volume_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -146,5 +146,5 @@ TEST(PackedVolumes, ArePlacedByTheirCorners) {
   EXPECT_NEAR(model.volumes[0].corners[0].y, -0.485, 1e-9);
 }
 
-}  // namespace
+}  // namespace packed_volume_test
 }  // namespace voxeld::voxelctl

@@ -21,7 +21,7 @@
 #include "tools/voxelctl/import/svg_style.h"
 
 namespace voxeld::voxelctl {
-namespace {
+namespace svg_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -442,5 +442,5 @@ TEST_F(Drawings, DamagedOnesEndWell) {
   }
 }
 
-}  // namespace
+}  // namespace svg_test
 }  // namespace voxeld::voxelctl

@@ -18,7 +18,7 @@
 #include "tools/voxelctl/import/importer.h"
 
 namespace voxeld::voxelctl {
-namespace {
+namespace vox_test {
 
 using ::testing::HasSubstr;
 
@@ -221,5 +221,5 @@ TEST_F(VoxFiles, DamagedOnesEndWell) {
   }
 }
 
-}  // namespace
+}  // namespace vox_test
 }  // namespace voxeld::voxelctl

@@ -19,7 +19,7 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr double kTicks = 25;  // a second, where a file does not say
-constexpr double kMostFrames = 1e6;
+constexpr double kMostAnimationFrames = 1e6;
 constexpr unsigned kMostShapes = 4096;  // of a mesh
 
 // The two keys around `time`, and how far it is from the first to the second.
@@ -148,9 +148,9 @@ class AnimationFrames final : public FrameSource {
     animation_ = scene_->mAnimations[number - 1];
     const double ticks = animation_->mTicksPerSecond > 0 ? animation_->mTicksPerSecond : kTicks;
     const double seconds = animation_->mDuration / ticks;
-    if (!(seconds >= 0) || !(seconds * fps <= kMostFrames)) {
+    if (!(seconds >= 0) || !(seconds * fps <= kMostAnimationFrames)) {
       return FileError(file_, absl::StrCat("has an animation of ", seconds, " s"),
-                       absl::StrCat("at most ", kMostFrames / fps, " are played"));
+                       absl::StrCat("at most ", kMostAnimationFrames / fps, " are played"));
     }
     ticks_a_frame_ = ticks / fps;
     count_ = std::max<int64_t>(1, std::llround(seconds * fps));

@@ -325,19 +325,19 @@ double LengthOf(const Part& bones) {
   return length;
 }
 
-struct Format {
+struct AssimpFormat {
   absl::string_view extension, name;
   Up up = Up::kY;
 };
-constexpr Format kFormats[] = {{"glb", "glTF binary"},   {"gltf", "glTF"},
-                               {"obj", "Wavefront OBJ"}, {"off", "OFF"},
-                               {"fbx", "FBX"},           {"3mf", "3MF", Up::kZ},
-                               {"dae", "COLLADA"},       {"blend", "Blender", Up::kZ},
-                               {"ifc", "IFC"},           {"bvh", "BVH"},
-                               {"amf", "AMF", Up::kZ},   {"dxf", "DXF"}};
+constexpr AssimpFormat kAssimpFormats[] = {{"glb", "glTF binary"},   {"gltf", "glTF"},
+                                           {"obj", "Wavefront OBJ"}, {"off", "OFF"},
+                                           {"fbx", "FBX"},           {"3mf", "3MF", Up::kZ},
+                                           {"dae", "COLLADA"},       {"blend", "Blender", Up::kZ},
+                                           {"ifc", "IFC"},           {"bvh", "BVH"},
+                                           {"amf", "AMF", Up::kZ},   {"dxf", "DXF"}};
 
-Format FormatOf(const SourceFile& file) {
-  for (const Format& format : kFormats) {
+AssimpFormat FormatOf(const SourceFile& file) {
+  for (const AssimpFormat& format : kAssimpFormats) {
     if (format.extension == file.extension) return format;
   }
   return {file.extension, file.extension};
@@ -406,7 +406,7 @@ absl::StatusOr<const aiScene*> LoadScene(const SourceFile& file, bool skinned,
 
 absl::StatusOr<Model> ModelOf(const SourceFile& file, const aiScene& scene, const Pose* pose) {
   Model model;
-  const Format format = FormatOf(file);
+  const AssimpFormat format = FormatOf(file);
   model.path = file.path;
   model.format = std::string(format.name);
   model.up = UpOf(scene, format.up);

@@ -19,7 +19,7 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr size_t kPreamble = 128;
-constexpr int kMostDepth = 32;
+constexpr int kMostSequences = 32;
 constexpr uint32_t kUndefined = UINT32_MAX;
 constexpr uint32_t kItem = 0xFFFEE000, kItemEnd = 0xFFFEE00D, kSequenceEnd = 0xFFFEE0DD;
 constexpr uint32_t kPixels = 0x7FE00010;
@@ -131,9 +131,9 @@ class Walker {
 
   // Items up to a delimiter or `end`; `fragments`: their contents are no elements.
   absl::Status Items(size_t* at, size_t end, uint32_t of, bool fragments, int depth) {
-    if (depth > kMostDepth) {
+    if (depth > kMostSequences) {
       return FileError(file_, absl::StrCat("has sequences ", depth, " deep"),
-                       absl::StrCat("at most ", kMostDepth, " are read"));
+                       absl::StrCat("at most ", kMostSequences, " are read"));
     }
     while (*at < end) {
       if (end - *at < 8) return CutOff(of, 8, end - *at);

@@ -23,14 +23,14 @@ constexpr size_t kMinor = 25, kOffsetToPoints = 96, kFormat = 104, kRecordLength
                  kHeaderBytes14 = 375;
 
 // A point record format's least length, where its colours are (0: it has none), and where its flags.
-struct Format {
+struct PointFormat {
   size_t bytes, color, flags;
   uint8_t withheld;
 };
-constexpr Format kFormats[] = {{20, 0, 15, 0x80},  {28, 0, 15, 0x80},  {26, 20, 15, 0x80},
-                               {34, 28, 15, 0x80}, {57, 0, 15, 0x80},  {63, 28, 15, 0x80},
-                               {30, 0, 15, 0x04},  {36, 30, 15, 0x04}, {38, 30, 15, 0x04},
-                               {59, 0, 15, 0x04},  {67, 30, 15, 0x04}};
+constexpr PointFormat kPointFormats[] = {{20, 0, 15, 0x80},  {28, 0, 15, 0x80},  {26, 20, 15, 0x80},
+                                         {34, 28, 15, 0x80}, {57, 0, 15, 0x80},  {63, 28, 15, 0x80},
+                                         {30, 0, 15, 0x04},  {36, 30, 15, 0x04}, {38, 30, 15, 0x04},
+                                         {59, 0, 15, 0x04},  {67, 30, 15, 0x04}};
 constexpr size_t kIntensity = 12;
 
 template <typename T>
@@ -40,14 +40,14 @@ T Take(absl::string_view bytes, size_t at) {
   return value;
 }
 
-struct Header {
-  Format format;
+struct LasHeader {
+  PointFormat format;
   size_t points_at = 0, record = 0;
   uint64_t count = 0;
   double scale[3] = {}, offset[3] = {};
 };
 
-absl::StatusOr<Header> ReadHeader(const SourceFile& file) {
+absl::StatusOr<LasHeader> ReadLasHeader(const SourceFile& file) {
   const absl::string_view bytes = file.bytes;
   if (!absl::StartsWith(bytes, "LASF") || bytes.size() < kHeaderBytes) {
     return FileError(file, absl::StrCat("is ", DescribeContents(bytes)), "a LAS file is expected");
@@ -57,10 +57,10 @@ absl::StatusOr<Header> ReadHeader(const SourceFile& file) {
     return FileError(file, "is compressed (LAZ)",
                      "LAS is read: laszip or las2las turns one into it");
   }
-  if (format >= std::size(kFormats)) {
+  if (format >= std::size(kPointFormats)) {
     return FileError(file, absl::StrCat("has point format ", format), "0 to 10 are read");
   }
-  Header out{kFormats[format]};
+  LasHeader out{kPointFormats[format]};
   out.points_at = Take<uint32_t>(bytes, kOffsetToPoints);
   out.record = Take<uint16_t>(bytes, kRecordLength);
   out.count = Take<uint32_t>(bytes, kOldCount);
@@ -92,7 +92,7 @@ absl::StatusOr<Header> ReadHeader(const SourceFile& file) {
 }  // namespace
 
 absl::StatusOr<Model> ReadLasPoints(const SourceFile& file) {
-  const absl::StatusOr<Header> header = ReadHeader(file);
+  const absl::StatusOr<LasHeader> header = ReadLasHeader(file);
   if (!header.ok()) return header.status();
   const absl::string_view points = absl::string_view(file.bytes).substr(header->points_at);
   const size_t color = header->format.color;

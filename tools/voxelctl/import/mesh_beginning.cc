@@ -13,7 +13,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr uint64_t kMostBytes = uint64_t{512} << 20;
+constexpr uint64_t kMostFileBytes = uint64_t{512} << 20;
 constexpr size_t kHead = 4096;
 
 struct Beginning {
@@ -41,9 +41,9 @@ int NestingOf(const SourceFile& file) {
 }  // namespace
 
 absl::Status CheckMeshBeginning(const SourceFile& file) {
-  if (file.bytes.size() > kMostBytes) {
+  if (file.bytes.size() > kMostFileBytes) {
     return FileError(file, absl::StrCat("has ", file.bytes.size(), " bytes"),
-                     absl::StrCat("meshes of this kind of at most ", kMostBytes, " are read"));
+                     absl::StrCat("meshes of this kind of at most ", kMostFileBytes, " are read"));
   }
   const Beginning beginnings[] = {
       {"off", {}, "OFF", "a file that begins with \"OFF\" is expected"},

@@ -83,8 +83,8 @@ Head HeadOf(const Header& header, bool apart) {
 bool IsPacked(const SourceFile& file) { return absl::StartsWith(file.bytes, "\x1f\x8b"); }
 
 // The first `most` bytes of what it holds; a copy only of what is compressed.
-absl::StatusOr<absl::string_view> Beginning(const SourceFile& file, uint64_t most,
-                                            std::string* room) {
+absl::StatusOr<absl::string_view> BeginningOf(const SourceFile& file, uint64_t most,
+                                              std::string* room) {
   if (!IsPacked(file)) return absl::string_view(file.bytes).substr(0, most);
   absl::StatusOr<std::string> inflated = Inflate(file, file.bytes, most);
   if (!inflated.ok()) return inflated.status();
@@ -116,9 +116,9 @@ absl::StatusOr<SourceFile> ReadBeside(const SourceFile& file, const std::string&
                    read.status().message());
 }
 
-class Reader {
+class NiftiReader {
  public:
-  explicit Reader(const SourceFile& file) : file_(file) {}
+  explicit NiftiReader(const SourceFile& file) : file_(file) {}
 
   absl::StatusOr<Model> Read() {
     if (absl::Status status = ReadHeader(); !status.ok()) return status;
@@ -145,7 +145,7 @@ class Reader {
     }
     const uint64_t bytes = samples * BytesEach();
     std::string room;
-    const absl::StatusOr<absl::string_view> all = Beginning(file, from_ + bytes, &room);
+    const absl::StatusOr<absl::string_view> all = BeginningOf(file, from_ + bytes, &room);
     if (!all.ok()) return all.status();
     if (all->size() < from_ + bytes) {
       return FileError(file,
@@ -177,7 +177,7 @@ class Reader {
 
   absl::Status ReadHeader() {
     std::string room;
-    const absl::StatusOr<absl::string_view> head = Beginning(file_, kHeader2, &room);
+    const absl::StatusOr<absl::string_view> head = BeginningOf(file_, kHeader2, &room);
     if (!head.ok()) return head.status();
     if (head->size() < kHeader1) {
       return FileError(file_, absl::StrCat("has ", head->size(), " bytes"),
@@ -288,14 +288,14 @@ class Reader {
 
 absl::StatusOr<Model> ReadNiftiVolume(const SourceFile& file) {
   nifti_set_debug_level(0);
-  if (file.extension != "img") return Reader(file).Read();
+  if (file.extension != "img") return NiftiReader(file).Read();
   const std::optional<std::string> header = Beside(file.path, "hdr");
   if (!header) {
     return FileError(file, "has no header beside it",
                      "the file of the same name with the extension .hdr is expected");
   }
   const absl::StatusOr<SourceFile> read = ReadBeside(file, *header);
-  return read.ok() ? Reader(*read).Read() : read.status();
+  return read.ok() ? NiftiReader(*read).Read() : read.status();
 }
 
 }  // namespace voxeld::voxelctl

@@ -39,7 +39,7 @@ std::string Plain(absl::string_view text) {
   return plain;
 }
 
-std::optional<SampleType> TypeOf(absl::string_view name) {
+std::optional<SampleType> NrrdTypeOf(absl::string_view name) {
   static constexpr std::pair<absl::string_view, SampleType> kNames[] = {
       {"signedchar", SampleType::kI8},
       {"int8", SampleType::kI8},
@@ -82,12 +82,13 @@ std::optional<SampleType> TypeOf(absl::string_view name) {
   return std::nullopt;
 }
 
-class Reader {
+class NrrdReader {
  public:
-  explicit Reader(const SourceFile& file) : file_(file) {}
+  explicit NrrdReader(const SourceFile& file) : file_(file) {}
 
   absl::StatusOr<Model> Read() {
-    for (const auto step : {&Reader::ReadHeader, &Reader::ReadCode, &Reader::ReadSizes}) {
+    for (const auto step :
+         {&NrrdReader::ReadHeader, &NrrdReader::ReadCode, &NrrdReader::ReadSizes}) {
       if (absl::Status status = (this->*step)(); !status.ok()) return status;
     }
     SampledVolume volume;
@@ -212,7 +213,7 @@ class Reader {
   }
 
   absl::Status ReadCode() {
-    const std::optional<SampleType> type = TypeOf(Field("type"));
+    const std::optional<SampleType> type = NrrdTypeOf(Field("type"));
     if (!type)
       return WrongField("type", "a type of numbers such as \"short\" or \"float\" is expected");
     code_.type = *type;
@@ -392,6 +393,6 @@ class Reader {
 
 }  // namespace
 
-absl::StatusOr<Model> ReadNrrdVolume(const SourceFile& file) { return Reader(file).Read(); }
+absl::StatusOr<Model> ReadNrrdVolume(const SourceFile& file) { return NrrdReader(file).Read(); }
 
 }  // namespace voxeld::voxelctl

@@ -33,7 +33,7 @@ struct Field {
 
 enum class Data : uint8_t { kAscii, kBinary, kCompressed };
 
-struct Header {
+struct PcdHeader {
   std::vector<Field> fields;
   uint64_t points = 0;
   Data data = Data::kAscii;
@@ -52,7 +52,7 @@ absl::Status Wrong(const SourceFile& file, size_t line, absl::string_view found,
 }
 
 // One line of the header. `done`: it was the last.
-absl::Status TakeLine(const SourceFile& file, size_t line, const Words& words, Header* out,
+absl::Status TakeLine(const SourceFile& file, size_t line, const Words& words, PcdHeader* out,
                       uint64_t* width, uint64_t* height, bool* done) {
   const absl::string_view key = words[0];
   const auto each = [&](auto&& take) -> absl::Status {
@@ -108,8 +108,8 @@ absl::Status TakeLine(const SourceFile& file, size_t line, const Words& words, H
                "ascii, binary and binary_compressed are read");
 }
 
-absl::StatusOr<Header> ReadHeader(const SourceFile& file) {
-  Header out;
+absl::StatusOr<PcdHeader> ReadPcdHeader(const SourceFile& file) {
+  PcdHeader out;
   uint64_t width = 0, height = 1;
   bool done = false;
   const absl::string_view bytes = file.bytes;
@@ -213,7 +213,7 @@ bool IsThere(const PointRow& row) {
   return std::isfinite(row[0]) && std::isfinite(row[1]) && std::isfinite(row[2]);
 }
 
-absl::Status ReadAscii(const SourceFile& file, const Header& header, PointTable* table,
+absl::Status ReadAscii(const SourceFile& file, const PcdHeader& header, PointTable* table,
                        uint64_t* nowhere) {
   absl::string_view rest = absl::string_view(file.bytes).substr(header.body);
   for (uint64_t i = 0; i < header.points; ++i) {
@@ -247,7 +247,7 @@ absl::Status ReadAscii(const SourceFile& file, const Header& header, PointTable*
 }
 
 // Points one after another, or field after field (`by_field`), as the compressed data have them.
-absl::Status ReadBinary(const SourceFile& file, const Header& header, absl::string_view bytes,
+absl::Status ReadBinary(const SourceFile& file, const PcdHeader& header, absl::string_view bytes,
                         bool by_field, PointTable* table, uint64_t* nowhere) {
   if (bytes.size() < header.points * header.point_bytes) {
     return FileError(file,
@@ -275,7 +275,7 @@ absl::Status ReadBinary(const SourceFile& file, const Header& header, absl::stri
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::string> Decompress(const SourceFile& file, const Header& header) {
+absl::StatusOr<std::string> Decompress(const SourceFile& file, const PcdHeader& header) {
   const absl::string_view body = absl::string_view(file.bytes).substr(header.body);
   uint32_t packed = 0, whole = 0;
   if (body.size() >= 8) {
@@ -301,7 +301,7 @@ absl::StatusOr<std::string> Decompress(const SourceFile& file, const Header& hea
 }  // namespace
 
 absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file) {
-  const absl::StatusOr<Header> header = ReadHeader(file);
+  const absl::StatusOr<PcdHeader> header = ReadPcdHeader(file);
   if (!header.ok()) return header.status();
   std::array<bool, kPointColumns> has = {};
   double full_scale = 255;

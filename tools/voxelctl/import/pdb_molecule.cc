@@ -42,8 +42,8 @@ struct CellHash {
   }
 };
 
-// Columns as the format counts them, from 1, of which the last may be beyond the line's end.
-absl::string_view Columns(absl::string_view line, size_t first, size_t last) {
+// ColumnsOf as the format counts them, from 1, of which the last may be beyond the line's end.
+absl::string_view ColumnsOf(absl::string_view line, size_t first, size_t last) {
   if (line.size() < first) return "";
   return line.substr(first - 1, last - first + 1);
 }
@@ -53,8 +53,8 @@ const ChemicalElement& ElementOf(absl::string_view line) {
   const auto find = [](absl::string_view text) {
     return FindElement(absl::StripAsciiWhitespace(text));
   };
-  if (const ChemicalElement* element = find(Columns(line, 77, 78))) return *element;
-  const absl::string_view name = Columns(line, 13, 16);
+  if (const ChemicalElement* element = find(ColumnsOf(line, 77, 78))) return *element;
+  const absl::string_view name = ColumnsOf(line, 13, 16);
   const bool four = name.find(' ') == absl::string_view::npos && name.size() == 4;
   if (!four || name[0] != 'H') {
     if (const ChemicalElement* element = find(name.substr(0, 2))) return *element;
@@ -67,9 +67,9 @@ const ChemicalElement& ElementOf(absl::string_view line) {
   return UnknownElement();
 }
 
-class Reader {
+class PdbReader {
  public:
-  Reader(const SourceFile& file, MoleculeStyle style) : file_(file), style_(style) {}
+  PdbReader(const SourceFile& file, MoleculeStyle style) : file_(file), style_(style) {}
 
   absl::StatusOr<Model> Read() {
     if (absl::Status status = ReadLines(); !status.ok()) return status;
@@ -106,7 +106,7 @@ class Reader {
       rest.remove_prefix(std::min(end + 1, rest.size()));
       if (absl::EndsWith(line, "\r")) line.remove_suffix(1);
       ++line_;
-      const absl::string_view record = Columns(line, 1, 6);
+      const absl::string_view record = ColumnsOf(line, 1, 6);
       if (absl::StartsWith(record, "ENDMDL")) {
         ended = !atoms_.empty();
       } else if (absl::StartsWith(record, "CONECT")) {
@@ -121,7 +121,7 @@ class Reader {
   }
 
   absl::Status ReadAtom(absl::string_view line) {
-    const absl::string_view location = Columns(line, 17, 17);
+    const absl::string_view location = ColumnsOf(line, 17, 17);
     if (location != " " && location != "A" && location != "1" && !location.empty())
       return absl::OkStatus();
     if (atoms_.size() >= kMaxModelVertices / 5) {
@@ -132,7 +132,7 @@ class Reader {
     double* const numbers[] = {&atom.at.x, &atom.at.y, &atom.at.z};
     for (size_t i = 0; i < 3; ++i) {
       const absl::string_view text =
-          absl::StripAsciiWhitespace(Columns(line, 31 + 8 * i, 38 + 8 * i));
+          absl::StripAsciiWhitespace(ColumnsOf(line, 31 + 8 * i, 38 + 8 * i));
       if (!absl::SimpleAtod(text, numbers[i]) || !(std::abs(*numbers[i]) <= kFarthest)) {
         return WrongLine(text.empty() ? absl::StrCat("is cut off before column ", 31 + 8 * i)
                                       : absl::StrCat("has \"", EscapeForTerminal(text),
@@ -140,7 +140,7 @@ class Reader {
                          "a coordinate of the atom is expected, in ångström");
       }
     }
-    serials_.emplace(absl::StripAsciiWhitespace(Columns(line, 7, 11)), atoms_.size());
+    serials_.emplace(absl::StripAsciiWhitespace(ColumnsOf(line, 7, 11)), atoms_.size());
     atoms_.push_back(atom);
     return absl::OkStatus();
   }
@@ -149,7 +149,7 @@ class Reader {
   void ReadConnections(absl::string_view line) {
     const auto find = [&](size_t first) {
       return serials_.find(
-          std::string(absl::StripAsciiWhitespace(Columns(line, first, first + 4))));
+          std::string(absl::StripAsciiWhitespace(ColumnsOf(line, first, first + 4))));
     };
     const auto from = find(7);
     if (from == serials_.end()) return;
@@ -248,7 +248,7 @@ class Reader {
 }  // namespace
 
 absl::StatusOr<Model> ReadPdbMolecule(const SourceFile& file, MoleculeStyle style) {
-  return Reader(file, style).Read();
+  return PdbReader(file, style).Read();
 }
 
 }  // namespace voxeld::voxelctl

@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kPieces = 32;
 constexpr double kArcStep = 5 * std::numbers::pi / 180;
-constexpr double kLargest = 1e12;
+constexpr double kLargestNumber = 1e12;
 
 bool IsDigit(char c) { return c >= '0' && c <= '9'; }
 
@@ -71,7 +71,9 @@ class PathParser {
     at_ = p;
   }
 
-  bool Take(double* number) { return TakeNumber(&rest_, number) && std::abs(*number) <= kLargest; }
+  bool Take(double* number) {
+    return TakeNumber(&rest_, number) && std::abs(*number) <= kLargestNumber;
+  }
   // In absolute coordinates.
   bool Take(bool relative, Point2* p) {
     if (!Take(&p->x) || !Take(&p->y)) return false;

@@ -19,7 +19,7 @@ namespace {
 constexpr size_t kMostRules = 10'000, kMostRuleBytes = 4096;
 constexpr size_t kMostValueBytes = 1024;  // every element has its own copy
 
-constexpr std::pair<absl::string_view, uint32_t> kNames[] = {
+constexpr std::pair<absl::string_view, uint32_t> kColorNames[] = {
     {"aliceblue", 0xf0f8ff},
     {"antiquewhite", 0xfaebd7},
     {"aqua", 0x00ffff},
@@ -206,7 +206,7 @@ std::optional<Rgb> ParseCssColor(absl::string_view text) {
     }
     return Rgb{channels[0], channels[1], channels[2]};
   }
-  for (const auto& [name, rgb] : kNames) {
+  for (const auto& [name, rgb] : kColorNames) {
     if (absl::EqualsIgnoreCase(name, text)) return FromNumber(rgb);
   }
   return std::nullopt;

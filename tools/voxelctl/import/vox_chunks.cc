@@ -98,9 +98,9 @@ bool ReadMove(const std::string& text, std::array<int32_t, 3>* out) {
   return true;
 }
 
-class Reader {
+class VoxReader {
  public:
-  explicit Reader(const SourceFile& file) : file_(file) { scene_.palette = DefaultPalette(); }
+  explicit VoxReader(const SourceFile& file) : file_(file) { scene_.palette = DefaultPalette(); }
 
   absl::StatusOr<VoxScene> Read() {
     absl::string_view rest = file_.bytes;
@@ -248,6 +248,6 @@ class Reader {
 
 }  // namespace
 
-absl::StatusOr<VoxScene> ReadVoxChunks(const SourceFile& file) { return Reader(file).Read(); }
+absl::StatusOr<VoxScene> ReadVoxChunks(const SourceFile& file) { return VoxReader(file).Read(); }
 
 }  // namespace voxeld::voxelctl

@@ -11,19 +11,19 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr int kMostDepth = 64;
-constexpr uint64_t kMostVisits = 1'000'000;
+constexpr int kMostGroupDepth = 64;
+constexpr uint64_t kMostGroupVisits = 1'000'000;
 constexpr size_t kSparse = 64;  // cells for each voxel
 
-using Cell = std::array<int64_t, 3>;
+using VoxCell = std::array<int64_t, 3>;
 
 // Where a grid's cells go: first turned, then moved.
 struct Place {
   VoxTurn turn;
-  Cell move = {};
+  VoxCell move = {};
 
-  Cell Turned(const Cell& v) const {
-    Cell out;
+  VoxCell Turned(const VoxCell& v) const {
+    VoxCell out;
     for (int r = 0; r < 3; ++r) out[r] = turn.sign[r] * v[turn.column[r]];
     return out;
   }
@@ -74,9 +74,9 @@ class Builder {
     if (at == scene_.nodes.end()) {
       return FileError(file_, absl::StrCat("refers to node ", number), "there is none");
     }
-    if (depth > kMostDepth || ++visits_ > kMostVisits) {
+    if (depth > kMostGroupDepth || ++visits_ > kMostGroupVisits) {
       return FileError(file_, "has nodes within nodes without end",
-                       absl::StrCat("at most ", kMostDepth, " deep are read"));
+                       absl::StrCat("at most ", kMostGroupDepth, " deep are read"));
     }
     const VoxNode& node = at->second;
     if (node.hidden) return absl::OkStatus();
@@ -94,8 +94,8 @@ class Builder {
       return FileError(file_, absl::StrCat("refers to model ", number),
                        absl::StrCat("it has ", scene_.grids.size()));
     }
-    if (++visits_ > kMostVisits) {
-      return FileError(file_, absl::StrCat("shows more than ", kMostVisits, " models"),
+    if (++visits_ > kMostGroupVisits) {
+      return FileError(file_, absl::StrCat("shows more than ", kMostGroupVisits, " models"),
                        "take a part of it");
     }
     const VoxGrid& grid = scene_.grids[static_cast<size_t>(number)];
@@ -143,12 +143,12 @@ class Builder {
     const int u = (axis + 1) % 3, w = (axis + 2) % 3;
     for (const auto& [du, dw] : {std::pair(0, 0), {1, 0}, {1, 1}, {0, 1}}) {
       // Grids are turned about the corner of cells that is their middle.
-      Cell corner;
+      VoxCell corner;
       for (int a = 0; a < 3; ++a) corner[a] = int64_t{cell[a]} - grid.size[a] / 2;
       corner[axis] += side;
       corner[u] += du;
       corner[w] += dw;
-      const Cell at = place.Turned(corner);
+      const VoxCell at = place.Turned(corner);
       part_.positions.push_back({static_cast<double>(at[0] + place.move[0]),
                                  static_cast<double>(at[1] + place.move[1]),
                                  static_cast<double>(at[2] + place.move[2])});

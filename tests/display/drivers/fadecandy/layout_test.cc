@@ -13,7 +13,7 @@
 #include "gtest/gtest.h"
 
 namespace voxeld::display::fadecandy {
-namespace {
+namespace layout_test {
 
 using Values = std::map<std::string, std::string>;
 
@@ -257,5 +257,5 @@ TEST(FadecandyLayout, ReadsTheFile) {
   std::remove(path.c_str());
 }
 
-}  // namespace
+}  // namespace layout_test
 }  // namespace voxeld::display::fadecandy

@@ -12,7 +12,7 @@
 #include "tests/display/emulator/carriers/peer.h"
 
 namespace voxeld::display::emulator {
-namespace {
+namespace usbip_mutation_test {
 
 constexpr int kMutations = 12'000;
 
@@ -96,5 +96,5 @@ TEST(UsbipMutations, Handshakes) {
   }
 }
 
-}  // namespace
+}  // namespace usbip_mutation_test
 }  // namespace voxeld::display::emulator
