@@ -14,11 +14,28 @@ import subprocess
 import sys
 
 CASE = re.compile(r"^\s*(?:TYPED_)?TEST(?:_F|_P)?\(\s*(\w+)\s*,\s*(\w+)\s*\)", re.MULTILINE)
+ADDED = re.compile(r"^add_test\(\[=\[(.*?)\]=\] (.*)\)$", re.MULTILINE)
+
+
+def commands_of(build):
+    """Returns: the command of each test by the test's name, from the files that CMake writes for ctest."""
+    commands = {}
+    for folder, _, names in os.walk(build):
+        if "CTestTestfile.cmake" in names:
+            with open(os.path.join(folder, "CTestTestfile.cmake"), encoding="utf-8") as file:
+                commands.update((name, re.findall('"(.*?)"', words)) for name, words in ADDED.findall(file.read()))
+    return commands
 
 
 def tests_of(build):
     listed = subprocess.run(["ctest", "--test-dir", build, "--show-only=json-v1"], capture_output=True, text=True, check=True)
-    return json.loads(listed.stdout)["tests"]
+    tests = json.loads(listed.stdout)["tests"]
+    # ctest leaves out the command of a test whose program has not been built yet.
+    if any("command" not in test for test in tests):
+        commands = commands_of(build)
+        for test in tests:
+            test.setdefault("command", commands.get(test["name"], []))
+    return tests
 
 
 def exactly(tests):
@@ -47,8 +64,9 @@ def programs_with(build, case_pattern):
         entries = json.load(file)
     programs = {}
     for entry in entries:
-        target = re.search(r"CMakeFiles/(\w+)\.dir/", entry["output"])
-        if target is None or "/tests/" not in "/" + entry["output"]:
+        # The tests' own sources; CMake 3.25 names the object only in the command.
+        target = re.search(r" -o tests/\S*CMakeFiles/(\w+)\.dir/", entry["command"])
+        if target is None:
             continue
         paths = [entry["file"]]
         if "/Unity/" in entry["file"] and os.path.exists(entry["file"]):

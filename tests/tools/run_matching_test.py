@@ -1,0 +1,61 @@
+#!/usr/bin/env python3
+"""What tools/run_matching.py builds for a pattern, in a project with two tests of which nothing has been built."""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tools"))
+import run_matching  # noqa: E402
+
+PROJECT = """
+cmake_minimum_required(VERSION 3.25)
+project(two LANGUAGES CXX)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin/tests)
+enable_testing()
+add_subdirectory(tests)
+"""
+TESTS = """
+add_executable(one_test one_test.cc)
+add_executable(host two.cc)
+add_executable(guest two.cc)
+add_test(NAME one_test COMMAND one_test --gtest_filter=*)
+add_test(NAME host.runs_guest COMMAND host $<TARGET_FILE:guest>)
+"""
+
+
+class RunMatchingTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        files = {"CMakeLists.txt": PROJECT, "tests/CMakeLists.txt": TESTS, "tests/two.cc": "int main() {}",
+                 "tests/one_test.cc": "TEST(Lamp, Lights) {}\nTEST_F(LampTest,\n       GoesOut) {}"}
+        os.mkdir(os.path.join(folder.name, "tests"))
+        for name, text in files.items():
+            with open(os.path.join(folder.name, name), "w", encoding="utf-8") as file:
+                file.write(text)
+        cls.build = os.path.join(folder.name, "build")
+        subprocess.run(["cmake", "-G", "Ninja", "-S", folder.name, "-B", cls.build], check=True, capture_output=True)
+
+    def targets(self, pattern):
+        tests = [test for test in run_matching.tests_of(self.build) if re.search(pattern, test["name"])]
+        return run_matching.targets_of(self.build, tests)
+
+    def test_programs_that_were_never_built_are_built(self):
+        self.assertEqual(self.targets("^one_test$"), ["one_test"])
+        self.assertEqual(self.targets("runs_guest"), ["guest", "host"])
+        self.assertEqual(self.targets("."), ["guest", "host", "one_test"])
+
+    def test_cases_are_found_in_the_sources(self):
+        self.assertEqual(run_matching.programs_with(self.build, re.compile("Lamp")),
+                         {"one_test": {"Lamp.Lights", "LampTest.GoesOut"}})
+        self.assertEqual(run_matching.programs_with(self.build, re.compile("Candle")), {})
+
+
+if __name__ == "__main__":
+    unittest.main()
