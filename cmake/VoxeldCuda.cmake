@@ -1,8 +1,8 @@
 # Finds CUDA by itself, also where nvcc is not on the PATH. Sets VOXELD_HAVE_CUDA.
 #
 # VOXELD_CUDA: AUTO builds the CUDA engine where there are nvcc and a GPU, ON wherever nvcc is, OFF leaves it out.
-# VOXELD_CUDA_ARCHITECTURES: what its kernels are compiled for. Devices other than Hopper compile the PTX of the lowest
-# compute capability that the engine accepts (Ampere): blocks of threads of those before it lack the shared memory.
+# VOXELD_CUDA_ARCHITECTURES: the architectures for which the kernels are compiled. GPUs other than Hopper compile the PTX for
+# Ampere, the oldest architecture that the engine supports: earlier ones have too little shared memory per thread block.
 set(VOXELD_CUDA_ARCHITECTURES "80-virtual;90-real" CACHE STRING "CUDA architectures, as CMAKE_CUDA_ARCHITECTURES names them")
 set(VOXELD_HAVE_CUDA OFF)
 if(VOXELD_CUDA STREQUAL "OFF")

@@ -1,17 +1,17 @@
-# Precompiled headers for quick and instrumented builds with Clang, which loads of them only what a source uses. (GCC takes as long to
-# load the headers of gRPC as to compile them.) Every target includes them, so no source may rely on them: tools/check compiles each
-# source without.
+# Precompiles common headers for quick and instrumented builds with Clang, which loads only the parts that a source uses. (GCC takes as
+# long to load gRPC's precompiled headers as to compile them.) They are included in every source and can hide a missing include, so
+# tools/check compiles each source without them.
 #
 # Headers are precompiled once for each combination of compiler options, and of what targets with those options may include.
 
-# Sets `result` to client, grpc, wire or none: the greatest that `target` links of the client library, the gRPC stubs and the wire
-# messages.
+# Sets `result` to the largest of these libraries that `target` links, directly or indirectly: client (the client library), grpc (the
+# gRPC stubs), wire (the protobuf messages) or none.
 function(voxeld_reach target result)
   set(${result} none PARENT_SCOPE)
   if(NOT TARGET ${target})
     return()
   endif()
-  get_target_property(reach ${target} VOXELD_REACH)
+  get_target_property(reach ${target} VOXELD_PCH_SET)
   if(NOT reach)
     set(reach none)
     if(target STREQUAL "voxeld_client")
@@ -40,13 +40,13 @@ function(voxeld_reach target result)
         endif()
       endforeach()
     endforeach()
-    set_target_properties(${target} PROPERTIES VOXELD_REACH ${reach})
+    set_target_properties(${target} PROPERTIES VOXELD_PCH_SET ${reach})
   endif()
   set(${result} ${reach} PARENT_SCOPE)
 endfunction()
 
-# Adds the target `name` that precompiles the headers for sources of this reach and optimisation level. `hardening`: properties that
-# decide on options (VoxeldHardening.cmake), with their values.
+# Adds the target `name`, which precompiles the headers for sources of this reach and optimisation level. `hardening` lists target
+# properties, with their values, that select hardening options (VoxeldHardening.cmake).
 function(voxeld_precompiled_headers name reach level hardening)
   file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/headers/${name}.cc CONTENT "int ${name};\n" @ONLY)
   add_library(${name} OBJECT EXCLUDE_FROM_ALL ${CMAKE_BINARY_DIR}/headers/${name}.cc)
@@ -113,8 +113,8 @@ function(voxeld_compilations target result)
   set(${result} ${count} PARENT_SCOPE)
 endfunction()
 
-# Precompiling takes as long as it saves in so many compilations.
-set(VOXELD_LEAST_COMPILATIONS 6)
+# The minimum number of compilations for which precompiling saves more time than it takes.
+set(VOXELD_PCH_MIN_COMPILATIONS 6)
 
 # Called when all targets are known: what a target may include depends on what its libraries link.
 function(voxeld_precompile_headers)
@@ -174,13 +174,13 @@ function(voxeld_precompile_headers)
   endforeach()
 
   foreach(kind ${kinds})
-    # Where there are too few for headers of their own, they take those of the next smaller reach.
+    # Targets with too few compilations for precompiled headers of their own use those of the next smaller reach.
     set(less_of_client grpc)
     set(less_of_grpc wire)
     set(less_of_wire none)
     foreach(reach client grpc wire none)
       set(some ${targets_${kind}_${reach}})
-      if(count_${kind}_${reach} LESS VOXELD_LEAST_COMPILATIONS)
+      if(count_${kind}_${reach} LESS VOXELD_PCH_MIN_COMPILATIONS)
         if(NOT reach STREQUAL "none")
           set(less ${less_of_${reach}})
           list(APPEND targets_${kind}_${less} ${some})

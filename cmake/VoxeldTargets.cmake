@@ -33,7 +33,7 @@ find_package(absl REQUIRED)
 
 add_library(voxeld_options INTERFACE)
 target_include_directories(voxeld_options INTERFACE ${CMAKE_SOURCE_DIR})
-# Both machines must round alike: a product and a sum are never fused.
+# CPU and GPU must round identically, so never fuse a multiplication and an addition.
 target_compile_options(voxeld_options INTERFACE -ffp-contract=off)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   # Where it vectorises straight code, GCC 12 forgets that a double was rounded to float on its way.
@@ -45,14 +45,14 @@ if(VOXELD_SANITIZE)
   target_compile_definitions(voxeld_options INTERFACE VOXELD_SANITIZED)
   target_link_options(voxeld_options INTERFACE -fsanitize=${VOXELD_SANITIZE})
   if(VOXELD_SANITIZE MATCHES "undefined")
-    # The check of virtual tables opens a pipe to look at an object, and takes
-    # the object for a wrong one where a test has used up the descriptors.
-    # A null pointer faults without being looked for.
+    # The vptr check opens a pipe to probe an object, and reports a false error
+    # if a test has used up all file descriptors. The null check is not needed:
+    # dereferencing a null pointer crashes anyway.
     target_compile_options(voxeld_options INTERFACE -fno-sanitize-recover=undefined -fno-sanitize=null,vptr)
   endif()
 endif()
 if(VOXELD_FUZZ)
-  # Which edges were taken guides libFuzzer; which lines were, tools/fuzz --coverage tells of the same programs.
+  # Edge coverage guides libFuzzer; tools/fuzz --coverage reports the line coverage of the same programs.
   target_compile_options(voxeld_options INTERFACE -fsanitize=fuzzer-no-link -fprofile-instr-generate -fcoverage-mapping)
   target_link_options(voxeld_options INTERFACE -fprofile-instr-generate)
 endif()
@@ -70,7 +70,7 @@ endif()
 include(VoxeldHardening)
 target_link_libraries(voxeld_options INTERFACE Threads::Threads)
 
-# A program has what it calls, and not all of every source that it calls something of.
+# Link only the functions and data that a program uses, not whole object files.
 if(CMAKE_BUILD_TYPE STREQUAL "Release" AND NOT VOXELD_SANITIZE)
   target_compile_options(voxeld_options INTERFACE $<$<COMPILE_LANGUAGE:C,CXX>:-ffunction-sections -fdata-sections>)
   add_link_options(LINKER:--gc-sections)
@@ -81,22 +81,17 @@ add_library(voxeld_warnings INTERFACE)
 target_compile_options(voxeld_warnings INTERFACE -Wall -Wextra -Wno-unused-parameter
                                                  -Wno-missing-field-initializers)
 if(VOXELD_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-  # GCC's flow analysis cannot see through the checks that a sanitizer inserts; nor does it know headers that were compiled
-  # before as the system's, whose own warnings are none of ours.
+  # The checks that a sanitizer inserts confuse GCC's flow analysis, which then reports false positives, also in system headers.
   target_compile_options(voxeld_warnings INTERFACE -Wno-array-bounds -Wno-maybe-uninitialized -Wno-nonnull -Wno-restrict
                                                    -Wno-stringop-overflow -Wno-stringop-overread)
 endif()
 if(VOXELD_HARDENING AND NOT VOXELD_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-  # Nor all through the library's assertions, and the less the more is inlined: what it then warns of ends no build.
+  # The standard library's assertions also cause false positives, more of them with more inlining. They must not fail the build.
   target_compile_options(voxeld_warnings INTERFACE -Wno-error=array-bounds -Wno-error=maybe-uninitialized -Wno-error=nonnull -Wno-error=restrict
                                                    -Wno-error=stringop-overflow -Wno-error=stringop-overread)
 endif()
-if((VOXELD_INSTRUMENTED OR VOXELD_QUICK) AND CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
-  # What is for GCC alone stands in some sources; the checks that Clang alone has are tools/check's.
-  target_compile_options(voxeld_warnings INTERFACE -Wno-unknown-warning-option)
-endif()
 if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-  # What a source has to itself is in a file that another includes.
+  # A unity build includes the sources, so GCC would warn about types that use their anonymous namespaces.
   target_compile_options(voxeld_warnings INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Wno-subobject-linkage>)
 endif()
 if(VOXELD_QUICK AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
@@ -107,28 +102,28 @@ if(VOXELD_WERROR)
   target_compile_options(voxeld_warnings INTERFACE -Werror)
 endif()
 
-# How a test and the headers compiled before it are built.
+# Sets the libraries and compile options of a test target.
 function(voxeld_test_options name)
   target_link_libraries(${name} PRIVATE voxeld_options voxeld_warnings GTest::gmock GTest::gtest_main)
-  # What gRPC brings along for some is to be alike for all, and headers that were compiled before are not known as the
-  # system's any more, whose own warnings are none of ours.
+  # gRPC adds -pthread to the targets that link it. Precompiled headers can only be shared by targets with the same options, so
+  # all test targets get it. With GCC, disable warnings that report false positives in library headers.
   target_compile_options(${name} PRIVATE -pthread)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     target_compile_options(${name} PRIVATE -Wno-array-bounds -Wno-restrict -Wno-stringop-overflow)
   endif()
   if((VOXELD_INSTRUMENTED OR VOXELD_QUICK) AND NOT ARG_HEAVY)
-    # Optimising what a sanitizer has put its checks into takes several times as long.
+    # With optimisation, sanitizer-instrumented code takes several times as long to compile.
     target_compile_options(${name} PRIVATE -O0)
     set_target_properties(${name} PROPERTIES VOXELD_UNOPTIMISED ON)
   elseif(CMAKE_BUILD_TYPE STREQUAL "Release")
-    # What is tested is built as it is shipped; the test itself compiles faster so.
+    # The code under test is built as it is shipped; only the test's own sources use -O1, to compile faster.
     target_compile_options(${name} PRIVATE -O1)
   endif()
 endfunction()
 
-# voxeld_compile_quickly(): sources of this directory and those below take little time when they run. They are optimised less
-# where VOXELD_QUICK says so, and not at all under a sanitizer, where optimising takes longest.
-macro(voxeld_compile_quickly)
+# voxeld_reduce_optimisation(): the code in this directory and its subdirectories is not performance-critical. Quick builds (VOXELD_QUICK)
+# compile it with -O1, instrumented builds with -O0, since optimising instrumented code takes longest.
+macro(voxeld_reduce_optimisation)
   if(VOXELD_FUZZ)
     # Fuzz targets run all of it as often as possible.
   elseif(VOXELD_INSTRUMENTED)
@@ -138,8 +133,8 @@ macro(voxeld_compile_quickly)
   endif()
 endmacro()
 
-# voxeld_unhurried(TARGET …): users wait for so little of what these do that quick builds do not optimise them at all.
-function(voxeld_unhurried)
+# voxeld_unoptimised_if_quick(TARGET …): these targets are not performance-critical; quick builds (VOXELD_QUICK) compile them with -O0.
+function(voxeld_unoptimised_if_quick)
   if(NOT VOXELD_QUICK OR VOXELD_INSTRUMENTED)
     return()
   endif()
@@ -149,21 +144,21 @@ function(voxeld_unhurried)
   endforeach()
 endfunction()
 
-# voxeld_unwatched(SOURCE …): sources that share nothing with other threads; ThreadSanitizer is not asked to look on.
-function(voxeld_unwatched)
+# voxeld_exclude_from_tsan(SOURCE …): excludes sources that share no data between threads from ThreadSanitizer's instrumentation.
+function(voxeld_exclude_from_tsan)
   if(VOXELD_SANITIZE STREQUAL "thread")
     set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS -fno-sanitize=thread SKIP_PRECOMPILE_HEADERS ON)
   endif()
 endfunction()
 
-# voxeld_apart(SOURCE …): where sources are compiled several at a time (CMAKE_UNITY_BUILD), these are compiled alone, for names
-# of their own are others' names too.
-function(voxeld_apart)
+# voxeld_exclude_from_unity(SOURCE …): excludes these sources from unity builds (CMAKE_UNITY_BUILD), because their file-local names conflict with
+# those of other sources.
+function(voxeld_exclude_from_unity)
   set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
 
 # voxeld_library(NAME [SINGLE_THREADED] [KERNELS] SOURCES … HEADERS … LINK …): a static library `voxeld_NAME`.
-#   SINGLE_THREADED  pure functions, and objects that no two threads share (voxeld_unwatched)
+#   SINGLE_THREADED  pure functions, and objects that no two threads share (voxeld_exclude_from_tsan)
 #   KERNELS          it has the inner loops (VoxeldHardening.cmake)
 # With VOXELD_HEADERS_ALONE, which tools/check sets, each of HEADERS that no source of the same name includes first is also compiled
 # with nothing before it, so that none depends on what its includer included.

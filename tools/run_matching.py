@@ -110,7 +110,7 @@ def main():
     if not programs:
         print(f"tools/test: no ctest test and no GoogleTest case matches '{arguments.pattern}'; to list the tests: tools/test --list", file=sys.stderr)
         return 1
-    # Cases of a library that several programs link are in none of its own.
+    # Some cases are compiled into an object library that several test programs link; it is not a program itself.
     runnable = {test["command"][0] for test in tests_of(arguments.build) if test.get("command")}
     runnable = {os.path.basename(path): path for path in runnable}
     named = {name: cases for name, cases in programs.items() if name in runnable}
@@ -122,7 +122,7 @@ def main():
         return 1
     status = 0
     for name, cases in sorted(named.items()):
-        # Instances of value-parameterised and typed cases have something before or after these names.
+        # The full names of value-parameterised and typed cases have a prefix or a suffix.
         wanted = ":".join(f"{case}:*/{case}/*:{case.split('.')[0]}/*.{case.split('.')[1]}:*/{case.split('.')[0]}/*.{case.split('.')[1]}"
                           for case in sorted(cases))
         folder = os.path.dirname(runnable[name])

@@ -304,12 +304,12 @@ class Cuda(Sandbox):
 
     def test_a_gpu_without_nvcc(self) -> None:
         self.stub("nvidia-smi", "exit 0")
-        self.assertIn("a GPU without the CUDA toolkit (nvcc): the CPU draws", self.said())
+        self.assertIn("found a GPU but no CUDA Toolkit (nvcc): voxeld will draw on the CPU", self.said())
 
     def test_nvcc_without_a_gpu(self) -> None:
         self.stub("nvcc", "exit 0")
         self.stub("nvidia-smi", "exit 9")
-        self.assertIn("the CUDA toolkit without a GPU: the CPU draws", self.said())
+        self.assertIn("found the CUDA Toolkit but no GPU: voxeld will draw on the CPU", self.said())
 
     def test_neither_and_both_need_no_words(self) -> None:
         self.assertNotIn("GPU", self.said())
