@@ -151,6 +151,19 @@ function(voxeld_exclude_from_tsan)
   endif()
 endfunction()
 
+# voxeld_build_tests_only(): makes the target `all` build the tests and what they need, and nothing else.
+function(voxeld_build_tests_only)
+  voxeld_targets_below(${CMAKE_SOURCE_DIR} targets)
+  voxeld_targets_below(${CMAKE_SOURCE_DIR}/tests tests)
+  list(REMOVE_ITEM targets ${tests})
+  foreach(target ${targets})
+    get_target_property(type ${target} TYPE)
+    if(type MATCHES "EXECUTABLE|(STATIC|SHARED|OBJECT)_LIBRARY")
+      set_target_properties(${target} PROPERTIES EXCLUDE_FROM_ALL ON)
+    endif()
+  endforeach()
+endfunction()
+
 # voxeld_exclude_from_unity(SOURCE …): excludes these sources from unity builds (CMAKE_UNITY_BUILD), because their file-local names conflict with
 # those of other sources.
 function(voxeld_exclude_from_unity)
@@ -211,18 +224,20 @@ function(voxeld_deep)
   endforeach()
 endfunction()
 
-# voxeld_test(NAME [SINGLE_THREADED] [HEAVY] [DEEP] LABELS … SOURCES … LINK … LONG … ONE_THREAD … SHARDS n TIMEOUT s COST s): an executable
-# `NAME` in bin/tests. Each of its cases is a ctest test; with VOXELD_WHOLE_TESTS all of them together are one, or SHARDS (1), which
+# voxeld_test(NAME [SINGLE_THREADED] [HEAVY] [DEEP] [FULL_ASAN] LABELS … SOURCES … LINK … LONG … ONE_THREAD … FULL_ASAN_CASES … SHARDS n
+# TIMEOUT s COST s): an executable `NAME` in bin/tests. Each of its cases is a ctest test; with VOXELD_WHOLE_TESTS all of them together are one, or SHARDS (1), which
 # may run at once.
 #   COST             how many seconds it takes, if that is long: such tests start first
 #   LABELS           host (default), gpu (needs one; named gpu.…), hil, e2e (not where VOXELD_E2E_TESTS is off)
 #   HEAVY            its own code computes much, and is optimised under a sanitizer as well
 #   DEEP             all of it runs in the deep tier
 #   LONG             patterns of cases that run in the deep tier (as the test NAME.long), and not where VOXELD_LONG_TESTS is off
+#   FULL_ASAN        AddressSanitizer runs it in the full tier only: it takes long there, and tests code that reads no untrusted input
+#   FULL_ASAN_CASES  patterns of such cases
 #   SINGLE_THREADED  neither it nor what it tests has threads: left out of ThreadSanitizer's build
 #   ONE_THREAD       patterns of cases that have no threads: left out under ThreadSanitizer
 function(voxeld_test name)
-  cmake_parse_arguments(ARG "SINGLE_THREADED;HEAVY;DEEP" "TIMEOUT;SHARDS;COST" "SOURCES;LINK;LABELS;LONG;ONE_THREAD" ${ARGN})
+  cmake_parse_arguments(ARG "SINGLE_THREADED;HEAVY;DEEP;FULL_ASAN" "TIMEOUT;SHARDS;COST" "SOURCES;LINK;LABELS;LONG;ONE_THREAD;FULL_ASAN_CASES" ${ARGN})
   if(ARG_SINGLE_THREADED AND VOXELD_SANITIZE STREQUAL "thread")
     return()
   endif()
@@ -242,7 +257,7 @@ function(voxeld_test name)
   target_link_libraries(${name} PRIVATE ${ARG_LINK})
   voxeld_test_options(${name})
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin/tests)
-  if(NOT VOXELD_E2E_TESTS AND "e2e" IN_LIST ARG_LABELS)
+  if((NOT VOXELD_E2E_TESTS AND "e2e" IN_LIST ARG_LABELS) OR (ARG_FULL_ASAN AND VOXELD_SHORT_ASAN))
     set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
     return()
   endif()
@@ -250,16 +265,18 @@ function(voxeld_test name)
   if("gpu" IN_LIST ARG_LABELS)
     set(prefix "gpu.${name}.")
   endif()
-  set(one_thread "")
+  set(skipped "")
   if(VOXELD_SANITIZE STREQUAL "thread")
-    set(one_thread ${ARG_ONE_THREAD})
+    set(skipped ${ARG_ONE_THREAD})
+  elseif(VOXELD_SHORT_ASAN)
+    set(skipped ${ARG_FULL_ASAN_CASES})
   endif()
   if(VOXELD_WHOLE_TESTS)
     string(REGEX REPLACE "\\.$" "" whole ${prefix})
-    voxeld_whole_test(${whole} ${name} "${ARG_LABELS}" "*" "${ARG_LONG};${one_thread}" ${ARG_TIMEOUT} ${ARG_COST} ${ARG_SHARDS} ${ARG_DEEP})
+    voxeld_whole_test(${whole} ${name} "${ARG_LABELS}" "*" "${ARG_LONG};${skipped}" ${ARG_TIMEOUT} ${ARG_COST} ${ARG_SHARDS} ${ARG_DEEP})
     if(ARG_LONG AND VOXELD_LONG_TESTS)
       list(JOIN ARG_LONG ":" long)
-      voxeld_whole_test(${whole}.long ${name} "${ARG_LABELS}" "${long}" "${one_thread}" ${ARG_TIMEOUT} ${ARG_COST} ${ARG_SHARDS} ON)
+      voxeld_whole_test(${whole}.long ${name} "${ARG_LABELS}" "${long}" "${skipped}" ${ARG_TIMEOUT} ${ARG_COST} ${ARG_SHARDS} ON)
     endif()
     # The default tier's build does without programs that only the deep tier runs.
     if(ARG_DEEP AND VOXELD_QUICK)
@@ -268,7 +285,7 @@ function(voxeld_test name)
     endif()
     return()
   endif()
-  set(without ${one_thread})
+  set(without ${skipped})
   if(NOT VOXELD_LONG_TESTS)
     list(APPEND without ${ARG_LONG})
   endif()
