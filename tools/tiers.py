@@ -7,8 +7,10 @@ The tier follows from the labels: `deep` and `package` run in tools/test --deep,
 
 import argparse
 import json
+import os
 import subprocess
 import sys
+import tempfile
 
 
 def main():
@@ -16,8 +18,12 @@ def main():
     parser.add_argument("build")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
-    listed = subprocess.run(["ctest", "--test-dir", arguments.build, "--show-only=json-v1"], capture_output=True, text=True, check=False)
-    if listed.returncode != 0:
+    # In a folder of its own, since ctest empties the log of a build whose tests it lists, also while they run.
+    with tempfile.TemporaryDirectory() as folder:
+        with open(os.path.join(folder, "CTestTestfile.cmake"), "w", encoding="utf-8") as file:
+            file.write(f'subdirs("{os.path.abspath(arguments.build)}")\n')
+        listed = subprocess.run(["ctest", "--test-dir", folder, "--show-only=json-v1"], capture_output=True, text=True, check=False)
+    if listed.returncode != 0 or not json.loads(listed.stdout)["tests"]:
         print(f"tools/test: {arguments.build} is not configured; run: tools/setup --test && cmake --preset test", file=sys.stderr)
         return 1
     rows = []

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""That tests/tiers.tsv names every test of this build, with the tier in which tools/test runs it, and each name once."""
+"""That tests/tiers.tsv names the tests of this build and no others, with the tier in which tools/test runs each, and each name once."""
 
 import json
 import os
@@ -36,6 +36,20 @@ class TiersTest(unittest.TestCase):
             elif not any(part.startswith(test["tier"] + ":") for part in tier.split(", ")):
                 wrong.append(f"{name} is listed as {tier!r}, and runs in the tier {test['tier']}")
         self.assertEqual(wrong, [])
+
+    def test_no_listed_test_is_missing(self):
+        listed = subprocess.run([sys.executable, "-B", os.path.join(ROOT, "tools", "tiers.py"), BUILD, "--json"],
+                                capture_output=True, text=True, check=True)
+        names = {test["test"] for test in json.loads(listed.stdout)}
+        with open(os.path.join(BUILD, "CMakeCache.txt"), encoding="utf-8") as file:
+            cache = file.read()
+        # Of what a machine may lack: tests that need a GPU, and parts whose libraries are not installed.
+        absent = ["gpu.", "cuda_"]
+        if "ROSCPP_FOUND:INTERNAL=1" not in cache:
+            absent += ["e2e.ros", "ros_"]
+        missing = [row[0] for row in rows()
+                   if row[2].startswith(("default: test", "deep: long")) and row[0] not in names and not row[0].startswith(tuple(absent))]
+        self.assertEqual(missing, [])
 
 
 if __name__ == "__main__":
