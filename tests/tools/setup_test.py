@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""tools/setup, tools/jobs and tools/demo with faked commands: what they install, and what they say where something is missing.
+"""tools/setup, tools/jobs, tools/demo and .ci/run with faked commands: what they install, and what they say where something is missing.
 
 Runs without root, network, packages or compiler: PATH is one folder of stubs and of links to the ordinary tools.
 
@@ -19,7 +19,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 ORDINARY = ("awk basename bash cat chmod cp cut date dirname env find grep head id kill ln ls mkdir mktemp mv nproc paste printf rm sed seq sh sleep "
-            "sort tail tar touch tr uname wc").split()
+            "sort tail tar timeout touch tr uname wc").split()
 MODULES = ["world-atlas", "three", "uplot", "esbuild"]  # of the default tier
 
 # What apt-get prints of its plan, as Debian 12's does.
@@ -333,6 +333,38 @@ class Jobs(Sandbox):
         self.assertEqual(self.jobs(4, 1_800_000), 1)
         self.assertEqual(self.jobs(4, 300_000), 1)
         self.assertEqual(self.jobs(8, 24_000_000, limit=str(3_200_000_000)), 2)
+
+
+class ContinuousIntegration(Sandbox):
+    """.ci/run over a tools/test that fails for the stages in `failing`. `seconds`: how long it has run already."""
+
+    def ci(self, failing: str = "", seconds: int = 0) -> "tuple[int, dict[str, str]]":
+        (self.clone / ".ci").mkdir(exist_ok=True)
+        shutil.copy(ROOT / ".ci/run", self.clone / ".ci/run")
+        test = self.clone / "tools/test"
+        test.write_text('#!/bin/bash\nstage=test\n[ "${1:-}" != --stage ] || stage=$2\ncase " $FAILING " in *" $stage "*) exit 1 ;; esac\n')
+        test.chmod(0o755)
+        done = subprocess.run([str(self.clone / ".ci/run")], env={**self.environment, "FAILING": failing, "SECONDS": str(seconds)},
+                              capture_output=True, text=True, timeout=60, check=False)
+        table = done.stdout.split("stage      result\n")[1].splitlines()
+        return done.returncode, {line[:10].strip(): line[11:] for line in table}
+
+    def test_runs_all_stages(self) -> None:
+        self.assertEqual(self.ci(), (0, dict.fromkeys(("test", "check", "tsan", "asan", "long", "hil"), "passed")))
+
+    def test_goes_on_after_a_failure(self) -> None:
+        status, table = self.ci("test asan")
+        self.assertEqual(status, 1)
+        self.assertEqual((table["test"], table["check"], table["asan"], table["hil"]), ("FAILED", "passed", "FAILED", "passed"))
+
+    def test_a_sanitizer_that_does_not_fit_fails_and_the_virtual_machine_may_be_left_out(self) -> None:
+        # The default tests took an hour, so each stage is expected to take three times as long, and 28 minutes are left.
+        status, table = self.ci(seconds=60 * 60)
+        self.assertEqual(status, 1)
+        self.assertIn("NOT RUN: it needs about 84 minutes, and 28 are left", table["asan"])
+        status, table = self.ci(seconds=33 * 60)
+        self.assertEqual(status, 0, table)
+        self.assertEqual(table["asan"], "passed")
 
 
 class Demo(Sandbox):
