@@ -90,6 +90,10 @@ if(VOXELD_HARDENING AND NOT VOXELD_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL "
   target_compile_options(voxeld_warnings INTERFACE -Wno-error=array-bounds -Wno-error=maybe-uninitialized -Wno-error=nonnull -Wno-error=restrict
                                                    -Wno-error=stringop-overflow -Wno-error=stringop-overread)
 endif()
+if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+  # Checks the lock annotations (display/sync/mutex.h).
+  target_compile_options(voxeld_warnings INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Wthread-safety>)
+endif()
 if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # A unity build includes the sources, so GCC would warn about types that use their anonymous namespaces.
   target_compile_options(voxeld_warnings INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Wno-subobject-linkage>)

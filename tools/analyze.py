@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Runs clang-16's analyses, or GCC, over translation units, as many at once as there are cores.
+"""Runs clang-16's analyses, or GCC, over translation units, as many at once as tools/jobs says.
 
-usage: analyze.py syntax|gcc|thread-safety|tidy BUILD_DIR FILE...
-Exit 1 if any finding; each is printed once. `syntax` (Clang) and `gcc` compile without writing anything, and pass over files that the
-build does not compile.
+usage: analyze.py syntax|gcc|tidy BUILD_DIR FILE...
+Exit 1 if any finding; each is printed once. `syntax` (Clang, with its analysis of lock annotations) and `gcc` compile without writing
+anything. Sources that are only built with CUDA are passed over.
 """
 
 import concurrent.futures
@@ -31,14 +31,14 @@ def analysis_command(mode, build_dir, path, entry):
     arguments.remove("-c")
     if mode == "gcc":
         arguments = ["g++", *(argument for argument in arguments[1:] if not argument.startswith("-Wthread-safety"))]
-    warnings = ["-Wthread-safety", "-Werror=thread-safety"] if mode == "thread-safety" else []
+    warnings = ["-Wthread-safety", "-Werror=thread-safety"] if mode == "syntax" else []
     return arguments + ["-fsyntax-only", "-w", *warnings]
 
 
 def run(mode, build_dir, path, commands):
     entry = commands.get(os.path.realpath(path))
     if entry is None:
-        return f"{path}: not part of the build\n" if mode == "tidy" and not optional(path) else ""
+        return "" if optional(path) else f"{path}: not part of the build\n"
     done = subprocess.run(
         analysis_command(mode, build_dir, path, entry),
         cwd=None if mode == "tidy" else entry["directory"],
@@ -50,18 +50,23 @@ def run(mode, build_dir, path, commands):
 
 
 def optional(path):
-    """CUDA sources and sources of switched-off parts are built elsewhere."""
+    """CUDA sources and sources of switched-off parts are built elsewhere, some tests only where there is a GPU."""
     return path.startswith(("gpu/cuda/", "gpu/worker/")) or re.match(r"tools/bench/(frame|paper)/(no_)?cuda_", path)
 
 
+def jobs():
+    here = os.path.dirname(os.path.abspath(__file__))
+    return int(subprocess.run([os.path.join(here, "jobs")], capture_output=True, text=True, check=True).stdout)
+
+
 def main():
-    if len(sys.argv) < 3 or sys.argv[1] not in ("syntax", "gcc", "thread-safety", "tidy"):
+    if len(sys.argv) < 3 or sys.argv[1] not in ("syntax", "gcc", "tidy"):
         print(__doc__, file=sys.stderr)
         return 2
     mode, build_dir, paths = sys.argv[1], sys.argv[2], sys.argv[3:]
     commands = compile_commands(build_dir)
     found = False
-    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+    with concurrent.futures.ThreadPoolExecutor(jobs()) as pool:
         for output in pool.map(lambda path: run(mode, build_dir, path, commands), paths):
             if output:
                 found = True
