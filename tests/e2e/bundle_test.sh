@@ -1,13 +1,18 @@
 #!/usr/bin/env bash
-# Packs the build and runs it with an empty library path: everything but glibc must come from the bundle.
+# Runs the bundle with an empty library path: everything but glibc must come from it. Packs it from the build, or takes it from the folder
+# VOXELD_DIST, where tools/package wrote it.
 # usage: bundle_test.sh SOURCE BUILD
 set -euo pipefail
 source=$1
 build=$2
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-"$source/tools/bundle" --no-build --build "$build" --out "$work/packed" >"$work/said"
-archive=$(tail -n 1 "$work/said")
+if [ -n "${VOXELD_DIST:-}" ]; then
+  archive=$(echo "$VOXELD_DIST"/voxeld-*-linux-*.tar.xz)
+else
+  "$source/tools/bundle" --no-build --build "$build" --out "$work/packed" >"$work/said"
+  archive=$(tail -n 1 "$work/said")
+fi
 mkdir "$work/bundle"
 tar -C "$work/bundle" -xJf "$archive"
 

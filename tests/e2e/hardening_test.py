@@ -80,7 +80,7 @@ class Compiled(unittest.TestCase):
         for one in commands:
             output = one.get("output") or re.search(r" -o (\S+)", one["command"])[1]  # type: ignore[index]
             path = os.path.relpath(os.path.join(one["directory"], output), BUILD)
-            if not path.startswith(("daemon/", "display/", "gpu/", "tools/", "client/", "proto/")) or ".cu." in path:
+            if not path.startswith(("common/", "daemon/", "display/", "gpu/", "tools/", "client/", "proto/")) or ".cu." in path:
                 continue
             words = one["command"].split()
             if "-O0" in words and "/headers/" in one["file"]:
@@ -91,6 +91,7 @@ class Compiled(unittest.TestCase):
             seen.add(target)
             with self.subTest(path):
                 self.assertEqual(without, set(LEFT_OUT.get(target, [])))
+                self.assertEqual([word for word in words if re.fullmatch(r"-O\w*", word)][-1], "-O3")
         self.assertLessEqual({"voxeld", "voxelctl", "voxeld-engine", "voxeld_gpu", "voxeld_wire", "voxeld_proto"} | set(LEFT_OUT), seen)
 
 

@@ -3,6 +3,7 @@
 # the development files, a C++ client as well. Then removes the packages. What it writes is thrown away.
 # usage: installed_test.sh PACKAGES WHEEL SOURCE CACHE
 #   PACKAGES  the folder of the .deb files; CACHE a folder that may be kept between calls
+# VOXELD_DIST=FOLDER: the packages and the wheel are those of this folder, as tools/package wrote it, and its checksums are checked.
 # The root is Debian as debootstrap installs it, kept in CACHE with the packages that voxeld depends on. Without debootstrap or a network it is
 # this system's own /usr, /etc and /var, without /usr/local. VOXELD_CLEAN_ROOT=FOLDER names another (/: this system's). Needs root, and a
 # kernel with overlayfs. Exit status 77: it cannot be tried here.
@@ -12,6 +13,15 @@ fail() { echo "installed_test: $*" >&2; exit 1; }
 step() { echo "== $*"; }
 [ $# = 4 ] || fail "usage: installed_test.sh PACKAGES WHEEL SOURCE CACHE"
 packages=$(realpath "$1") wheel=$(realpath "$2") source=$(realpath "$3") cache=$4
+if [ -n "${VOXELD_DIST:-}" ]; then
+  packages=$(realpath "$VOXELD_DIST")
+  for kind in 'voxeld_*.deb' 'libvoxeld-dev_*.deb' 'voxeld-*.whl' 'voxeld-*-linux-*.tar.xz' voxeld.spdx.json NOTICES; do
+    [ "$(cd "$packages" && compgen -G "$kind" | wc -l)" = 1 ] || fail "tools/package wrote no $kind, or several, to $packages"
+    grep -q "  $(cd "$packages" && compgen -G "$kind")\$" "$packages/SHA256SUMS" || fail "SHA256SUMS lacks $kind"
+  done
+  (cd "$packages" && sha256sum --quiet --strict --check SHA256SUMS) || fail "a checksum is wrong"
+  wheel=$(echo "$packages"/voxeld-*.whl)
+fi
 ls "$packages"/voxeld_*.deb >/dev/null 2>&1 || fail "there is no package voxeld in $packages"
 [ -f "$wheel" ] || fail "there is no wheel $wheel"
 [ "$(id -u)" = 0 ] || skip "only root can change its root folder"
