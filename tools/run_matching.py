@@ -87,7 +87,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("build")
     parser.add_argument("pattern")
-    parser.add_argument("--jobs", default=str(os.cpu_count()))
+    parser.add_argument("--jobs", default="1")
     arguments = parser.parse_args()
     try:
         pattern = re.compile(arguments.pattern)
