@@ -31,8 +31,9 @@ def analysis_command(mode, build_dir, path, entry):
     arguments.remove("-c")
     if mode == "gcc":
         arguments = ["g++", *(argument for argument in arguments[1:] if not argument.startswith("-Wthread-safety"))]
-    warnings = ["-Wthread-safety", "-Werror=thread-safety"] if mode == "syntax" else []
-    return arguments + ["-fsyntax-only", "-w", *warnings]
+        return arguments + ["-fsyntax-only", "-w"]
+    # With -w, Clang would not warn of anything.
+    return arguments + ["-fsyntax-only", "-Wno-everything", "-Wthread-safety", "-Werror=thread-safety"]
 
 
 def run(mode, build_dir, path, commands):

@@ -144,7 +144,10 @@ class TcpLink final : public Link {
       return Failed(to_, "eventfd", error);
     }
     connected_ = false;
-    ends_ = false;
+    {
+      sync::MutexLock lock(mutex_);
+      ends_ = false;
+    }
     Watch(true);
     thread_ = std::thread([this] { Run(); });
     return absl::OkStatus();
