@@ -240,7 +240,7 @@ void Genlock::Order(sync::TimeNs not_before) {
   const State& leads = *std::find_if(members_.begin(), members_.end(), in);
   period_ = leads.period;
   sync::TimeNs first = 0, last = 0;
-  const auto place = [&](sync::TimeNs leader_at) {
+  const auto place = [&](sync::TimeNs leader_at) VOXELD_REQUIRES(mutex_) {
     first = last = leader_at;
     for (State& member : members_) {
       if (!in(member)) continue;

@@ -34,6 +34,10 @@ struct BulkPool::State : std::enable_shared_from_this<State> {
   void GiveBack(const BulkBlock::Extent& extent);
   // Lets segments go in which nothing is used, until at most `most` of their bytes are left.
   void Trim(uint64_t most, Released* released) VOXELD_REQUIRES(mutex);
+  // Bytes that further segments may have.
+  uint64_t Left() const VOXELD_REQUIRES(mutex) {
+    return options.limit_bytes - std::min(held, options.limit_bytes);
+  }
   void AddFree(Room& room, size_t offset, size_t size) VOXELD_REQUIRES(mutex);
   void EraseFree(Room& room, std::map<size_t, size_t>::iterator at) VOXELD_REQUIRES(mutex);
 
@@ -92,14 +96,13 @@ void BulkPool::State::Trim(uint64_t most, Released* released) {
 }
 
 absl::Status BulkPool::State::AddRoom(size_t size, Released* released) {
-  const auto left = [this] { return options.limit_bytes - std::min(held, options.limit_bytes); };
-  if (left() < std::max<uint64_t>(size, options.segment_bytes)) Trim(0, released);
-  if (left() < size) {
+  if (Left() < std::max<uint64_t>(size, options.segment_bytes)) Trim(0, released);
+  if (Left() < size) {
     return absl::ResourceExhaustedError(absl::StrCat(
         "bulk memory: ", size, " bytes asked for, ", used, " used, ", held,
         " held in segments, limit ", options.limit_bytes, "; send less or raise the limit"));
   }
-  const uint64_t most = left() / kAlign * kAlign;
+  const uint64_t most = Left() / kAlign * kAlign;
   const size_t make = std::max<size_t>(size, std::min<uint64_t>(options.segment_bytes, most));
   absl::StatusOr<std::shared_ptr<Segment>> memory =
       options.shared ? Segment::CreateReadOnlyForOthers(make) : Segment::CreatePrivate(make);
