@@ -43,7 +43,7 @@ class TiersTest(unittest.TestCase):
         names = {test["test"] for test in json.loads(listed.stdout)}
         with open(os.path.join(BUILD, "CMakeCache.txt"), encoding="utf-8") as file:
             cache = file.read()
-        # Of what a machine may lack: tests that need a GPU, and parts whose libraries are not installed.
+        # A machine may have no GPU, and may lack the libraries of optional parts.
         absent = ["gpu.", "cuda_"]
         if "ROSCPP_FOUND:INTERNAL=1" not in cache:
             absent += ["e2e.ros", "ros_"]
