@@ -51,8 +51,9 @@ def run(mode, build_dir, path, commands):
 
 
 def optional(path):
-    """CUDA sources and sources of switched-off parts are built elsewhere, some tests only where there is a GPU."""
-    return path.startswith(("gpu/cuda/", "gpu/worker/")) or re.match(r"tools/bench/(frame|paper)/(no_)?cuda_", path)
+    """CUDA sources, sources of switched-off parts and some tests' main files are built elsewhere, some only where there is a GPU."""
+    return path.startswith(("gpu/cuda/", "gpu/worker/")) or re.match(
+        r"tools/bench/(frame|paper)/(no_)?cuda_|tests/.*cuda|tests/gpu/simt/engines_simt\.cc|tests/fuzz/packed_main\.cc", path)
 
 
 def jobs():
