@@ -432,9 +432,13 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   const absl::Status stopped = core.Stop(stop_by - clock.Now());
   if (kept != nullptr) kept->Stop();
   http->reset();
-  if (!stopped.ok()) log.Error("not all ended", {{"why", std::string(stopped.message())}});
+  if (!stopped.ok()) {
+    log.Error("not all ended", {{"why", std::string(stopped.message())}});
+    // A display's thread still uses what the destructors would take away.
+    _exit(1);
+  }
   log.Info("stopped");
-  return stopped.ok() ? 0 : 1;
+  return 0;
 }
 
 int Main(int argc, char** argv) {
