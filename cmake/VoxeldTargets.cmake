@@ -168,8 +168,8 @@ function(voxeld_build_tests_only)
   endforeach()
 endfunction()
 
-# voxeld_exclude_from_unity(SOURCE …): excludes these sources from unity builds (CMAKE_UNITY_BUILD), because their file-local names conflict with
-# those of other sources.
+# voxeld_exclude_from_unity(SOURCE …): excludes these sources from unity builds (CMAKE_UNITY_BUILD), because their file-local names
+# conflict with those of other sources.
 function(voxeld_exclude_from_unity)
   set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
@@ -229,15 +229,15 @@ function(voxeld_deep)
 endfunction()
 
 # voxeld_test(NAME [SINGLE_THREADED] [HEAVY] [DEEP] [FULL_ASAN] LABELS … SOURCES … LINK … LONG … ONE_THREAD … FULL_ASAN_CASES … SHARDS n
-# TIMEOUT s COST s): an executable `NAME` in bin/tests. Each of its cases is a ctest test; with VOXELD_WHOLE_TESTS all of them together are one, or SHARDS (1), which
-# may run at once.
+# TIMEOUT s COST s): an executable `NAME` in bin/tests. Each of its cases is a ctest test. With VOXELD_WHOLE_TESTS, all of them together are
+# one test, or SHARDS (1) tests, which may run in parallel.
 #   COST             how many seconds it takes, if that is long: such tests start first
 #   LABELS           host (default), gpu (needs one; named gpu.…), hil, e2e (not where VOXELD_E2E_TESTS is off)
 #   HEAVY            its own code computes much, and is optimised under a sanitizer as well
 #   DEEP             all of it runs in the deep tier
 #   LONG             patterns of cases that run in the deep tier (as the test NAME.long), and not where VOXELD_LONG_TESTS is off
-#   FULL_ASAN        AddressSanitizer runs it in the full tier only: it takes long there, and tests code that reads no untrusted input
-#   FULL_ASAN_CASES  patterns of such cases
+#   FULL_ASAN        AddressSanitizer runs it in the full tier only: it takes long there and reads no untrusted input
+#   FULL_ASAN_CASES  patterns of cases that take long there
 #   SINGLE_THREADED  neither it nor what it tests has threads: left out of ThreadSanitizer's build
 #   ONE_THREAD       patterns of cases that have no threads: left out under ThreadSanitizer
 function(voxeld_test name)

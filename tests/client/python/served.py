@@ -53,7 +53,7 @@ class Served:
                 context.abort(grpc.StatusCode.NOT_FOUND, "no such session")
             except TooLarge:
                 context.abort(grpc.StatusCode.RESOURCE_EXHAUSTED, "the message is too large")
-            # A ping that used up the credit is answered: what was to be held up would otherwise never come.
+            # A ping that used up the credit is still answered. Otherwise the client never sends what the test wants to hold up.
             is_ping = pb.StreamRequest.FromString(message).HasField("ping")
             if self.plain.window and self.plain.received >= self.plain.credit and not is_ping:
                 self.credit.wait(LONG)
