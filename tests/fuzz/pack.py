@@ -84,8 +84,8 @@ def pack(targets, build, folder, commit):
     for target in targets:
         shutil.copytree(target.corpus, folder / "corpus" / target.name)
         chosen = [f"-max_len={target.max_len}"]
-        if target.dict:
-            shutil.copy(target.dict, folder / "dict")
+        if target.words:
+            (folder / "dict" / target.dict.name).write_text(target.words)
             chosen.append(f"-dict=dict/{target.dict.name}")
         (folder / "options" / target.name).write_text("\n".join(chosen) + "\n")
     (folder / "COMMIT").write_text(commit + "\n")
