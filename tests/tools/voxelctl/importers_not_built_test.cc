@@ -1,4 +1,4 @@
-// A build without VOXELD_IMPORTERS names the option that adds a format, and reads the formats that every build reads.
+// A build without VOXELD_IMPORTERS names the command that adds a format, and reads the formats that every build reads.
 #include <gtest/gtest.h>
 
 #include "tests/tools/voxelctl/status_matchers.h"
@@ -9,17 +9,21 @@
 namespace voxeld::voxelctl {
 namespace {
 
-TEST(ImportersNotBuilt, AFormatThatTheyAddIsAnsweredWithTheOption) {
-  EXPECT_THAT(ImportFile(DataFile("arrow.obj"), {}),
-              Fails(Words{"arrow.obj: this build reads ",
-                          "configure with -DVOXELD_IMPORTERS=ON for .obj"}));
-  EXPECT_THAT(ImportFile(DataFile("house.ifc"), {}), Fails(Words{"ON for .ifc"}));
+TEST(ImportersNotBuilt, AFormatThatTheyAddIsAnsweredWithTheCommand) {
+  EXPECT_THAT(
+      ImportFile(DataFile("arrow.obj"), {}),
+      Fails(Words{
+          "arrow.obj: this build reads ",
+          "; to add .obj, run in the source tree: tools/setup --import && cmake --preset demo "
+          "-DVOXELD_IMPORTERS=ON && cmake --build --preset demo -j $(tools/jobs)"}));
+  EXPECT_THAT(ImportFile(DataFile("house.ifc"), {}), Fails(Words{"to add .ifc, run"}));
 }
 
-TEST(ImportersNotBuilt, AFolderAndAnAnimationAreAnsweredWithTheOption) {
+TEST(ImportersNotBuilt, AFolderAndAnAnimationAreAnsweredWithTheCommand) {
   TempFolder folder;
-  EXPECT_THAT(ImportFile(folder.Path("."), {}), Fails(Words{"ON for folders of DICOM slices"}));
-  EXPECT_THAT(OpenAnimation(DataFile("arrow.obj"), 1, 20), Fails(Words{"ON for --animate"}));
+  EXPECT_THAT(ImportFile(folder.Path("."), {}),
+              Fails(Words{"to add folders of DICOM slices, run"}));
+  EXPECT_THAT(OpenAnimation(DataFile("arrow.obj"), 1, 20), Fails(Words{"to add --animate, run"}));
 }
 
 TEST(ImportersNotBuilt, AnUnknownExtensionIsNotSaidToBeAdded) {

@@ -16,7 +16,7 @@ using testing::HasSubstr;
 
 class PartsTest : public CommandsTest {};
 
-TEST_F(PartsTest, ACommandThatIsNotBuiltNamesItsOptionInOneLine) {
+TEST_F(PartsTest, ACommandThatIsNotBuiltNamesWhatAddsItInOneLine) {
   for (const char* line :
        {"VOXELD_RECORDING record a.mcap", "VOXELD_RECORDING replay a.mcap",
         "VOXELD_RECORDING playlist a.toml", "VOXELD_LIGHTS input opc",
@@ -28,7 +28,9 @@ TEST_F(PartsTest, ACommandThatIsNotBuiltNamesItsOptionInOneLine) {
     const Result result = RunAnywhere(arguments);
     EXPECT_EQ(result.code, 1) << line;
     EXPECT_THAT(result.err, HasSubstr("this build ")) << line;
-    EXPECT_THAT(result.err, HasSubstr(absl::StrCat("; configure with -D", words[0], "=ON")));
+    EXPECT_THAT(result.err,
+                HasSubstr(absl::StrCat(", run in the source tree: cmake --preset demo -D", words[0],
+                                       "=ON && cmake --build --preset demo -j $(tools/jobs)")));
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
     EXPECT_EQ(result.out, "") << line;
   }

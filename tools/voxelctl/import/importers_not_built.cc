@@ -12,8 +12,8 @@ namespace voxeld::voxelctl {
 namespace {
 
 absl::Status NoImporter(absl::string_view path, absl::string_view wanted) {
-  return NotBuilt(path, "reads STL, PLY, VOX, GeoJSON, TopoJSON and text clouds",
-                  "VOXELD_IMPORTERS", wanted);
+  return NotBuilt(path, "reads STL, PLY, VOX, GeoJSON, TopoJSON and text clouds", wanted,
+                  "VOXELD_IMPORTERS");
 }
 
 // The extensions that docs/files.md names.
@@ -25,7 +25,7 @@ constexpr absl::string_view kMoreFormats[] = {
 }  // namespace
 
 absl::Status CheckImporters(absl::string_view subject) {
-  return NotBuilt(subject, "has no file importers", "VOXELD_IMPORTERS");
+  return NotBuilt(subject, "has no file importers", "them", "VOXELD_IMPORTERS");
 }
 
 absl::StatusOr<Model> ReadMoreFormats(const SourceFile& file, const ImportOptions&) {
@@ -40,8 +40,8 @@ absl::StatusOr<Model> ReadMoreFormats(const SourceFile& file, const ImportOption
           ? "its name has no extension"
           : absl::StrCat("files of type .", EscapeForTerminal(extension), " are not read"),
       "this build reads meshes and points (.stl, .ply), voxels (.vox), points as text (.xyz, "
-      ".txt, .asc, .pts, .csv) and maps (.geojson, .topojson, .json); -DVOXELD_IMPORTERS=ON adds "
-      "more formats");
+      ".txt, .asc, .pts, .csv) and maps (.geojson, .topojson, .json); a build with "
+      "-DVOXELD_IMPORTERS=ON reads more formats");
 }
 
 absl::StatusOr<Model> ReadFolder(const std::string& path) {

@@ -5,11 +5,11 @@
 namespace voxeld::voxelctl {
 
 absl::Status Input(const InputOptions&, const Connector&, Interrupt&, Console&) {
-  return NotBuilt("input", "has no LED inputs", "VOXELD_LIGHTS");
+  return NotBuilt("input", "has no LED inputs", "them", "VOXELD_LIGHTS");
 }
 
 absl::Status Pipe(const PipeOptions&, const Connector&, Interrupt&, int, Console&) {
-  return NotBuilt("pipe", "has no LED inputs", "VOXELD_LIGHTS");
+  return NotBuilt("pipe", "has no LED inputs", "them", "VOXELD_LIGHTS");
 }
 
 }  // namespace voxeld::voxelctl

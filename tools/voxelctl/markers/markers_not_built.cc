@@ -5,7 +5,7 @@
 namespace voxeld::voxelctl {
 
 absl::Status FollowMarkers(const MarkersOptions&, const Connector&, Interrupt&, Console&) {
-  return NotBuilt("markers", "has no markers", "VOXELD_MARKERS");
+  return NotBuilt("markers", "has no marker client", "it", "VOXELD_MARKERS");
 }
 
 }  // namespace voxeld::voxelctl

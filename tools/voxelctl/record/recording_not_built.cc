@@ -7,7 +7,7 @@ namespace voxeld::voxelctl {
 namespace {
 
 absl::Status NoRecording(absl::string_view command) {
-  return NotBuilt(command, "has no recording", "VOXELD_RECORDING");
+  return NotBuilt(command, "has no recording", "it", "VOXELD_RECORDING");
 }
 
 }  // namespace

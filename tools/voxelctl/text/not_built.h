@@ -6,8 +6,9 @@
 
 namespace voxeld::voxelctl {
 
-// Returns: Unimplemented "SUBJECT: this build STATE; configure with -DOPTION=ON[ for WANTED]".
-absl::Status NotBuilt(absl::string_view subject, absl::string_view state, absl::string_view option,
-                      absl::string_view wanted = "");
+// Returns: Unimplemented "SUBJECT: this build STATE; to add PART, run in the source tree: COMMANDS", where the commands install what
+// OPTION needs, configure with it and build.
+absl::Status NotBuilt(absl::string_view subject, absl::string_view state, absl::string_view part,
+                      absl::string_view option);
 
 }  // namespace voxeld::voxelctl
