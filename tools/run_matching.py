@@ -38,6 +38,11 @@ def tests_of(build):
     return tests
 
 
+def is_deep(test):
+    """Whether the test needs what only tools/setup --dev installs."""
+    return any(entry["name"] == "LABELS" and "deep" in entry["value"] for entry in test.get("properties", []))
+
+
 def exactly(tests):
     """Returns: a ctest regular expression that matches exactly these tests; ctest's syntax differs from Python's."""
     return "^(" + "|".join(re.sub(r"([^A-Za-z0-9_])", r"[\1]", test["name"]) for test in tests) + ")$"
@@ -100,6 +105,10 @@ def main():
 
     tests = [test for test in tests_of(arguments.build) if pattern.search(test["name"])]
     if tests:
+        if any(is_deep(test) for test in tests):
+            here = os.path.dirname(os.path.abspath(__file__))
+            if subprocess.run([os.path.join(here, "setup"), "--dev"], check=False).returncode != 0:
+                return 1
         targets = targets_of(arguments.build, tests)
         if targets and make(targets) != 0:
             return 1

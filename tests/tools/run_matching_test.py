@@ -25,6 +25,7 @@ add_executable(host two.cc)
 add_executable(guest two.cc)
 add_test(NAME one_test COMMAND one_test --gtest_filter=*)
 add_test(NAME host.runs_guest COMMAND host $<TARGET_FILE:guest>)
+set_tests_properties(host.runs_guest PROPERTIES LABELS deep)
 """
 
 
@@ -55,6 +56,10 @@ class RunMatchingTest(unittest.TestCase):
         self.assertEqual(run_matching.programs_with(self.build, re.compile("Lamp")),
                          {"one_test": {"Lamp.Lights", "LampTest.GoesOut"}})
         self.assertEqual(run_matching.programs_with(self.build, re.compile("Candle")), {})
+
+    def test_packages_of_the_deep_tier_are_known_to_be_needed(self):
+        tests = run_matching.tests_of(self.build)
+        self.assertEqual([test["name"] for test in tests if run_matching.is_deep(test)], ["host.runs_guest"])
 
 
 if __name__ == "__main__":
