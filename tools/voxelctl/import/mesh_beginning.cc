@@ -6,7 +6,9 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
 #include "absl/strings/string_view.h"
 #include "tools/voxelctl/import/nesting.h"
 
@@ -38,6 +40,29 @@ int NestingOf(const SourceFile& file) {
       BracketDepth(text, '"'));
 }
 
+// The library makes room for as many vertices and faces as an OFF file claims before it reads one.
+absl::Status CheckOffCounts(const SourceFile& file) {
+  uint64_t counts[2] = {};  // vertices, faces
+  size_t found = 0;
+  for (absl::string_view line : absl::StrSplit(file.bytes, '\n')) {
+    line = line.substr(0, line.find('#'));
+    for (const absl::string_view word : absl::StrSplit(line, absl::ByAnyChar(" \t\r"))) {
+      // What is no number is the keyword, such as OFF or COFF.
+      if (found < 2 && absl::SimpleAtoi(word, &counts[found])) ++found;
+    }
+    if (found == 2) break;
+  }
+  // "0 0 0" is the shortest vertex, "1 0" the shortest face, each with the end of its line.
+  const uint64_t bytes = file.bytes.size();
+  if (counts[0] > bytes / 6 || counts[1] > bytes / 4) {
+    return FileError(file,
+                     absl::StrCat("claims ", counts[0], " vertices and ", counts[1],
+                                  " faces, for which its ", bytes, " bytes are too few"),
+                     "the file is truncated or damaged");
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::Status CheckMeshBeginning(const SourceFile& file) {
@@ -62,6 +87,9 @@ absl::Status CheckMeshBeginning(const SourceFile& file) {
     for (const absl::string_view front : b.at_front) good |= absl::StartsWith(head, front);
     if (!good)
       return FileError(file, absl::StrCat("is ", DescribeContents(file.bytes)), b.expected);
+  }
+  if (file.extension == "off") {
+    if (absl::Status status = CheckOffCounts(file); !status.ok()) return status;
   }
   if (const int depth = NestingOf(file); depth > kMostNesting) {
     return FileError(file, absl::StrCat("is nested ", depth, " levels deep"),
