@@ -2,11 +2,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <string>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "gpu/implicit/parse.h"
+#include "tests/small_stack.h"
 
 namespace voxeld::gpu::implicit {
 namespace {
@@ -168,6 +170,66 @@ TEST(ParseRefusals, NamesAreToldAsFarAsThereIsRoom) {
   many.emplace("r", 0);
   EXPECT_THAT(Number("none", many), HasSubstr("p9 and 2 more, and functions"));
 }
+
+// A construct that nests, as deep as a number says.
+struct Construct {
+  const char* name;
+  std::function<std::string(int depth)> text;
+  bool is_flat = false;  // it only gets longer, and equal parts of it are one node
+};
+
+std::string Times(const std::string& text, int count) {
+  std::string all;
+  for (int i = 0; i < count; ++i) all += text;
+  return all;
+}
+
+std::string Around(const std::string& before, const std::string& middle, int depth) {
+  return absl::StrCat(Times(before, depth), middle, Times(")", depth));
+}
+
+const Construct kConstructs[] = {
+    {"Parentheses", [](int n) { return Around("(", "x", n); }},
+    {"ParenthesesInACondition",
+     [](int n) { return absl::StrCat("x where ", Around("(", "x <= 1", n)); }},
+    {"NumbersInParenthesesInACondition",
+     [](int n) { return absl::StrCat("x where ", Around("(", "x", n), " <= 1"); }},
+    {"Minus", [](int n) { return absl::StrCat(Times("-", n), "x"); }},
+    {"Plus", [](int n) { return absl::StrCat(Times("+ ", n), "x"); }},
+    {"Powers", [](int n) { return absl::StrCat(Times("x^", n), "x"); }},
+    {"PowersOfSigned", [](int n) { return absl::StrCat(Times("2^-", n), "x"); }},
+    {"Nots", [](int n) { return absl::StrCat("x where ", Times("not ", n), "x <= 1"); }},
+    {"NotsInParentheses",
+     [](int n) { return absl::StrCat("x where ", Around("not (", "x <= 1", n)); }},
+    {"Functions", [](int n) { return Around("sin(", "x", n); }},
+    {"FirstArguments", [](int n) { return absl::StrCat(Times("min(", n), "x", Times(",y)", n)); }},
+    {"LastArguments", [](int n) { return Around("max(x,", "y", n); }},
+    {"Unions", [](int n) { return Around("union(x <= 1,", "y <= 1", n); }},
+    {"Sums", [](int n) { return absl::StrCat(Times("x+", n), "y"); }},
+    {"Relations", [](int n) { return absl::StrCat("x where ", Times("0 <= ", n), "x"); }, true},
+    {"ParenthesesNeverClosed", [](int n) { return Times("(", n); }},
+    {"FunctionsNeverClosed", [](int n) { return Times("sin(", n); }},
+};
+
+class DeepenedExpression : public ::testing::TestWithParam<Construct> {};
+
+TEST_P(DeepenedExpression, IsRefusedBeforeItTakesStack) {
+  OnSmallStack([] {
+    for (int depth = 1; depth <= 1 << 18; depth = depth < 70 ? depth + 1 : depth * 2) {
+      Graph graph;
+      const auto shape = ParseShape(GetParam().text(depth), {}, {}, graph);
+      if (depth > 1024 && !GetParam().is_flat) {
+        EXPECT_FALSE(shape.ok()) << depth;
+      }
+      if (!shape.ok()) {
+        EXPECT_FALSE(shape.status().message().empty()) << depth;
+      }
+    }
+  });
+}
+
+INSTANTIATE_TEST_SUITE_P(Constructs, DeepenedExpression, ::testing::ValuesIn(kConstructs),
+                         [](const auto& instance) { return std::string(instance.param.name); });
 
 }  // namespace
 }  // namespace voxeld::gpu::implicit

@@ -12,6 +12,7 @@
 #include <random>
 
 #include "absl/strings/str_cat.h"
+#include "tests/small_stack.h"
 #include "tools/recording/mcap_bytes.h"
 
 namespace voxeld::recording {
@@ -183,6 +184,27 @@ TEST_F(McapTest, AChunkPackedOtherwiseSaysHowInPrintableText) {
   const absl::Status status = (*reader)->Summarise().status();
   EXPECT_EQ(status.code(), absl::StatusCode::kUnimplemented);
   EXPECT_THAT(std::string(status.message()), HasSubstr("packed by \"l\\x1bz\"; zstd and none"));
+}
+
+// A chunk holds schemas, channels and messages, never another chunk.
+TEST_F(McapTest, ChunksWithinChunksAreRefusedBeforeTheyTakeStack) {
+  for (const int depth : {1, 2, 3, 10, 100, 1'000}) {
+    std::string inside;
+    for (int i = 0; i < depth; ++i) {
+      McapBytes chunk;
+      chunk.Number(uint64_t{0}).Number(uint64_t{0}).Number(uint64_t{inside.size()});
+      chunk.Number(uint32_t{0}).Text("").Number(uint64_t{inside.size()}).Raw(inside);
+      inside = chunk.Record(kChunk);
+    }
+    std::ofstream(path_, std::ios::binary | std::ios::trunc) << kMcapMagic << inside;
+    absl::Status status;
+    OnSmallStack([&] {
+      auto reader = McapReader::Open(path_);
+      status = reader.ok() ? (*reader)->Summarise().status() : reader.status();
+    });
+    EXPECT_EQ(status.code(), depth == 1 ? absl::StatusCode::kOk : absl::StatusCode::kDataLoss)
+        << depth << ": " << status;
+  }
 }
 
 TEST_F(McapTest, WhatIsNoneSaysSo) {
