@@ -7,15 +7,28 @@ set(VOXELD_MAINTAINER "voxeld maintainers <maintainers@voxeld.invalid>" CACHE ST
 
 set(doc ${CMAKE_INSTALL_DATADIR}/doc/voxeld)
 set(packaging ${CMAKE_SOURCE_DIR}/packaging)
-install(TARGETS voxeld voxelctl RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+# voxeld_install_programs(DESTINATION COMPONENT [EXCLUDE_FROM_ALL] TARGET …): installs them without the path to libraries that they have in
+# the build (VoxeldTargets.cmake).
+function(voxeld_install_programs destination component)
+  cmake_parse_arguments(ARG "EXCLUDE_FROM_ALL" "" "" ${ARGN})
+  set(all "")
+  if(ARG_EXCLUDE_FROM_ALL)
+    set(all EXCLUDE_FROM_ALL)
+  endif()
+  foreach(target ${ARG_UNPARSED_ARGUMENTS})
+    install(TARGETS ${target} RUNTIME DESTINATION ${destination} COMPONENT ${component} ${all})
+    install(CODE "file(RPATH_REMOVE FILE \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${destination}/${target}\")" COMPONENT ${component} ${all})
+  endforeach()
+endfunction()
+voxeld_install_programs(${CMAKE_INSTALL_BINDIR} service voxeld voxelctl)
 # Not of the package, which would depend on ROS: cmake --install BUILD --component ros
 if(TARGET voxeld-ros)
-  install(TARGETS voxeld-ros RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT ros EXCLUDE_FROM_ALL)
+  voxeld_install_programs(${CMAKE_INSTALL_BINDIR} ros EXCLUDE_FROM_ALL voxeld-ros)
 endif()
 # Where voxeld looks for it: gpu/worker/worker_engine.h.
-install(TARGETS voxeld-engine RUNTIME DESTINATION libexec/voxeld)
+voxeld_install_programs(libexec/voxeld service voxeld-engine)
 if(TARGET voxeld-engine-cuda)
-  install(TARGETS voxeld-engine-cuda RUNTIME DESTINATION libexec/voxeld COMPONENT cuda)
+  voxeld_install_programs(libexec/voxeld cuda voxeld-engine-cuda)
   install(FILES ${packaging}/cuda/voxeld-engine.conf DESTINATION lib/systemd/system/voxeld-engine@.service.d RENAME 50-voxeld-cuda.conf
           COMPONENT cuda)
   install(FILES ${CMAKE_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/voxeld-cuda RENAME copyright COMPONENT cuda)
@@ -80,9 +93,9 @@ else()
   message(STATUS "voxeld is built without a list of what it is made of: that takes dpkg and Ninja")
 endif()
 
-# All that tools/package packs: programs, manual, list of contents, client libraries. Tests and benchmarks are no part of it.
+# All that tools/package packs: programs, manual, list of contents, client libraries. Tests are no part of it.
 add_custom_target(packaged DEPENDS voxeld voxelctl voxeld-engine voxeld-emulator voxeld_client_shared voxeld_manual python_client)
-foreach(part voxeld-engine-cuda voxeld-ros sbom)
+foreach(part voxeld-engine-cuda voxel-bench sbom)
   if(TARGET ${part})
     add_dependencies(packaged ${part})
   endif()

@@ -7,9 +7,10 @@ set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 # Programs find the libraries that tools/bundle puts beside them, and those find theirs (which the newer
-# tag, RUNPATH, would not do).
-set(CMAKE_BUILD_RPATH "$ORIGIN/../lib;$ORIGIN/../../lib")
+# tag, RUNPATH, would not do). CMAKE_BUILD_RPATH would add an empty entry to what is installed, which means the working directory.
+# add_link_options() would escape the dollar signs twice.
 add_link_options(-Wl,--disable-new-dtags)
+string(APPEND CMAKE_EXE_LINKER_FLAGS " -Wl,-rpath,'$ORIGIN/../lib:$ORIGIN/../../lib'")
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
 
 if(NOT CMAKE_BUILD_TYPE)
@@ -174,35 +175,16 @@ function(voxeld_exclude_from_unity)
   set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
 
-# voxeld_library(NAME [SINGLE_THREADED] [KERNELS] SOURCES … HEADERS … LINK …): a static library `voxeld_NAME`.
+# voxeld_library(NAME [SINGLE_THREADED] [KERNELS] SOURCES … LINK …): a static library `voxeld_NAME`.
 #   SINGLE_THREADED  pure functions, and objects that no two threads share (voxeld_exclude_from_tsan)
 #   KERNELS          it has the inner loops (VoxeldHardening.cmake)
-# With VOXELD_HEADERS_ALONE, which tools/check sets, each of HEADERS that no source of the same name includes first is also compiled
-# with nothing before it, so that none depends on what its includer included.
 function(voxeld_library name)
-  cmake_parse_arguments(ARG "SINGLE_THREADED;KERNELS" "" "SOURCES;HEADERS;LINK" ${ARGN})
+  cmake_parse_arguments(ARG "SINGLE_THREADED;KERNELS" "" "SOURCES;LINK" ${ARGN})
   set(unwatched OFF)
   if(ARG_SINGLE_THREADED AND VOXELD_SANITIZE STREQUAL "thread")
     set(unwatched ON)
   endif()
-  set(alone "")
-  if(NOT VOXELD_HEADERS_ALONE)
-    set(ARG_HEADERS "")
-  endif()
-  foreach(header ${ARG_HEADERS})
-    string(REGEX REPLACE "\\.h$" ".cc" own ${header})
-    if(own IN_LIST ARG_SOURCES)
-      continue()
-    endif()
-    file(RELATIVE_PATH path ${CMAKE_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/${header})
-    string(MAKE_C_IDENTIFIER ${path} id)
-    set(file ${CMAKE_BINARY_DIR}/headers/${id}.cc)
-    file(CONFIGURE OUTPUT ${file} CONTENT "#include \"${path}\"\n" @ONLY)
-    list(APPEND alone ${file})
-    # Nothing of it is ever run.
-    set_source_files_properties(${file} PROPERTIES COMPILE_OPTIONS "-O0;-U_FORTIFY_SOURCE")
-  endforeach()
-  add_library(voxeld_${name} STATIC ${ARG_SOURCES} ${alone})
+  add_library(voxeld_${name} STATIC ${ARG_SOURCES})
   target_link_libraries(voxeld_${name} PUBLIC voxeld_options ${ARG_LINK} PRIVATE voxeld_warnings)
   if(ARG_KERNELS)
     set_target_properties(voxeld_${name} PROPERTIES VOXELD_KERNELS ON)

@@ -24,6 +24,11 @@ def _said(*command):
     return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
 
+def search_path(path):
+    """The folders in which `path` has its libraries looked for before the system's, as they are written; an empty one is the working directory."""
+    return [folder for told in re.findall(r"\((?:RPATH|RUNPATH)\)\s+Library r(?:un)?path: \[(.*)\]", _said("readelf", "-dW", path)) for folder in told.split(":")]
+
+
 def defences(path):
     """Names of ALL that `path` has."""
     headers, dynamic = _said("readelf", "-hlW", path), _said("readelf", "-dW", path)
