@@ -7,7 +7,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from elf_defences import ALL, defences
+from elf_defences import ALL, defences, search_path
 
 BUILD = os.environ["BUILD"]
 # By their folders: what is compiled without a flag, and why is in docs/security/hardening.md.
@@ -66,11 +66,32 @@ class Installed(unittest.TestCase):
             subprocess.run([os.environ["CMAKE"], "--install", BUILD, "--prefix", folder], check=True, stdout=subprocess.DEVNULL)
             engines = sorted(Path(folder, "libexec/voxeld").iterdir())
             self.assertEqual(engines[0].name, "voxeld-engine")
-            programs = [Path(folder, "bin/voxeld"), Path(folder, "bin/voxelctl"), *engines]
-            for program in programs:
-                with self.subTest(program.name):
-                    lacking = set(ALL) - defences(program)
-                    self.assertEqual(lacking, set(), "; ".join(f"it {ALL[one]}: no" for one in sorted(lacking)))
+            self.check([Path(folder, "bin/voxeld"), Path(folder, "bin/voxelctl"), *engines])
+
+    def check(self, programs: "list[Path]", without: "set[str]" = set()) -> None:
+        for program in programs:
+            with self.subTest(str(program)):
+                lacking = set(ALL) - without - defences(program)
+                self.assertEqual(lacking, set(), "; ".join(f"it {ALL[one]}: no" for one in sorted(lacking)))
+
+    @unittest.skipUnless("VOXELD_DIST" in os.environ, "tools/test --stage package sets VOXELD_DIST, where tools/package wrote")
+    def test_programs_of_the_packages_and_of_the_bundle_have_every_defence(self) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            for package in Path(os.environ["VOXELD_DIST"]).glob("*.deb"):
+                subprocess.run(["dpkg-deb", "-x", package, folder], check=True)
+            [archive] = Path(os.environ["VOXELD_DIST"]).glob("voxeld-*-linux-*.tar.xz")
+            bundle = Path(folder, "bundle")
+            bundle.mkdir()
+            subprocess.run(["tar", "-C", bundle, "-xJf", archive], check=True)
+            packed = [Path(folder, "usr/bin/voxeld"), Path(folder, "usr/bin/voxelctl"), *Path(folder, "usr/libexec/voxeld").iterdir()]
+            bundled = [program for program in Path(bundle, "bin").iterdir() if program.is_file()]
+            self.assertLessEqual({"voxeld", "voxelctl", "voxeld-engine"}, {program.name for program in packed})
+            self.assertLessEqual({"voxeld", "voxelctl", "voxeld-engine"}, {program.name for program in bundled})
+            self.check(packed)
+            # What is bundled finds the libraries beside it.
+            self.check(bundled, without={"no_rpath"})
+            for program in bundled:
+                self.assertEqual(search_path(program), ["$ORIGIN/../lib", "$ORIGIN/../../lib"], program.name)
 
 
 class Compiled(unittest.TestCase):
@@ -83,8 +104,6 @@ class Compiled(unittest.TestCase):
             if not path.startswith(("common/", "daemon/", "display/", "gpu/", "tools/", "client/", "proto/")) or ".cu." in path:
                 continue
             words = one["command"].split()
-            if "-O0" in words and "/headers/" in one["file"]:
-                continue  # a header by itself, of which nothing runs
             of_cpp = {"-D_GLIBCXX_ASSERTIONS"} if path.endswith(".c.o") else set()
             without = {flag for flag in FLAGS if flag not in words} - of_cpp
             target = re.search(r"CMakeFiles/(\w[\w-]*)\.dir", path)[1]  # type: ignore[index]

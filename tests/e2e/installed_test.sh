@@ -4,9 +4,9 @@
 # usage: installed_test.sh PACKAGES WHEEL SOURCE CACHE
 #   PACKAGES  the folder of the .deb files; CACHE a folder that may be kept between calls
 # VOXELD_DIST=FOLDER: the packages and the wheel are those of this folder, as tools/package wrote it, and its checksums are checked.
-# The root is Debian as debootstrap installs it, kept in CACHE with the packages that voxeld depends on. Without debootstrap or a network it is
-# this system's own /usr, /etc and /var, without /usr/local. VOXELD_CLEAN_ROOT=FOLDER names another (/: this system's). Needs root, and a
-# kernel with overlayfs. Exit status 77: it cannot be tried here.
+# The root is Debian as debootstrap installs it, kept in CACHE with what a client is built with. VOXELD_CLEAN_ROOT=FOLDER names another; /
+# is this system's own /usr, /etc and /var, without /usr/local, where a dependency that a package does not name may be there all the same.
+# Needs root, debootstrap, a network the first time, and a kernel with overlayfs. Exit status 77: it cannot be tried here.
 set -euo pipefail
 skip() { echo "installed_test: skipped: $*" >&2; exit 77; }
 fail() { echo "installed_test: $*" >&2; exit 1; }
@@ -37,18 +37,18 @@ if [ -z "${INSTALLED_WORK:-}" ]; then
 fi
 
 in_root() { chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@"; }
-needed=(python3-grpcio python3-numpy python3-protobuf python3-venv)
+needed=(python3-grpcio python3-numpy python3-protobuf python3-venv g++ cmake ninja-build)
 
 step "a clean root"
 base=${VOXELD_CLEAN_ROOT:-}
-if [ -z "$base" ] && command -v debootstrap >/dev/null; then
+if [ -z "$base" ]; then
+  command -v debootstrap >/dev/null || skip "debootstrap is not installed (tools/setup --dev)"
   base=$cache/debian
   if [ ! -d "$base" ]; then
     rm -rf "$base.new" && mkdir -p "$base.new"
     if ! { debootstrap --variant=minbase bookworm "$base.new" && root=$base.new &&
            in_root apt-get install -q -y --no-install-recommends "${needed[@]}" && mv "$base.new" "$base"; } >"$cache/debian.log" 2>&1; then
-      echo "   no Debian by debootstrap ($(tail -n 1 "$cache/debian.log")); this system's files instead"
-      base=
+      skip "debootstrap made no Debian ($(tail -n 1 "$cache/debian.log")); to use this system's own files: VOXELD_CLEAN_ROOT=/"
     fi
   fi
 fi
@@ -147,13 +147,13 @@ step "voxelctl"
 in_root env VOXELD_SERVER=unix:/run/voxeld/voxeld.sock voxelctl displays | sed 's/^/   /'
 
 step "a C++ client against the development files"
-if [ -n "$(ls "$packages"/libvoxeld-dev_*.deb 2>/dev/null)" ] && in_root sh -c 'command -v c++ && command -v cmake && command -v ninja' >/dev/null; then
+if [ -n "$(ls "$packages"/libvoxeld-dev_*.deb 2>/dev/null)" ]; then
   cp -r "$source/client/cpp/examples" "$root/tmp/examples"
   in_root sh -c 'cmake -S /tmp/examples -B /tmp/built -G Ninja && cmake --build /tmp/built -j 1 --target example_01_hello_line' >"$INSTALLED_WORK/log" 2>&1 ||
     fail "it is not built: $(tail -n 20 "$INSTALLED_WORK/log")"
   in_root timeout 60 /tmp/built/example_01_hello_line unix:/run/voxeld/voxeld.sock | sed 's/^/   /'
 else
-  echo "   left out: this root has no compiler"
+  echo "   left out: there is no package libvoxeld-dev in $packages"
 fi
 
 step "stop, remove"
