@@ -18,6 +18,9 @@ import unittest
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+import progress  # noqa: E402
+
 ORDINARY = ("awk basename bash cat chmod cp cut date dirname env find grep head id kill ln ls mkdir mktemp mv nproc paste printf rm sed seq sh sleep "
             "sort tail tar timeout touch tr uname wc").split()
 MODULES = ["world-atlas", "three", "uplot", "esbuild"]  # of the default tier
@@ -287,12 +290,18 @@ node-css-loader
 node-gyp
   Depends: node-build
 END""")
-        self.stub("apt-get", 'for word in "$@"; do case "$word" in node-* | npm) touch "$word.deb" ;; esac; done')
+        self.stub("apt-get", """for word in "$@"; do
+  case "$word" in
+    --print-uris) echo "'http://mirror/npm.deb' npm.deb 1500000 SHA256:0"; exit 0 ;;
+    node-* | npm) touch "$word.deb" ;;
+  esac
+done""")
         self.stub("dpkg-deb", 'mkdir -p "$3/usr/share/nodejs/npm/bin" && touch "$3/usr/share/nodejs/npm/bin/npm-cli.js"')
         done = self.run_tool("setup")
         self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertEqual(self.calls("apt-get"), ["apt-get download -qq node-css-loader node-css-selector-tokenizer node-first node-gyp node-tar "
-                                                 "node-yallist npm"])
+        names = "node-css-loader node-css-selector-tokenizer node-first node-gyp node-tar node-yallist npm"
+        self.assertEqual(self.calls("apt-get"), [f"apt-get download --print-uris {names}", f"apt-get download -qq {names}"])
+        self.assertIn("setup: npm: 7 packages, 1.5 MB to download, unpacked into build/npm\n", done.stdout)
         self.assertRegex(self.calls("node")[0], r"^node build/npm/usr/share/nodejs/npm/bin/npm-cli.js install ")
         self.assertTrue((self.clone / "build/npm/usr/share/nodejs/node_modules/npm").is_dir())
 
@@ -335,22 +344,38 @@ class Jobs(Sandbox):
         self.assertEqual(self.jobs(8, 24_000_000, limit=str(3_200_000_000)), 2)
 
 
-class ContinuousIntegration(Sandbox):
-    """.ci/run over a tools/test that fails for the stages in `failing`. `seconds`: how long it has run already."""
+class Progress(unittest.TestCase):
+    def test_estimates_the_time_left_from_the_steps_that_are_done(self) -> None:
+        self.assertEqual(progress.left(100, 50, 150), "about 3 min left")
+        self.assertEqual(progress.left(100, 100, 150), "about 50 s left")
+        self.assertEqual(progress.left(100, 149, 150), "about 5 s left")
 
-    def ci(self, failing: str = "", seconds: int = 0) -> "tuple[int, dict[str, str]]":
+    def test_does_not_estimate_from_the_first_steps_alone(self) -> None:
+        for elapsed_s, done, total in ((100, 1, 20), (100, 3, 150), (4, 75, 150)):
+            self.assertEqual(progress.left(elapsed_s, done, total), "estimating the time left")
+
+
+class ContinuousIntegration(Sandbox):
+    """.ci/run over a tools/test that fails for the stages in `failing`, and otherwise runs `then`. `seconds`: how long it has run already."""
+
+    def ci(self, failing: str = "", seconds: int = 0, then: str = "") -> "tuple[int, dict[str, str]]":
         (self.clone / ".ci").mkdir(exist_ok=True)
         shutil.copy(ROOT / ".ci/run", self.clone / ".ci/run")
         test = self.clone / "tools/test"
-        test.write_text('#!/bin/bash\nstage=test\n[ "${1:-}" != --stage ] || stage=$2\ncase " $FAILING " in *" $stage "*) exit 1 ;; esac\n')
+        test.write_text('#!/bin/bash\nstage=test\n[ "${1:-}" != --stage ] || stage=$2\ncase " $FAILING " in *" $stage "*) exit 1 ;; esac\n' + then)
         test.chmod(0o755)
+        (self.clone / "build/test-logs").mkdir(parents=True, exist_ok=True)
         done = subprocess.run([str(self.clone / ".ci/run")], env={**self.environment, "FAILING": failing, "SECONDS": str(seconds)},
                               capture_output=True, text=True, timeout=60, check=False)
-        table = done.stdout.split("stage      result\n")[1].splitlines()
-        return done.returncode, {line[:10].strip(): line[11:] for line in table}
+        table = done.stdout.split("stage         build    tests  result\n")[1].splitlines()
+        return done.returncode, {line[:10].strip(): line[30:] for line in table}
 
     def test_runs_all_stages(self) -> None:
         self.assertEqual(self.ci(), (0, dict.fromkeys(("test", "check", "tsan", "asan", "long", "hil"), "passed")))
+
+    def test_what_a_stage_skipped_stands_in_the_table(self) -> None:
+        skipping = 'mkdir -p build/test-logs; printf "%-10s %8s %8s  %s\\n" $stage 1.5 0.0 "1 skipped" >build/test-logs/$stage.row'
+        self.assertEqual(self.ci(then=skipping)[1]["check"], "1 skipped")
 
     def test_goes_on_after_a_failure(self) -> None:
         status, table = self.ci("test asan")
