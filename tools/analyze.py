@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Runs clang-16's analyses, or GCC, over translation units, as many at once as tools/jobs says.
 
-usage: analyze.py syntax|gcc|tidy BUILD_DIR FILE...
+usage: analyze.py syntax|gcc|tidy|headers BUILD_DIR FILE...
 Exit 1 if any finding; each is printed once. `syntax` (Clang, with its analysis of lock annotations) and `gcc` compile without writing
-anything. Sources that are only built with CUDA are passed over.
+anything. `headers` compiles by itself each header of FILE, and each that includes one of them, unless a source of its name, which includes
+it first, does that; with the options of a source that includes it. What is only built with CUDA is passed over.
 """
 
 import concurrent.futures
@@ -18,6 +19,73 @@ import sys
 def compile_commands(build_dir):
     with open(os.path.join(build_dir, "compile_commands.json"), encoding="utf-8") as file:
         return {os.path.realpath(entry["file"]): entry for entry in json.load(file)}
+
+
+INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
+
+
+def includers():
+    """Returns: by each header of the project, the files that include it."""
+    listed = subprocess.run(["git", "ls-files", "--cached", "--others", "--exclude-standard", "*.c", "*.cc", "*.h", "*.cu", "*.cuh"],
+                            capture_output=True, text=True, check=True).stdout.split()
+    listed = [path for path in listed if os.path.exists(path)]
+    known = set(listed)
+    found = {}
+    for path in listed:
+        with open(path, encoding="utf-8") as file:
+            names = INCLUDE.findall(file.read())
+        for name in names:
+            # As the compiler looks for it: beside the file that includes it, then in the root, then where users' programs have the client.
+            for place in (os.path.normpath(os.path.join(os.path.dirname(path), name)), name, "client/cpp/" + name):
+                if place in known:
+                    found.setdefault(place, []).append(path)
+                    break
+    return found
+
+
+def headers_to_compile(paths, included_by):
+    """Returns: the headers of `paths` and all that include them, directly or not, without those that a source of their name includes."""
+    found = []
+    open_ = [path for path in paths if path.endswith(".h")]
+    seen = set(open_)
+    while open_:
+        path = open_.pop()
+        found.append(path)
+        for includer in included_by.get(path, []):
+            if includer.endswith(".h") and includer not in seen:
+                seen.add(includer)
+                open_.append(includer)
+    return sorted(path for path in found if not os.path.exists(path[:-2] + ".cc"))
+
+
+def source_that_includes(header, included_by, commands):
+    """Returns: a source of the build that includes `header`, by as few headers between as possible; None if there is none."""
+    seen = {header}
+    level = [header]
+    while level:
+        following = []
+        for path in level:
+            for includer in included_by.get(path, []):
+                if os.path.realpath(includer) in commands:
+                    return includer
+                if includer not in seen:
+                    seen.add(includer)
+                    following.append(includer)
+        level = following
+    return None
+
+
+def header_entry(header, included_by, commands):
+    """Returns: the command that compiles `header` by itself, or None."""
+    source = source_that_includes(header, included_by, commands)
+    if source is None:
+        return None
+    entry = commands[os.path.realpath(source)]
+    # CMake ends the command with the source.
+    command = entry["command"].removesuffix(entry["file"])
+    language = "c" if source.endswith(".c") else "c++"
+    return {"file": os.path.realpath(header), "directory": entry["directory"],
+            "command": f"{command} -x {language} {shlex.quote(os.path.realpath(header))}"}
 
 
 def analysis_command(mode, build_dir, path, entry):
@@ -52,8 +120,8 @@ def run(mode, build_dir, path, commands):
 
 def optional(path):
     """CUDA sources, sources of switched-off parts and some tests' main files are built elsewhere, some only where there is a GPU."""
-    return path.startswith(("gpu/cuda/", "gpu/worker/")) or re.match(
-        r"tools/bench/(frame|paper)/(no_)?cuda_|tests/.*cuda|tests/gpu/simt/engines_simt\.cc|tests/fuzz/packed_main\.cc", path)
+    return re.match(r"gpu/cuda/|tools/bench/(frame|paper)/cuda_"
+                    r"|tests/.*cuda|tests/gpu/simt/(include/|vectors\.h|engines_simt\.cc)|tests/gpu/worker/illegal_|tests/fuzz/packed_main\.cc", path)
 
 
 def jobs():
@@ -62,11 +130,20 @@ def jobs():
 
 
 def main():
-    if len(sys.argv) < 3 or sys.argv[1] not in ("syntax", "gcc", "tidy"):
+    if len(sys.argv) < 3 or sys.argv[1] not in ("syntax", "gcc", "tidy", "headers"):
         print(__doc__, file=sys.stderr)
         return 2
     mode, build_dir, paths = sys.argv[1], sys.argv[2], sys.argv[3:]
     commands = compile_commands(build_dir)
+    if mode == "headers":
+        mode = "syntax"
+        included_by = includers()
+        paths = headers_to_compile(paths, included_by)
+        print(f"headers alone: {len(paths)}", flush=True)
+        for path in paths:
+            entry = header_entry(path, included_by, commands)
+            if entry is not None:
+                commands[os.path.realpath(path)] = entry
     found = False
     with concurrent.futures.ThreadPoolExecutor(jobs()) as pool:
         for output in pool.map(lambda path: run(mode, build_dir, path, commands), paths):
