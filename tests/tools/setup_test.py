@@ -328,12 +328,20 @@ class Cuda(Sandbox):
 
 
 class Jobs(Sandbox):
-    def jobs(self, cores: int, available_kb: int, limit: str = "max") -> int:
+    def jobs(self, cores: int, available_kb: int, limits: "dict[str, str]" = {}, own: str = "0::/\n") -> int:
+        """`limits`: by the file below /sys/fs/cgroup, what it says. `own`: /proc/self/cgroup."""
         self.stub("nproc", f"echo {cores}")
-        folder = Path(self.environment["STUBS"])
+        folder = Path(self.environment["STUBS"], "system")
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir()
         (folder / "meminfo").write_text(f"MemTotal: 99999999 kB\nMemAvailable: {available_kb} kB\n", encoding="utf-8")
-        (folder / "max").write_text(limit + "\n", encoding="utf-8")
-        return int(self.run_tool("jobs", str(folder / "meminfo"), str(folder / "max")).stdout)
+        (folder / "own").write_text(own, encoding="utf-8")
+        for name, text in limits.items():
+            (folder / "cgroup" / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / "cgroup" / name).write_text(text + "\n", encoding="utf-8")
+        done = self.run_tool("jobs", str(folder / "meminfo"), str(folder / "own"), str(folder / "cgroup"))
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        return int(done.stdout)
 
     def test_cores_and_memory_limit_the_jobs(self) -> None:
         self.assertEqual(self.jobs(2, 24_000_000), 2)
@@ -341,7 +349,16 @@ class Jobs(Sandbox):
         self.assertEqual(self.jobs(16, 6_100_000), 4)
         self.assertEqual(self.jobs(4, 1_800_000), 1)
         self.assertEqual(self.jobs(4, 300_000), 1)
-        self.assertEqual(self.jobs(8, 24_000_000, limit=str(3_200_000_000)), 2)
+
+    def test_control_groups_limit_the_jobs(self) -> None:
+        memory = 24_000_000
+        self.assertEqual(self.jobs(8, memory, {"memory.max": "3200000000"}), 2, "a container's")
+        self.assertEqual(self.jobs(8, memory, {"a/b/memory.max": "max", "a/memory.max": "3200000000"}, "0::/a/b\n"), 2, "one above")
+        self.assertEqual(self.jobs(8, memory, {"a/memory.max": "1600000000", "memory.max": "9000000000"}, "0::/a\n"), 1, "the least")
+        self.assertEqual(self.jobs(8, memory, {"memory/memory.limit_in_bytes": "3200000000"}, "4:memory:/docker/1\n0::/\n"), 2, "version 1")
+        self.assertEqual(self.jobs(8, memory, {"memory/a/memory.limit_in_bytes": "1600000000"}, "9:cpu,memory:/a\n"), 1)
+        self.assertEqual(self.jobs(8, memory, {"memory/memory.limit_in_bytes": "9223372036854771712"}, "4:memory:/\n"), 8, "no limit")
+        self.assertEqual(self.jobs(8, memory, {"a/memory.max": "1600000000"}, "0::/b\n"), 8, "another's")
 
 
 class Progress(unittest.TestCase):
