@@ -7,8 +7,8 @@ set(VOXELD_MAINTAINER "voxeld maintainers <maintainers@voxeld.invalid>" CACHE ST
 
 set(doc ${CMAKE_INSTALL_DATADIR}/doc/voxeld)
 set(packaging ${CMAKE_SOURCE_DIR}/packaging)
-# voxeld_install_programs(DESTINATION COMPONENT [EXCLUDE_FROM_ALL] TARGET …): installs them without the path to libraries that they have in
-# the build (VoxeldTargets.cmake).
+# voxeld_install_programs(DESTINATION COMPONENT [EXCLUDE_FROM_ALL] TARGET …): installs the programs and
+# removes the build's RPATH (VoxeldTargets.cmake).
 function(voxeld_install_programs destination component)
   cmake_parse_arguments(ARG "EXCLUDE_FROM_ALL" "" "" ${ARGN})
   set(all "")
@@ -93,7 +93,8 @@ else()
   message(STATUS "voxeld is built without a list of what it is made of: that takes dpkg and Ninja")
 endif()
 
-# All that tools/package packs: programs, manual, list of contents, client libraries. Tests are no part of it.
+# Everything that tools/package packages: programs, manual, SBOM, client libraries; no tests. Also voxel-bench, to measure this build; it is
+# not published, because it compares with a loop that is compiled for the processor of the machine that builds it.
 add_custom_target(packaged DEPENDS voxeld voxelctl voxeld-engine voxeld-emulator voxeld_client_shared voxeld_manual python_client)
 foreach(part voxeld-engine-cuda voxel-bench sbom)
   if(TARGET ${part})

@@ -6,9 +6,9 @@ set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_POSITION_INDEPENDENT_CODE ON)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
-# Programs find the libraries that tools/bundle puts beside them, and those find theirs (which the newer
-# tag, RUNPATH, would not do). CMAKE_BUILD_RPATH would add an empty entry to what is installed, which means the working directory.
-# add_link_options() would escape the dollar signs twice.
+# RPATH lets programs find the libraries that tools/bundle puts beside them. RUNPATH, the linker's default, does not apply to the
+# dependencies of those libraries. CMAKE_BUILD_RPATH is not used because it leaves an empty entry, that is, the working directory, in
+# programs that are to be installed. add_link_options() is not used because it would escape the dollar signs twice.
 add_link_options(-Wl,--disable-new-dtags)
 string(APPEND CMAKE_EXE_LINKER_FLAGS " -Wl,-rpath,'$ORIGIN/../lib:$ORIGIN/../../lib'")
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)

@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 """Runs clang-16's analyses, or GCC, over translation units, as many at once as tools/jobs says.
 
-usage: analyze.py syntax|gcc|tidy|headers BUILD_DIR FILE...
+usage: analyze.py syntax|gcc|tidy|affected BUILD_DIR FILE...
 Exit 1 if any finding; each is printed once. `syntax` (Clang, with its analysis of lock annotations) and `gcc` compile without writing
-anything. `headers` compiles by itself each header of FILE, and each that includes one of them, unless a source of its name, which includes
-it first, does that; with the options of a source that includes it. What is only built with CUDA is passed over.
+anything; a header is compiled on its own, with the options of a source that includes it. `affected` compiles nothing: it prints what to
+compile after the headers among FILE have changed. That is, for each of these headers and each header that includes one of them, directly
+or indirectly, the source of the same name, which includes it first, or, without such a source, the header. Files that are built only with
+CUDA are skipped.
 """
 
 import concurrent.futures
@@ -43,30 +45,31 @@ def includers():
     return found
 
 
-def headers_to_compile(paths, included_by):
-    """Returns: the headers of `paths` and all that include them, directly or not, without those that a source of their name includes."""
+def affected(paths, included_by):
+    """Returns: what to compile after the headers among `paths` have changed; see above."""
     found = []
     open_ = [path for path in paths if path.endswith(".h")]
     seen = set(open_)
     while open_:
         path = open_.pop()
-        found.append(path)
+        source = path[:-2] + ".cc"
+        found.append(source if os.path.exists(source) else path)
         for includer in included_by.get(path, []):
             if includer.endswith(".h") and includer not in seen:
                 seen.add(includer)
                 open_.append(includer)
-    return sorted(path for path in found if not os.path.exists(path[:-2] + ".cc"))
+    return sorted(found)
 
 
 def source_that_includes(header, included_by, commands):
-    """Returns: a source of the build that includes `header`, by as few headers between as possible; None if there is none."""
+    """Returns: a source of the build that includes `header` through the fewest intermediate headers, or None."""
     seen = {header}
     level = [header]
     while level:
         following = []
         for path in level:
             for includer in included_by.get(path, []):
-                if os.path.realpath(includer) in commands:
+                if includer.endswith((".cc", ".c")) and os.path.realpath(includer) in commands:
                     return includer
                 if includer not in seen:
                     seen.add(includer)
@@ -120,7 +123,7 @@ def run(mode, build_dir, path, commands):
 
 def optional(path):
     """CUDA sources, sources of switched-off parts and some tests' main files are built elsewhere, some only where there is a GPU."""
-    return re.match(r"gpu/cuda/|tools/bench/(frame|paper)/cuda_"
+    return re.match(r"gpu/cuda/|tools/bench/(frame|paper)/(no_)?cuda_"
                     r"|tests/.*cuda|tests/gpu/simt/(include/|vectors\.h|engines_simt\.cc)|tests/gpu/worker/illegal_|tests/fuzz/packed_main\.cc", path)
 
 
@@ -130,20 +133,23 @@ def jobs():
 
 
 def main():
-    if len(sys.argv) < 3 or sys.argv[1] not in ("syntax", "gcc", "tidy", "headers"):
+    if len(sys.argv) < 3 or sys.argv[1] not in ("syntax", "gcc", "tidy", "affected"):
         print(__doc__, file=sys.stderr)
         return 2
     mode, build_dir, paths = sys.argv[1], sys.argv[2], sys.argv[3:]
     commands = compile_commands(build_dir)
-    if mode == "headers":
-        mode = "syntax"
+    headers = [path for path in paths if path.endswith(".h")]
+    if headers:
         included_by = includers()
-        paths = headers_to_compile(paths, included_by)
-        print(f"headers alone: {len(paths)}", flush=True)
-        for path in paths:
+        if mode == "affected":
+            print("\n".join(affected(headers, included_by)))
+            return 0
+        for path in headers:
             entry = header_entry(path, included_by, commands)
             if entry is not None:
                 commands[os.path.realpath(path)] = entry
+    if mode == "affected":
+        return 0
     found = False
     with concurrent.futures.ThreadPoolExecutor(jobs()) as pool:
         for output in pool.map(lambda path: run(mode, build_dir, path, commands), paths):

@@ -25,8 +25,8 @@ def _said(*command):
 
 
 def search_path(path):
-    """The folders in which `path` has its libraries looked for before the system's, as they are written; an empty one is the working directory."""
-    return [folder for told in re.findall(r"\((?:RPATH|RUNPATH)\)\s+Library r(?:un)?path: \[(.*)\]", _said("readelf", "-dW", path)) for folder in told.split(":")]
+    """Returns: the entries of RPATH or RUNPATH in the ELF file `path`, unexpanded. An empty entry means the working directory."""
+    return [folder for entries in re.findall(r"\((?:RPATH|RUNPATH)\)\s+Library r(?:un)?path: \[(.*)\]", _said("readelf", "-dW", path)) for folder in entries.split(":")]
 
 
 def defences(path):

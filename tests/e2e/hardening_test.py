@@ -72,9 +72,9 @@ class Installed(unittest.TestCase):
         for program in programs:
             with self.subTest(str(program)):
                 lacking = set(ALL) - without - defences(program)
-                self.assertEqual(lacking, set(), "; ".join(f"it {ALL[one]}: no" for one in sorted(lacking)))
+                self.assertEqual(lacking, set(), "; ".join(f"{one}: expected that the program {ALL[one]}" for one in sorted(lacking)))
 
-    @unittest.skipUnless("VOXELD_DIST" in os.environ, "tools/test --stage package sets VOXELD_DIST, where tools/package wrote")
+    @unittest.skipUnless("VOXELD_DIST" in os.environ, "VOXELD_DIST is not set: tools/test --stage package sets it to the output folder of tools/package")
     def test_programs_of_the_packages_and_of_the_bundle_have_every_defence(self) -> None:
         with tempfile.TemporaryDirectory() as folder:
             for package in Path(os.environ["VOXELD_DIST"]).glob("*.deb"):

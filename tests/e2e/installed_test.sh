@@ -4,9 +4,10 @@
 # usage: installed_test.sh PACKAGES WHEEL SOURCE CACHE
 #   PACKAGES  the folder of the .deb files; CACHE a folder that may be kept between calls
 # VOXELD_DIST=FOLDER: the packages and the wheel are those of this folder, as tools/package wrote it, and its checksums are checked.
-# The root is Debian as debootstrap installs it, kept in CACHE with what a client is built with. VOXELD_CLEAN_ROOT=FOLDER names another; /
-# is this system's own /usr, /etc and /var, without /usr/local, where a dependency that a package does not name may be there all the same.
-# Needs root, debootstrap, a network the first time, and a kernel with overlayfs. Exit status 77: it cannot be tried here.
+# The clean root is a Debian system made by debootstrap, plus the packages needed to build a client. It is kept in CACHE.
+# VOXELD_CLEAN_ROOT=FOLDER uses another root. With VOXELD_CLEAN_ROOT=/, the test uses this system's /usr (without /usr/local), /etc and /var;
+# it may then miss an undeclared dependency that happens to be installed. Requires root, debootstrap, a network for the first run, and a
+# kernel with overlayfs. Exit status 77: the test was skipped because something required is missing.
 set -euo pipefail
 skip() { echo "installed_test: skipped: $*" >&2; exit 77; }
 fail() { echo "installed_test: $*" >&2; exit 1; }
@@ -48,7 +49,7 @@ if [ -z "$base" ]; then
     rm -rf "$base.new" && mkdir -p "$base.new"
     if ! { debootstrap --variant=minbase bookworm "$base.new" && root=$base.new &&
            in_root apt-get install -q -y --no-install-recommends "${needed[@]}" && mv "$base.new" "$base"; } >"$cache/debian.log" 2>&1; then
-      skip "debootstrap made no Debian ($(tail -n 1 "$cache/debian.log")); to use this system's own files: VOXELD_CLEAN_ROOT=/"
+      skip "debootstrap failed ($(tail -n 1 "$cache/debian.log")); to use this system's own files instead, set VOXELD_CLEAN_ROOT=/"
     fi
   fi
 fi

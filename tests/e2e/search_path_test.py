@@ -1,27 +1,20 @@
-"""Where programs of a build have their libraries looked for: never in the working directory, which may be somebody else's."""
+"""Checks that built programs never search for shared libraries in the working directory, which an attacker may control."""
 import os
 import unittest
-from pathlib import Path
 
 from elf_defences import search_path
 
-BUILD = Path(os.environ["BUILD"])
-
-
-def is_elf(path: Path) -> bool:
-    with path.open("rb") as file:
-        return file.read(4) == b"\x7fELF"
+PROGRAMS = os.environ["PROGRAMS"].split(":")
 
 
 class SearchPath(unittest.TestCase):
     def test_every_folder_is_absolute_or_beside_the_program(self) -> None:
-        programs = [path for folder in ("bin", "bin/tests", "client/cpp") for path in sorted((BUILD / folder).iterdir())
-                    if path.is_file() and (path.suffix == ".so" or os.access(path, os.X_OK)) and is_elf(path)]
-        self.assertLessEqual({"voxeld", "voxelctl", "voxeld-engine", "libvoxeld_client.so"}, {path.name for path in programs})
-        wrong = [(path.name, folder) for path in programs for folder in search_path(path)
-                 if not folder.startswith(("/", "$ORIGIN/"))]
+        self.assertGreater(len(PROGRAMS), 3)
+        wrong = [(program, folder) for program in PROGRAMS for folder in search_path(program) if not folder.startswith(("/", "$ORIGIN/"))]
         self.assertEqual(wrong, [])
-        self.assertEqual(search_path(BUILD / "bin/voxeld"), ["$ORIGIN/../lib", "$ORIGIN/../../lib"])
+
+    def test_programs_find_the_libraries_of_a_bundle(self) -> None:
+        self.assertEqual(search_path(PROGRAMS[0]), ["$ORIGIN/../lib", "$ORIGIN/../../lib"])
 
 
 if __name__ == "__main__":

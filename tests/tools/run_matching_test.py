@@ -57,7 +57,7 @@ class RunMatchingTest(unittest.TestCase):
                          {"one_test": {"Lamp.Lights", "LampTest.GoesOut"}})
         self.assertEqual(run_matching.programs_with(self.build, re.compile("Candle")), {})
 
-    def test_packages_of_the_deep_tier_are_known_to_be_needed(self):
+    def test_is_deep_finds_tests_labelled_deep(self):
         tests = run_matching.tests_of(self.build)
         self.assertEqual([test["name"] for test in tests if run_matching.is_deep(test)], ["host.runs_guest"])
 

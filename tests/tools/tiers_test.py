@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Compares tests/tiers.tsv with this build, that of VOXELD_STAGE: it lists each test once, with its tier, and no test that does not
-exist."""
+"""Checks that tests/tiers.tsv lists each test of this build (of the stage VOXELD_STAGE) once, with its tier, and lists no test that does
+not exist."""
 
 import json
 import os
@@ -30,11 +30,11 @@ class TiersTest(unittest.TestCase):
         cls.long = "VOXELD_LONG_TESTS:BOOL=ON" in cls.cache
 
     def is_listed(self, test, places):
-        """Whether these places of the list, as "default: test" or "deep: asan", are where the test runs in this build."""
+        """Returns: whether `places`, such as "default: test" or "deep: asan", include the stage in which this build runs the test."""
         if STAGE == "test":
             return ("default: test" if self.tests[test] == "default" else "deep: long") in places
-        # The full tier runs everything under a sanitizer.
-        return f"deep: {STAGE}" in places or (self.long and places)
+        # The full tier runs more tests under a sanitizer than the list says.
+        return f"deep: {STAGE}" in places or (self.long and bool(places))
 
     def test_each_name_stands_there_once(self):
         names = [row[0] for row in rows()]

@@ -1,5 +1,5 @@
-// What clients send cannot nest without bound: no message of the protocol contains itself, and fields that nobody knows, which may nest,
-// are refused before they take stack.
+// Checks that clients cannot send messages of unbounded nesting depth: no protocol message contains itself, and deeply nested unknown
+// fields are rejected before parsing them could overflow the stack.
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>
 #include <google/protobuf/message.h>
@@ -21,7 +21,8 @@ namespace nested_messages_test {
 using google::protobuf::Descriptor;
 using google::protobuf::FieldDescriptor;
 
-// How deep messages nest in `message`, at most; −1 if one contains itself. `found` has those that were looked at; 0: not yet done.
+// Returns the maximum nesting depth of `message`, or −1 if a message contains itself. `found` maps each visited message to its depth; 0
+// means in progress.
 int Depth(const Descriptor* message, std::map<const Descriptor*, int>& found) {
   const auto [place, is_new] = found.emplace(message, 0);
   if (!is_new) return place->second == 0 ? -1 : place->second;
@@ -65,7 +66,7 @@ TEST(NestedMessages, AMessageThatContainsItselfIsFound) {
 }
 
 // Groups are the only fields of unknown number whose content is parsed.
-TEST(NestedMessages, UnknownGroupsAreRefusedBeforeTheyTakeStack) {
+TEST(NestedMessages, DeepUnknownGroupsAreRejectedWithoutStackOverflow) {
   const std::string begin("\x83\x7d", 2), end("\x84\x7d", 2);  // field 2000
   for (const Descriptor* request : Requests()) {
     OnSmallStack([&] {

@@ -211,9 +211,9 @@ const Construct kConstructs[] = {
     {"FunctionsNeverClosed", [](int n) { return Times("sin(", n); }},
 };
 
-class DeepenedExpression : public ::testing::TestWithParam<Construct> {};
+class NestedExpression : public ::testing::TestWithParam<Construct> {};
 
-TEST_P(DeepenedExpression, IsRefusedBeforeItTakesStack) {
+TEST_P(NestedExpression, DoesNotOverflowTheStack) {
   OnSmallStack([] {
     for (int depth = 1; depth <= 1 << 18; depth = depth < 70 ? depth + 1 : depth * 2) {
       Graph graph;
@@ -228,7 +228,7 @@ TEST_P(DeepenedExpression, IsRefusedBeforeItTakesStack) {
   });
 }
 
-INSTANTIATE_TEST_SUITE_P(Constructs, DeepenedExpression, ::testing::ValuesIn(kConstructs),
+INSTANTIATE_TEST_SUITE_P(Constructs, NestedExpression, ::testing::ValuesIn(kConstructs),
                          [](const auto& instance) { return std::string(instance.param.name); });
 
 }  // namespace

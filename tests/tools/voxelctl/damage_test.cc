@@ -230,7 +230,8 @@ class Damage : public testing::Test {
 
   void OtherBytes(uint32_t seed, size_t divisor);
 
-  // Reads the samples under the names of other kinds, every `step`-th of the pairs, and contents of no kind under every name.
+  // Imports samples under the file extensions of other formats (every `step`-th pair), and contents of no known format under every
+  // extension.
   void OtherKinds(size_t step);
 
   TempFolder folder_;
@@ -251,7 +252,7 @@ TEST_F(Damage, CutOffAnywhere) {
   }
 }
 
-// Damages every sample, one in `divisor` of its tries.
+// Imports randomly damaged copies of every sample; makes 1/`divisor` of the sample's usual number of attempts.
 void Damage::OtherBytes(uint32_t seed, size_t divisor) {
   std::mt19937 random(seed);
   // Numbers that are on the edge of something, and any.
@@ -275,7 +276,7 @@ void Damage::OtherBytes(uint32_t seed, size_t divisor) {
 
 TEST_F(Damage, BytesThatAreOthers) { OtherBytes(18, 10); }
 
-TEST_F(Damage, BytesThatAreOthersOften) { OtherBytes(17, 1); }
+TEST_F(Damage, ChangedBytesAllAttempts) { OtherBytes(17, 1); }
 
 // A slice of three is damaged, or a picture of three that follow one another.
 TEST_F(Damage, FoldersAndSequences) {
@@ -345,10 +346,10 @@ void Damage::OtherKinds(size_t step) {
   }
 }
 
-// Seven and the number of samples have no common divisor, so that each content gets its turn.
+// The step 7 and the number of samples are coprime, so the contents of every sample are tested.
 TEST_F(Damage, OfAnotherKind) { OtherKinds(7); }
 
-TEST_F(Damage, OfEveryOtherKind) { OtherKinds(1); }
+TEST_F(Damage, WrongExtensionsAllPairs) { OtherKinds(1); }
 
 // How much more memory a process has at its height that does this than one that does nothing; MiB.
 double MegabytesOf(const std::function<void()>& work) {

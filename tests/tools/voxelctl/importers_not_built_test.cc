@@ -9,7 +9,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-TEST(ImportersNotBuilt, AFormatThatTheyAddIsAnsweredWithTheCommand) {
+TEST(ImportersNotBuilt, UnsupportedFormatReportsCommandsThatAddIt) {
   EXPECT_THAT(
       ImportFile(DataFile("arrow.obj"), {}),
       Fails(Words{
@@ -19,7 +19,7 @@ TEST(ImportersNotBuilt, AFormatThatTheyAddIsAnsweredWithTheCommand) {
   EXPECT_THAT(ImportFile(DataFile("house.ifc"), {}), Fails(Words{"to add .ifc, run"}));
 }
 
-TEST(ImportersNotBuilt, AFolderAndAnAnimationAreAnsweredWithTheCommand) {
+TEST(ImportersNotBuilt, FolderAndAnimationReportCommandsThatAddThem) {
   TempFolder folder;
   EXPECT_THAT(ImportFile(folder.Path("."), {}),
               Fails(Words{"to add folders of DICOM slices, run"}));

@@ -16,7 +16,7 @@ using testing::HasSubstr;
 
 class PartsTest : public CommandsTest {};
 
-TEST_F(PartsTest, ACommandThatIsNotBuiltNamesWhatAddsItInOneLine) {
+TEST_F(PartsTest, CommandNotBuiltReportsHowToAddItInOneLine) {
   for (const char* line :
        {"VOXELD_RECORDING record a.mcap", "VOXELD_RECORDING replay a.mcap",
         "VOXELD_RECORDING playlist a.toml", "VOXELD_LIGHTS input opc",

@@ -12,7 +12,7 @@ namespace voxeld::voxelctl {
 namespace {
 
 absl::Status NoImporter(absl::string_view path, absl::string_view wanted) {
-  return NotBuilt(path, "reads STL, PLY, VOX, GeoJSON, TopoJSON and text clouds", wanted,
+  return NotBuilt(path, "reads STL, PLY, VOX, GeoJSON, TopoJSON and point clouds as text", wanted,
                   "VOXELD_IMPORTERS");
 }
 

@@ -6,10 +6,9 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_split.h"
 #include "absl/strings/string_view.h"
+#include "absl/strings/strip.h"
 #include "tools/voxelctl/import/nesting.h"
 
 namespace voxeld::voxelctl {
@@ -40,24 +39,45 @@ int NestingOf(const SourceFile& file) {
       BracketDepth(text, '"'));
 }
 
-// The library makes room for as many vertices and faces as an OFF file claims before it reads one.
-absl::Status CheckOffCounts(const SourceFile& file) {
-  uint64_t counts[2] = {};  // vertices, faces
-  size_t found = 0;
-  for (absl::string_view line : absl::StrSplit(file.bytes, '\n')) {
-    line = line.substr(0, line.find('#'));
-    for (const absl::string_view word : absl::StrSplit(line, absl::ByAnyChar(" \t\r"))) {
-      // What is no number is the keyword, such as OFF or COFF.
-      if (found < 2 && absl::SimpleAtoi(word, &counts[found])) ++found;
+// Takes the number off the front of `text`, after spaces, line ends and comments; 0 if there is none. Numbers that are too large are
+// UINT64_MAX.
+uint64_t TakeCount(absl::string_view* text) {
+  while (!text->empty()) {
+    if (text->front() == '#') {
+      text->remove_prefix(std::min(text->find('\n'), text->size()));
+    } else if (absl::ascii_isspace(static_cast<unsigned char>(text->front()))) {
+      text->remove_prefix(1);
+    } else {
+      break;
     }
-    if (found == 2) break;
   }
+  uint64_t value = 0;
+  while (!text->empty() && absl::ascii_isdigit(static_cast<unsigned char>(text->front()))) {
+    const auto digit = static_cast<uint64_t>(text->front() - '0');
+    value = value > (UINT64_MAX - digit) / 10 ? UINT64_MAX : value * 10 + digit;
+    text->remove_prefix(1);
+  }
+  // What is left of a word that is not a number.
+  while (!text->empty() && !absl::ascii_isspace(static_cast<unsigned char>(text->front())))
+    text->remove_prefix(1);
+  return value;
+}
+
+// The library allocates all the vertices and faces that an OFF file declares before it reads the first one.
+absl::Status CheckOffCounts(const SourceFile& file) {
+  absl::string_view text = file.bytes;
+  // [ST][C][N][4][n]OFF; the counts may follow at once.
+  for (const absl::string_view option : {"ST", "C", "N", "4"}) absl::ConsumePrefix(&text, option);
+  const bool has_dimension = absl::ConsumePrefix(&text, "n");
+  absl::ConsumePrefix(&text, "OFF");
+  if (has_dimension) TakeCount(&text);
+  const uint64_t vertices = TakeCount(&text), faces = TakeCount(&text);
   // "0 0 0" is the shortest vertex, "1 0" the shortest face, each with the end of its line.
   const uint64_t bytes = file.bytes.size();
-  if (counts[0] > bytes / 6 || counts[1] > bytes / 4) {
+  if (vertices > bytes / 6 || faces > bytes / 4) {
     return FileError(file,
-                     absl::StrCat("claims ", counts[0], " vertices and ", counts[1],
-                                  " faces, for which its ", bytes, " bytes are too few"),
+                     absl::StrCat("declares ", vertices, " vertices and ", faces,
+                                  " faces but has only ", bytes, " bytes"),
                      "the file is truncated or damaged");
   }
   return absl::OkStatus();
