@@ -88,7 +88,7 @@ class Installed(unittest.TestCase):
             self.assertLessEqual({"voxeld", "voxelctl", "voxeld-engine"}, {program.name for program in packed})
             self.assertLessEqual({"voxeld", "voxelctl", "voxeld-engine"}, {program.name for program in bundled})
             self.check(packed)
-            # What is bundled finds the libraries beside it.
+            # Bundled programs find the libraries beside them.
             self.check(bundled, without={"no_rpath"})
             for program in bundled:
                 self.assertEqual(search_path(program), ["$ORIGIN/../lib", "$ORIGIN/../../lib"], program.name)

@@ -154,7 +154,7 @@ if [ -n "$(ls "$packages"/libvoxeld-dev_*.deb 2>/dev/null)" ]; then
     fail "it is not built: $(tail -n 20 "$INSTALLED_WORK/log")"
   in_root timeout 60 /tmp/built/example_01_hello_line unix:/run/voxeld/voxeld.sock | sed 's/^/   /'
 else
-  echo "   left out: there is no package libvoxeld-dev in $packages"
+  echo "   skipped: no package libvoxeld-dev in $packages"
 fi
 
 step "stop, remove"

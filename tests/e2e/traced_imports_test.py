@@ -15,7 +15,7 @@ from typing import Callable
 from polling import LONG
 from quick_daemon import VOXELCTL, QuickDaemon
 
-# What voxelctl and its libraries open by themselves, whatever the file.
+# Files that voxelctl and its libraries open for every input.
 OWN = re.compile(r"""
     /etc/ld\.so\.(cache|preload)
   | /(\S*/)?lib(64)?/\S*\.so(\.\S+)?

@@ -224,7 +224,7 @@ echo "E: Unable to locate package cmake"; echo "E: Package 'g++' has no installa
         done = self.run_tool("setup")
         self.assertEqual(done.returncode, 1)
         self.assertIn("apt-get update failed (no network?)", done.stderr)
-        self.assertIn("there are no package lists for cmake g++; check the network connection and run tools/setup again", done.stderr)
+        self.assertIn("no package lists for cmake g++; check the network connection and run tools/setup again", done.stderr)
 
     def test_a_package_that_debian_does_not_have_is_named(self) -> None:
         self.installed("none")

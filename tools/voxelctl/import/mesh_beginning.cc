@@ -39,8 +39,8 @@ int NestingOf(const SourceFile& file) {
       BracketDepth(text, '"'));
 }
 
-// Takes the number off the front of `text`, after spaces, line ends and comments; 0 if there is none. Numbers that are too large are
-// UINT64_MAX.
+// Removes the next number from the front of `text`, after whitespace and comments, and returns it: 0 for a word that does not begin with a
+// digit, UINT64_MAX for a number that is too large.
 uint64_t TakeCount(absl::string_view* text) {
   while (!text->empty()) {
     if (text->front() == '#') {
@@ -57,7 +57,7 @@ uint64_t TakeCount(absl::string_view* text) {
     value = value > (UINT64_MAX - digit) / 10 ? UINT64_MAX : value * 10 + digit;
     text->remove_prefix(1);
   }
-  // What is left of a word that is not a number.
+  // The rest of a word that is not a number.
   while (!text->empty() && !absl::ascii_isspace(static_cast<unsigned char>(text->front())))
     text->remove_prefix(1);
   return value;
