@@ -6,7 +6,7 @@ Exit 1 if any finding; each is printed once. `syntax` (Clang, with its analysis 
 anything; a header is compiled on its own, with the options of a source that includes it. `affected` compiles nothing: it prints what to
 compile after the headers among FILE have changed. That is, for each of these headers and each header that includes one of them, directly
 or indirectly, the source of the same name, which includes it first, or, without such a source, the header. Files that are built only with
-CUDA are skipped.
+CUDA are skipped, and so are the parts named *-inl.h, which a source includes in its middle.
 """
 
 import concurrent.futures
@@ -103,12 +103,14 @@ def analysis_command(mode, build_dir, path, entry):
     if mode == "gcc":
         arguments = ["g++", *(argument for argument in arguments[1:] if not argument.startswith("-Wthread-safety"))]
         return arguments + ["-fsyntax-only", "-w"]
+    if not os.path.basename(arguments[0]).startswith("clang"):  # C
+        return [argument for argument in arguments if not argument.startswith("-Wthread-safety")] + ["-fsyntax-only", "-w"]
     # With -w, Clang would not warn of anything.
     return arguments + ["-fsyntax-only", "-Wno-everything", "-Wthread-safety", "-Werror=thread-safety"]
 
 
 def run(mode, build_dir, path, commands):
-    entry = commands.get(os.path.realpath(path))
+    entry = None if path.endswith("-inl.h") else commands.get(os.path.realpath(path))
     if entry is None:
         return "" if optional(path) else f"{path}: not part of the build\n"
     done = subprocess.run(
@@ -123,7 +125,7 @@ def run(mode, build_dir, path, commands):
 
 def optional(path):
     """CUDA sources, sources of switched-off parts and some tests' main files are built elsewhere, some only where there is a GPU."""
-    return re.match(r"gpu/cuda/|tools/bench/(frame|paper)/(no_)?cuda_"
+    return path.endswith("-inl.h") or re.match(r"gpu/cuda/|tools/bench/(frame|paper)/(no_)?cuda_"
                     r"|tests/.*cuda|tests/gpu/simt/(include/|vectors\.h|engines_simt\.cc)|tests/gpu/worker/illegal_|tests/fuzz/packed_main\.cc", path)
 
 
