@@ -1,5 +1,5 @@
-# Optional parts of a build. Packages include all of them except voxeld-ros, which would make ROS a dependency. The libraries of a disabled part are not required; voxelctl then reports
-# which command adds it (tools/voxelctl/text/not_built.h).
+# Optional parts of a build. Packages include all of them except voxeld-ros, which would make ROS a dependency. The libraries of a
+# disabled part are not required; voxelctl then prints the commands that add the part (tools/voxelctl/text/not_built.h).
 option(VOXELD_IMPORTERS "More file formats than STL, PLY, VOX, GeoJSON, TopoJSON and points as text (assimp, gdcm, nifti, libxml2, GLU, lzf)" ON)
 option(VOXELD_RECORDING "Recordings and playlists: voxelctl record, replay, playlist (zstd)" ON)
 option(VOXELD_LIGHTS "LED protocols as input: voxelctl input and pipe" ON)
