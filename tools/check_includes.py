@@ -32,11 +32,11 @@ ALLOWED = {
     "daemon/pipeline": ["gpu", "display/api", "display/geometry", "display/sync", "daemon/scene", "daemon/core"],
     "daemon/core": ["gpu", "display/api", "display/geometry", "display/sync", "daemon/scene", "daemon/pipeline"],
     "daemon/explain": ["gpu", "display/api", "display/sync", "daemon/scene"],
-    "daemon/access": ["display/sync", "daemon/address", "daemon/log", "daemon/suggest"],
+    "daemon/access": ["display/sync", "daemon/address", "daemon/log"],
     "daemon/listen": ["display/sync", "daemon/address", "daemon/core/stats", "daemon/log"],
     "tools": ["voxeld", "display/geometry", "display/api", "display/sync", "gpu", "tools",
               # What an address looks like, and what was meant: alike at both ends.
-              "daemon/address", "daemon/suggest", "daemon/usage",
+              "daemon/address", "daemon/usage",
               # What a display's geometry is, on the wire.
               "daemon/geometry_wire",
               # Strokes of letters: in scenes and in pictures of them.

@@ -20,8 +20,8 @@
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "common/text/suggest.h"
 #include "common/toml/parse_toml.h"
-#include "daemon/suggest/suggest.h"
 
 namespace voxeld::daemon::access {
 namespace {

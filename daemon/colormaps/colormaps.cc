@@ -4,7 +4,7 @@
 #include <charconv>
 
 #include "colormaps_text.h"  // kColormapsText, made of the file
-#include "daemon/suggest/suggest.h"
+#include "common/text/suggest.h"
 
 namespace voxeld {
 namespace {

@@ -14,8 +14,8 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "common/text/suggest.h"
 #include "daemon/config/fields.h"
-#include "daemon/suggest/suggest.h"
 
 namespace voxeld::daemon {
 namespace {
@@ -36,9 +36,16 @@ std::string DefaultSocket(const Environment& environment) {
   return absl::StrCat("/tmp/voxeld-", geteuid(), "/voxeld.sock");
 }
 
+}  // namespace
+
+std::vector<std::string> DefaultAddresses(const Environment& environment) {
+  return {kDefaultListen, absl::StrCat("unix:", DefaultSocket(environment))};
+}
+
+namespace {
+
 absl::Status SetDefaults(const Environment& environment, Config* config) {
-  for (const std::string& text :
-       {std::string(kDefaultListen), absl::StrCat("unix:", DefaultSocket(environment))}) {
+  for (const std::string& text : DefaultAddresses(environment)) {
     absl::StatusOr<Address> address = ParseAddress(text);
     if (!address.ok()) return address.status();
     config->server.listen.push_back(*std::move(address));

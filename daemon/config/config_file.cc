@@ -10,10 +10,10 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "common/text/printable.h"
+#include "common/text/suggest.h"
 #include "common/toml/parse_toml.h"
 #include "daemon/config/config.h"
 #include "daemon/config/fields.h"
-#include "daemon/suggest/suggest.h"
 #include "display/profiles/toml_options.h"
 
 namespace voxeld::daemon {

@@ -7,7 +7,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
-#include "daemon/suggest/suggest.h"
+#include "common/text/suggest.h"
 #include "display/profiles/profile.h"
 
 namespace voxeld::daemon {

@@ -9,7 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
-#include "daemon/suggest/suggest.h"
+#include "common/text/suggest.h"
 
 namespace voxeld::usage {
 namespace {

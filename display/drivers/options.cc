@@ -13,6 +13,7 @@
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
 #include "common/text/printable.h"
+#include "common/text/suggest.h"
 #include "display/drivers/geometry_options.h"
 #include "display/geometry/footprint.h"
 
@@ -196,7 +197,8 @@ absl::Status OptionReader::Finish() const {
     if (known_.contains(key)) continue;
     return absl::InvalidArgumentError(
         absl::StrCat("display \"", options_.name, "\": unknown option ", EscapeQuoted(key), " (\"",
-                     EscapeQuoted(value), "\"); known options: ", absl::StrJoin(known_, ", ")));
+                     EscapeQuoted(value), "\")",
+                     Suggestion(key, std::vector<std::string>(known_.begin(), known_.end()))));
   }
   return absl::OkStatus();
 }

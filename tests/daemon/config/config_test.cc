@@ -12,7 +12,7 @@
 #include <sstream>
 
 #include "absl/strings/str_cat.h"
-#include "daemon/suggest/suggest.h"
+#include "common/text/suggest.h"
 
 namespace voxeld::daemon {
 namespace config_test {
@@ -433,6 +433,9 @@ TEST(Suggest, WhatIsLikeAndNothingElse) {
   EXPECT_EQ(Nearest("htp", known), "http");
   EXPECT_EQ(Nearest("displays", known), "display");
   EXPECT_EQ(Nearest("zebra", known), "");
+  // Half of the letters is a guess.
+  EXPECT_EQ(Nearest("cube", {"cone", "box"}), "");
+  EXPECT_EQ(Nearest("remove", {"demo", "clear"}), "");
   EXPECT_EQ(Nearest("", known), "");
   EXPECT_EQ(Nearest(std::string(100'000, 'x'), known), "");
   EXPECT_THAT(Suggestion("zebra", known), Not(HasSubstr("did you mean")));

@@ -285,8 +285,17 @@ TEST(Options, MessagesArePrintableWhateverValuesAre) {
             std::string::npos);
   const DisplayOptions options{.name = "d", .driver = "x", .options = {{"si\nze", "\x01"}}};
   OptionReader reader(options);
-  EXPECT_NE(reader.Finish().message().find("unknown option si\\nze (\"\\x01\"); known options: "),
+  EXPECT_NE(reader.Finish().message().find("unknown option si\\nze (\"\\x01\"); known are "),
             std::string::npos);
+}
+
+TEST(Options, MisspeltOptionSuggestsTheNearest) {
+  const DisplayOptions options{.name = "d", .driver = "x", .options = {{"siez", "8x8x8"}}};
+  OptionReader reader(options);
+  reader.Size("size", {8, 8, 8}, 3, 3);
+  reader.Number("rate", 1, 0, 2);
+  EXPECT_THAT(std::string(reader.Finish().message()),
+              testing::EndsWith("unknown option siez (\"8x8x8\"); did you mean size?"));
 }
 
 }  // namespace

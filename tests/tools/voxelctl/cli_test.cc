@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "absl/strings/str_split.h"
-#include "daemon/suggest/suggest.h"
+#include "common/text/suggest.h"
 #include "tools/voxelctl/cli/options.h"
 #include "tools/voxelctl/cli/patterns.h"
 

@@ -9,7 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "common/text/printable.h"
-#include "daemon/suggest/suggest.h"
+#include "common/text/suggest.h"
 
 namespace voxeld::voxelctl {
 

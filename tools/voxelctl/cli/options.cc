@@ -12,7 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "common/text/printable.h"
-#include "daemon/suggest/suggest.h"
+#include "common/text/suggest.h"
 #include "daemon/usage/usage_error.h"
 #include "tools/voxelctl/cli/about.h"
 #include "tools/voxelctl/cli/argument_checks.h"

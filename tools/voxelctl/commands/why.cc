@@ -6,7 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "common/text/printable.h"
-#include "daemon/suggest/suggest.h"
+#include "common/text/suggest.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/text/proto_json.h"
 #include "tools/voxelctl/text/table.h"

@@ -12,7 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "common/text/printable.h"
-#include "daemon/suggest/suggest.h"
+#include "common/text/suggest.h"
 #include "gpu/affine.h"
 #include "tools/voxelctl/shape/field_text.h"
 
