@@ -5,6 +5,10 @@
 # Ampere, the oldest architecture that the engine supports: earlier ones have too little shared memory per thread block.
 set(VOXELD_CUDA_ARCHITECTURES "80-virtual;90-real" CACHE STRING "CUDA architectures, as CMAKE_CUDA_ARCHITECTURES names them")
 set(VOXELD_HAVE_CUDA OFF)
+string(TOUPPER "${VOXELD_CUDA}" VOXELD_CUDA)
+if(VOXELD_CUDA MATCHES "^(0|NO|FALSE|N)$")
+  set(VOXELD_CUDA OFF)
+endif()
 if(VOXELD_CUDA STREQUAL "OFF")
   message(STATUS "CUDA engine: left out (VOXELD_CUDA=OFF)")
   return()

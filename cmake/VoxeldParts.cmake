@@ -1,11 +1,18 @@
-# Optional parts of a build. Packages include all of them except voxeld-ros, which would make ROS a dependency. The libraries of a
+# Optional parts of a build. They are on by default, or off with VOXELD_MINIMAL. An option that was given keeps its value in later runs
+# of CMake, so parts can be added one after the other. Packages include all of them except voxeld-ros, which would make ROS a dependency. The libraries of a
 # disabled part are not required; voxelctl then prints the commands that add the part (tools/voxelctl/text/not_built.h).
-option(VOXELD_IMPORTERS "More file formats than STL, PLY, VOX, GeoJSON, TopoJSON and points as text (assimp, gdcm, nifti, libxml2, GLU, lzf)" ON)
-option(VOXELD_RECORDING "Recordings and playlists: voxelctl record, replay, playlist (zstd)" ON)
-option(VOXELD_LIGHTS "LED protocols as input: voxelctl input and pipe" ON)
-option(VOXELD_MARKERS "Foxglove marker client: voxelctl markers" ON)
-option(VOXELD_ROS "voxeld-ros (ROS 1 markers); requires VOXELD_MARKERS; skipped if roscpp is missing" ON)
-option(VOXELD_BENCH "Build the benchmarks" ON)
+option(VOXELD_MINIMAL "Turn off by default all optional parts except VOXELD_PAGE (for new build folders)" OFF)
+set(by_default ON)
+if(VOXELD_MINIMAL)
+  set(by_default OFF)
+endif()
+option(VOXELD_IMPORTERS "More file formats than STL, PLY, VOX, GeoJSON, TopoJSON and points as text (assimp, gdcm, nifti, libxml2, GLU, lzf)" ${by_default})
+option(VOXELD_RECORDING "Recordings and playlists: voxelctl record, replay, playlist (zstd)" ${by_default})
+option(VOXELD_LIGHTS "LED protocols as input: voxelctl input and pipe" ${by_default})
+option(VOXELD_MARKERS "Foxglove marker client: voxelctl markers" ${by_default})
+option(VOXELD_ROS "voxeld-ros (ROS 1 markers); requires VOXELD_MARKERS; skipped if roscpp is missing" ${by_default})
+option(VOXELD_BENCH "Build the benchmarks" ${by_default})
+option(VOXELD_PYTHON_CLIENT "Python client: the wheel (target python_client)" ${by_default})
 option(VOXELD_PAGE "Web viewer served by voxeld; skipped if Node.js or its npm packages are missing" ON)
 
 # Tests that go through several parts run where all of these are built.

@@ -53,7 +53,8 @@ function(voxeld_precompiled_headers name reach level hardening)
   if(hardening)
     set_target_properties(${name} PROPERTIES ${hardening})
   endif()
-  target_compile_options(${name} PRIVATE -pthread -fPIC -${level})
+  # Without -fno-pch-timestamp, reinstalling a package changes the times of its headers and invalidates the files of the compiler cache.
+  target_compile_options(${name} PRIVATE -pthread -fPIC -${level} "SHELL:-Xclang -fno-pch-timestamp")
   target_link_libraries(${name} PRIVATE voxeld_options voxeld_warnings absl::flat_hash_map absl::flat_hash_set absl::statusor
                                         absl::strings absl::str_format absl::synchronization absl::time)
   set(headers
@@ -121,6 +122,12 @@ function(voxeld_precompile_headers)
   if(NOT (VOXELD_INSTRUMENTED OR VOXELD_QUICK) OR NOT CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
     return()
   endif()
+  # The files of a package are as old as the package, so Ninja does not notice that a header was upgraded, and Clang then refuses the
+  # precompiled header. CMake runs again after each change of Debian's packages.
+  if(EXISTS /var/lib/dpkg/status)
+    set_property(DIRECTORY ${CMAKE_SOURCE_DIR} APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS /var/lib/dpkg/status)
+  endif()
+  execute_process(COMMAND python3 -B ${CMAKE_SOURCE_DIR}/tools/stale_headers.py ${CMAKE_BINARY_DIR})
   string(TOUPPER "CMAKE_CXX_FLAGS_${CMAKE_BUILD_TYPE}" flags)
   voxeld_targets_below(${CMAKE_SOURCE_DIR} targets)
   # The headers need what these generate.

@@ -303,6 +303,10 @@ function(voxeld_whole_test test program labels filter without timeout cost shard
       set(each ${test}.${shard})
     endif()
     add_test(NAME ${each} COMMAND ${program} --gtest_filter=${filter} WORKING_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR})
+    # GoogleTest succeeds if no case matches the filter. A shard may have none.
+    if(last EQUAL 0)
+      set_tests_properties(${each} PROPERTIES FAIL_REGULAR_EXPRESSION "\\[  PASSED  \\] 0 tests")
+    endif()
     set_tests_properties(${each} PROPERTIES LABELS "${labels}" TIMEOUT ${timeout} COST ${cost}
                          ENVIRONMENT "GTEST_TOTAL_SHARDS=${shards};GTEST_SHARD_INDEX=${shard}")
   endforeach()

@@ -48,18 +48,28 @@ def exactly(tests):
     return "^(" + "|".join(re.sub(r"([^A-Za-z0-9_])", r"[\1]", test["name"]) for test in tests) + ")$"
 
 
+def outputs_of(build):
+    """Returns: the paths, relative to `build`, of all files that the build makes."""
+    listed = subprocess.run(["ninja", "-C", build, "-t", "targets", "all"], capture_output=True, text=True, check=True)
+    return {line.rsplit(": ", 1)[0] for line in listed.stdout.splitlines()}
+
+
 def targets_of(build, tests):
-    """The targets to build: the programs that the tests run, or what scripts use."""
-    programs = os.path.realpath(os.path.join(build, "bin"))
+    """Returns: the files to build: all that the tests' commands and environments name, or "all" if one is given the build folder itself."""
+    outputs = outputs_of(build)
+    programs = os.path.realpath(build)
     targets = set()
     for test in tests:
         words = test.get("command", [])
         properties = {entry["name"]: entry["value"] for entry in test.get("properties", [])}
         words = words + [word for setting in properties.get("ENVIRONMENT", []) for word in re.split(r"[=:]", setting)]
-        found = {os.path.basename(word) for word in words if os.path.realpath(word).startswith(programs + os.sep)}
-        targets |= found
-        if not any(word.startswith(programs + "/tests/") for word in test.get("command", [])[:1]):
-            targets |= {"python_client"} if any("voxeld-" in word and word.endswith(".whl") for word in words) else set()
+        for word in words:
+            path = os.path.realpath(word)
+            if path == programs:
+                return ["all"]
+            path = os.path.relpath(path, programs)
+            if path in outputs:
+                targets.add(path)
     return sorted(targets)
 
 
@@ -123,18 +133,26 @@ def main():
     runnable = {test["command"][0] for test in tests_of(arguments.build) if test.get("command")}
     runnable = {os.path.basename(path): path for path in runnable}
     named = {name: cases for name, cases in programs.items() if name in runnable}
-    if not named:
-        print(f"tools/test: '{arguments.pattern}' matches only GoogleTest cases in {', '.join(sorted(programs))}, which several test programs link;"
-              " run a program by name, for example: tools/test conformance", file=sys.stderr)
-        return 1
-    if make(sorted(named)) != 0:
-        return 1
     status = 0
+    if len(named) < len(programs):
+        shared = ", ".join(sorted(programs.keys() - named.keys()))
+        print(f"tools/test: '{arguments.pattern}' also matches GoogleTest cases in {shared}, which several test programs link and which are not"
+              " run here; run a program by name, for example: tools/test conformance", file=sys.stderr)
+        status = 1
+    if named and make(sorted(named)) != 0:
+        return 1
     for name, cases in sorted(named.items()):
         # The full names of value-parameterised and typed cases have a prefix or a suffix.
         wanted = ":".join(f"{case}:*/{case}/*:{case.split('.')[0]}/*.{case.split('.')[1]}:*/{case.split('.')[0]}/*.{case.split('.')[1]}"
                           for case in sorted(cases))
         folder = os.path.dirname(runnable[name])
+        listed = subprocess.run([runnable[name], f"--gtest_filter={wanted}", "--gtest_list_tests"], cwd=folder, capture_output=True, text=True,
+                                check=False)
+        # A case is indented; other lines are its suite, or come from GoogleTest.
+        if not re.search(r"^  \S", listed.stdout, re.MULTILINE):
+            print(f"tools/test: {name} has none of the cases {', '.join(sorted(cases))}, which its sources name", file=sys.stderr)
+            status = 1
+            continue
         status |= subprocess.run([runnable[name], f"--gtest_filter={wanted}"], cwd=folder, check=False).returncode
     return 1 if status else 0
 

@@ -82,7 +82,8 @@ class Reader:
         programs, home = Path(folder.name, "bin"), Path(folder.name, "home")
         for one in (programs, home, self.folder / "build"):
             one.mkdir(parents=True)
-        (self.folder / "build" / "release").symlink_to(os.environ["BUILD"])
+        for preset in ("demo", "release"):
+            (self.folder / "build" / preset).symlink_to(os.environ["BUILD"])
         (self.folder / "display").symlink_to(Path(os.environ["SOURCE"], "display"))
         for name, path in (("voxelctl", os.environ["VOXELCTL"]), ("cmake", os.environ["VOXELD_CMAKE"]), ("python3", sys.executable)):
             (programs / name).symlink_to(path)

@@ -23,6 +23,12 @@ TESTS = """
 add_executable(one_test one_test.cc)
 add_executable(host two.cc)
 add_executable(guest two.cc)
+add_executable(apart two.cc)
+set_target_properties(apart PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/elsewhere)
+add_test(NAME script.runs_apart COMMAND sh script $<TARGET_FILE:apart>)
+add_test(NAME script.installs COMMAND sh script ${CMAKE_BINARY_DIR})
+add_test(NAME script.by_environment COMMAND sh script)
+set_tests_properties(script.by_environment PROPERTIES ENVIRONMENT "PROGRAMS=$<TARGET_FILE:apart>:$<TARGET_FILE:guest>;FOLDER=${CMAKE_BINARY_DIR}/tests")
 add_test(NAME one_test COMMAND one_test --gtest_filter=*)
 add_test(NAME host.runs_guest COMMAND host $<TARGET_FILE:guest>)
 set_tests_properties(host.runs_guest PROPERTIES LABELS deep)
@@ -48,9 +54,17 @@ class RunMatchingTest(unittest.TestCase):
         return run_matching.targets_of(self.build, tests)
 
     def test_programs_that_were_never_built_are_built(self):
-        self.assertEqual(self.targets("^one_test$"), ["one_test"])
-        self.assertEqual(self.targets("runs_guest"), ["guest", "host"])
-        self.assertEqual(self.targets("."), ["guest", "host", "one_test"])
+        self.assertEqual(self.targets("^one_test$"), ["bin/tests/one_test"])
+        self.assertEqual(self.targets("runs_guest"), ["bin/tests/guest", "bin/tests/host"])
+        self.assertEqual(self.targets("one|host"), ["bin/tests/guest", "bin/tests/host", "bin/tests/one_test"])
+
+    def test_programs_outside_of_bin_are_built(self):
+        self.assertEqual(self.targets("runs_apart"), ["elsewhere/apart"])
+        self.assertEqual(self.targets("by_environment"), ["bin/tests/guest", "elsewhere/apart"])
+
+    def test_what_uses_the_whole_build_has_all_built(self):
+        self.assertEqual(self.targets("installs"), ["all"])
+        self.assertEqual(self.targets("."), ["all"])
 
     def test_cases_are_found_in_the_sources(self):
         self.assertEqual(run_matching.programs_with(self.build, re.compile("Lamp")),

@@ -422,6 +422,16 @@ class ContinuousIntegration(Sandbox):
     def test_required_stages_may_use_88_minutes(self) -> None:
         self.assertEqual(self.ci(seconds=80 * 60)[0], 0)
 
+    def test_a_timeout_fails_the_run_only_in_a_required_stage(self) -> None:
+        # A timeout of an optional stage is only reported; that of a required stage is a failure.
+        timing_out = 'case " $TIMING_OUT " in *" $stage "*) exit 124 ;; esac\n'
+        self.environment["TIMING_OUT"] = "demo hil"
+        status, table = self.ci(then=timing_out)
+        self.assertEqual((status, table["demo"], table["hil"], table["tsan"]), (0, "TIMED OUT", "TIMED OUT", "passed"))
+        self.environment["TIMING_OUT"] = "tsan"
+        status, table = self.ci(then=timing_out)
+        self.assertEqual((status, table["tsan"], table["asan"]), (1, "TIMED OUT", "passed"))
+
     def test_a_sanitizer_that_was_not_run_is_a_failure(self) -> None:
         status, table = self.ci(seconds=88 * 60)
         self.assertEqual((status, table["test"], table["asan"]), (1, "passed", "NOT RUN: not enough time left"))
@@ -501,6 +511,13 @@ mkdir -p build/demo/bin; cp "$STUBS/voxeld" "$STUBS/voxelctl" build/demo/bin"""
         self.assertEqual(done.returncode, 1)
         self.assertIn("a compiler ran out of memory; close other programs or run: tools/demo --jobs 1", done.stderr)
         self.assertIn("FAILED: x/2.cc.o", done.stdout)
+
+    def test_a_command_that_fails_without_an_error_was_out_of_memory_too(self) -> None:
+        # Clang compiles in its own process, so nobody is left to say that it was killed.
+        self.programs(build='echo "@ 1 3 Building CXX object x/1.cc.o"; echo "FAILED: x/2.cc.o"; echo "clang++-16 -c x/2.cc -o x/2.cc.o"; exit 1')
+        done = self.run_tool("demo", "--once")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("a compiler ran out of memory; close other programs or run: tools/demo --jobs 1", done.stderr)
 
     def test_an_error_of_the_compiler_is_shown(self) -> None:
         self.programs(build='echo "FAILED: x/2.cc.o"; echo "x/2.cc:1: error: expected ;"; exit 1')

@@ -4,6 +4,14 @@
     v = voxel.connect()
     v.lines("axes", [[-1, 0, 0], [1, 0, 0]], colors="tab:orange")
 """
+import importlib.util
+
+if importlib.util.find_spec(f"{__name__}.v1") is None:
+    raise ImportError(
+        "voxeld: the generated modules (voxeld.v1) are not here: this is the client's source. Build the wheel in the source tree: "
+        "tools/setup --python && cmake --preset demo -DVOXELD_PYTHON_CLIENT=ON && cmake --build --preset demo --target python_client; "
+        "then install it in a virtual environment: pip install build/demo/python/voxeld-*.whl")
+
 from . import aio
 from .assets import Asset
 from .clip import ClipBox, ClipCylinder

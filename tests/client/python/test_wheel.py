@@ -1,8 +1,11 @@
 """What is shipped. PYTHONPATH begins with the wheel."""
 import os
+import subprocess
+import sys
 import unittest
 import zipfile
 from email.parser import Parser
+from pathlib import Path
 
 import voxeld
 
@@ -12,6 +15,14 @@ WHEEL = os.environ["PYTHONPATH"].split(":")[0]
 class Wheel(unittest.TestCase):
     def test_it_is_what_is_imported(self) -> None:
         self.assertTrue(voxeld.__file__.startswith(WHEEL + "/"), voxeld.__file__)
+
+    def test_the_source_folder_says_how_to_build_it(self) -> None:
+        source = Path(__file__).resolve().parents[3] / "client/python"
+        done = subprocess.run([sys.executable, "-B", "-c", "import voxeld"], env={**os.environ, "PYTHONPATH": str(source)}, capture_output=True, text=True,
+                              check=False)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("ImportError: voxeld: the generated modules (voxeld.v1) are not here", done.stderr)
+        self.assertIn("cmake --build --preset demo --target python_client", done.stderr)
 
     def test_it_has_types_stubs_and_nothing_else(self) -> None:
         with zipfile.ZipFile(WHEEL) as wheel:
