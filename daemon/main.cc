@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/algorithm/container.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
@@ -129,8 +130,7 @@ absl::StatusOr<std::unique_ptr<http::Server>> StartHttp(
                           viewer.Handler(http::MonitorHandler(core, std::move(phase))),
                           viewer.Upgrade(), viewer.Receive());
   if (server.ok() || config.http_asked || !absl::IsAlreadyExists(server.status())) return server;
-  log.Warn("no http port", {{"why", std::string(server.status().message())},
-                            {"hint", "choose another with --http ADDR, or none with --http off"}});
+  log.Warn("no http port", {{"why", std::string(server.status().message())}});
   return nullptr;
 }
 
@@ -156,9 +156,18 @@ bool TellsControl(const Config& config) {
   return config.log.format == "text" && isatty(STDOUT_FILENO) != 0;  // JSON is for programs
 }
 
-// For whoever started it by hand: where to look, what to try, what draws.
-void Welcome(Core& core, const http::Server* http, const viewer::Viewer& viewer,
-             bool tells_control) {
+// Returns: "--server ADDR " with the first address that is served, or nothing if voxelctl tries one of them by default.
+std::string OptionForClients(const std::vector<std::string>& addresses) {
+  const std::vector<std::string> known = DefaultAddresses(ProcessEnvironment());
+  const bool is_known = absl::c_any_of(addresses, [&known](const std::string& address) {
+    return absl::c_linear_search(known, address);
+  });
+  return addresses.empty() || is_known ? "" : absl::StrCat("--server ", addresses.front(), " ");
+}
+
+// Prints where to look, what to try and what draws, for a user who started the daemon by hand. `server`: as OptionForClients returns it.
+void Welcome(Core& core, const http::Server* http, const viewer::Viewer& viewer, bool tells_control,
+             const std::string& server) {
   if (http != nullptr && !http->address().unix_socket) {
     const std::string page = viewer::Viewer::PageAddress(http->address());
     const std::string control = viewer.ControlAddress(http->address());
@@ -173,9 +182,10 @@ void Welcome(Core& core, const http::Server* http, const viewer::Viewer& viewer,
       std::printf("see:    %s\n", page.c_str());
     }
   } else {
-    std::printf("see:    voxelctl snapshot picture.png (http is off)\n");
+    std::printf("see:    voxelctl %ssnapshot picture.png (there is no http port)\n",
+                server.c_str());
   }
-  std::printf("try:    voxelctl demo\n");
+  std::printf("try:    voxelctl %sdemo\n", server.c_str());
   std::promise<absl::StatusOr<Stats>> promise;
   core.GetStats([&promise](absl::StatusOr<Stats> stats) { promise.set_value(std::move(stats)); });
   const absl::StatusOr<Stats> stats = promise.get_future().get();
@@ -216,6 +226,13 @@ void FeedWatchdog(Core& core, const Supervisor& supervisor) {
   core.GetStats([&supervisor](const absl::StatusOr<Stats>& stats) {
     if (stats.ok() && stats->connections.unreachable.empty()) supervisor.Alive();
   });
+}
+
+// Returns: EngineOptions::cpu_index_bytes. Items and lists of tiles are counted only after they have been drawn, so the CPU engines of
+// all displays together get at most half of max_memory_bytes for both.
+uint64_t CpuIndexBytes(uint64_t max_memory_bytes, size_t displays) {
+  const uint64_t share = max_memory_bytes / 2 / std::max<size_t>(1, displays);
+  return std::clamp(share / 5 * 4, uint64_t{1}, uint64_t{4} << 30);
 }
 
 int Serve(const Config& config, const CommandLine& command_line, Displays displays,
@@ -278,16 +295,18 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
                    return figures;
                  }},
             clock);
-  const gpu::EngineOptions engine{.kind = config.engine.kind,
-                                  .threads = static_cast<int>(config.engine.threads),
-                                  .device = static_cast<int>(config.engine.device),
-                                  .nccl = config.engine.nccl,
-                                  .in_worker = config.engine.in_worker,
-                                  .worker = config.engine.worker,
-                                  .workers = std::make_shared<gpu::WorkerPool>(),
-                                  .worker_deadline_ns = config.engine.worker_deadline_ns,
-                                  .staging_limit_bytes = config.engine.staging_limit_bytes,
-                                  .index_bytes = config.engine.index_bytes};
+  const gpu::EngineOptions engine{
+      .kind = config.engine.kind,
+      .threads = static_cast<int>(config.engine.threads),
+      .device = static_cast<int>(config.engine.device),
+      .nccl = config.engine.nccl,
+      .in_worker = config.engine.in_worker,
+      .worker = config.engine.worker,
+      .workers = std::make_shared<gpu::WorkerPool>(),
+      .worker_deadline_ns = config.engine.worker_deadline_ns,
+      .staging_limit_bytes = config.engine.staging_limit_bytes,
+      .index_bytes = config.engine.index_bytes,
+      .cpu_index_bytes = CpuIndexBytes(config.limits.max_memory_bytes, displays.size())};
   const size_t core_displays = displays.size();
   for (auto& [display, setup, gpus] : displays) {
     if (absl::Status status = core.AddDisplay(std::move(display), EngineOf(engine, gpus), setup);
@@ -392,7 +411,9 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
                      {"http", *http == nullptr ? "off" : (*http)->address().ToString()}});
 
   // JSON is for programs, which may read both outputs as one.
-  if (config.log.format == "text") Welcome(core, http->get(), **viewer, TellsControl(config));
+  if (config.log.format == "text") {
+    Welcome(core, http->get(), **viewer, TellsControl(config), OptionForClients(addresses));
+  }
 
   const std::string displays_text =
       absl::StrCat(core_displays, core_displays == 1 ? " display" : " displays");

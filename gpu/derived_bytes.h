@@ -18,8 +18,8 @@ constexpr uint64_t HeapBytes(uint64_t bytes) {
 // An upper bound for a drawable without vertices: its record, its places in indexes, and the smallest lists (assemble/scene.cc checks it).
 inline constexpr uint64_t kMostDrawableBytes = 1200;
 
-// Returns: an upper bound of the bytes that an engine holds for one drawable of this geometry, without lists of tiles, the pieces of
-// curves, and lists of items (EngineOptions::index_bytes bounds these).
+// Returns: an upper bound of the bytes that an engine holds for one drawable of this geometry, without lists of tiles and items, and
+// the pieces of curves: EngineOptions::index_bytes bounds those for all drawables together.
 constexpr uint64_t MostDerivedBytes(const GeometryRecord& geometry) {
   return kMostDrawableBytes + HeapBytes(uint64_t{geometry.vertex_count} * 3 * sizeof(int32_t));
 }

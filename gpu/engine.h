@@ -103,9 +103,11 @@ struct EngineOptions {
   SlicePart part;
   uint64_t staging_limit_bytes = uint64_t{4} << 30;  // of blocks at once, until they are applied
   // Bounds what an engine derives of items by tile (CPU), or by tile and region (CUDA, of the device's
-  // memory). A scene that needs more is drawn in passes, to the same bytes, in more time. 0: the
-  // engine's own choice (CPU: 4 GiB; CUDA: 16 GiB or a quarter of the device, whichever is less).
+  // memory). The CPU engine may use a quarter more for lists of the tiles that drawables are in, and for pieces of curves.
+  // A scene that needs more is drawn in passes: more slowly, with the same result. 0: the engine's default (CPU:
+  // cpu_index_bytes; CUDA: 16 GiB or a quarter of the device, whichever is less).
   uint64_t index_bytes = 0;
+  uint64_t cpu_index_bytes = 0;  // 0: 4 GiB
 };
 
 struct EngineInfo {

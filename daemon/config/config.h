@@ -128,6 +128,9 @@ struct Config {
 using Environment = std::function<std::optional<std::string>(const char* name)>;
 Environment ProcessEnvironment();
 
+// Returns: the addresses at which gRPC is served by default. voxelctl and the clients also try these by default.
+std::vector<std::string> DefaultAddresses(const Environment& environment);
+
 // Reads `path` over `config`. Every fault of the file is in the message, one a line, each as
 // "path:line:column: key what was wrong, the value, what would be right". InvalidArgument, or
 // NotFound if there is no such file.

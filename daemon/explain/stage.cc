@@ -47,7 +47,9 @@ Stage::Stage(std::unique_ptr<gpu::Engine> engine, const gpu::Target& target,
 
 absl::StatusOr<std::unique_ptr<Stage>> Stage::Make(const gpu::Target& target,
                                                    std::function<bool()> cancelled) {
-  auto engine = gpu::CreateEngine({.kind = gpu::EngineKind::kCpu, .inline_execution = true});
+  auto engine = gpu::CreateEngine({.kind = gpu::EngineKind::kCpu,
+                                   .inline_execution = true,
+                                   .index_bytes = uint64_t{256} << 20});
   if (!engine.ok()) return engine.status();
   std::unique_ptr<Stage> stage(new Stage(*std::move(engine), target, std::move(cancelled)));
   Answered answered;

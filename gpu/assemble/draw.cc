@@ -119,7 +119,7 @@ void MapDrawable(Drawable& d, const Affine& view_map, const TileGrid& grid, Exec
   d.source.record = &view.record;
   d.source.tint = d.record.tint;
   d.cut = nullptr;
-  d.inside = {};
+  d.inside = std::vector<uint32_t>();
   if (IsCurved(view.record.kind)) {
     d.cut = std::make_unique<Cut>(CutCurved(view, map, grid));
     d.source.record = &d.cut->record;

@@ -10,6 +10,8 @@ namespace {
 
 // Of an item in a tile, all in all: what it is expected to need. More where lines are long, less where triangles are.
 constexpr uint64_t kItemBytes = 192;
+// Bytes of a drawable in the list of a tile: a Volume::Entry of 16, and half of that for unused capacity, on average.
+constexpr uint64_t kEntryBytes = 24;
 
 }  // namespace
 
@@ -26,9 +28,43 @@ bool IndexBudget::Keep(Drawable& d) {
 
 void IndexBudget::Release(Drawable& d) {
   d.bins = Bins();
-  d.inside = {};
+  d.inside = std::vector<uint32_t>();  // "= {}" would keep the memory
   d.source.inside = nullptr;
   Charge(d, 0);
+}
+
+bool IndexBudget::TryChargeLists(Drawable& d) {
+  ReleaseLists(d);
+  const Bins& bins = d.bins;
+  // As much with counts as with items, so that a drawable that is counted has room when its items do.
+  const uint64_t words =
+      bins.tiles.capacity() +
+      std::max({bins.begin.capacity(), bins.counts.capacity(), bins.tiles.size() + 1});
+  const uint64_t bytes = words * sizeof(uint32_t) + bins.tiles.size() * kEntryBytes +
+                         (d.cut != nullptr ? d.cut->bytes() : 0);
+  // What does not fit is not charged for a moment either, so it keeps out no other drawable.
+  uint64_t listed = listed_bytes();
+  while (bytes <= list_bytes_ && listed <= list_bytes_ - bytes) {
+    if (!listed_.compare_exchange_weak(listed, listed + bytes, std::memory_order_relaxed)) continue;
+    d.list_bytes = bytes;
+    return true;
+  }
+  uint64_t least = least_refused_.load(std::memory_order_relaxed);
+  while (bytes < least &&
+         !least_refused_.compare_exchange_weak(least, bytes, std::memory_order_relaxed)) {
+  }
+  return false;
+}
+
+void IndexBudget::ReleaseLists(Drawable& d) {
+  listed_.fetch_sub(std::exchange(d.list_bytes, 0), std::memory_order_relaxed);
+}
+
+bool IndexBudget::RefusedWouldFit() {
+  const uint64_t least = least_refused_.load(std::memory_order_relaxed);
+  if (least > list_bytes_ || listed_bytes() > list_bytes_ - least) return false;
+  least_refused_.store(UINT64_MAX, std::memory_order_relaxed);
+  return true;
 }
 
 bool FindBins(const Drawable& d, const TileGrid& grid, std::span<const uint8_t> owned,

@@ -5,7 +5,8 @@
 // their items, which are found anew for each pass (PassBins). In a tile that has too many by itself they are found and drawn
 // range by range.
 //
-// Beside the budget, for each tile of the grid and each tile that a drawable is in, there are a few bytes.
+// The lists of the tiles that drawables are in, and the pieces of curves, have a budget of their own. A drawable that exceeds it is
+// unlisted: only the box around its tiles is kept. Each owned tile in such a box is drawn by itself, range by range.
 #pragma once
 
 #include <atomic>
@@ -25,16 +26,26 @@ namespace voxeld::gpu {
 inline constexpr uint64_t kIndexBytes = uint64_t{4} << 30;
 
 // How many bytes go where: three quarters at most to bins that are kept, an eighth at least to finding items, and as much to
-// what workers find by themselves.
+// what workers find by themselves. Lists of tiles, and pieces of curves, have `list_bytes` beside that (0: a quarter of `bytes`).
 class IndexBudget {
  public:
-  explicit IndexBudget(uint64_t bytes) : bytes_(bytes == 0 ? kIndexBytes : bytes) {}
+  explicit IndexBudget(uint64_t bytes, uint64_t list_bytes = 0)
+      : bytes_(bytes == 0 ? kIndexBytes : bytes),
+        list_bytes_(list_bytes == 0 ? bytes_ / 4 : list_bytes) {}
 
   // Charges what the bins of a drawable, and `inside`, hold now, instead of what they held. False if too much would be kept:
   // then they have no items, and hold nothing. For different drawables by several threads.
   bool Keep(Drawable& drawable);
   // The bins go, and `inside`.
   void Release(Drawable& drawable);
+  // Charges the lists of the drawable's tiles, and its cut, instead of what they were charged before. False if there is no room:
+  // then nothing is charged, and the caller drops them. For different drawables by several threads.
+  bool TryChargeLists(Drawable& drawable);
+  // Releases what TryChargeLists has charged.
+  void ReleaseLists(Drawable& drawable);
+  uint64_t listed_bytes() const { return listed_.load(std::memory_order_relaxed); }
+  // Whether the smallest charge that was refused since this was last true would fit now.
+  bool RefusedWouldFit();
   uint64_t kept_bytes() const { return kept_.load(std::memory_order_relaxed); }
   // For all workers in turns: to find items, or for a pass.
   uint64_t room() const { return bytes_ - bytes_ / 8 - kept_bytes(); }
@@ -46,8 +57,8 @@ class IndexBudget {
  private:
   void Charge(Drawable& drawable, uint64_t bytes);
 
-  const uint64_t bytes_;
-  std::atomic<uint64_t> kept_{0};
+  const uint64_t bytes_, list_bytes_;
+  std::atomic<uint64_t> kept_{0}, listed_{0}, least_refused_{UINT64_MAX};
 };
 
 // Finds the items of a drawable that is mapped, in `bytes` at most together with what `scratch` holds already. False if they

@@ -45,8 +45,12 @@ struct Drawable {
   Bins bins;
   uint64_t derived_bytes = 0;
   uint64_t index_bytes = 0;  // of the budget (passes.h), for as long as bins and `inside` have it
+  uint64_t list_bytes = 0;   // likewise, of the lists of its tiles and of `cut`
   bool pending = false;      // awaits preparation
   bool leaving = false;      // its entries are being taken out of the tiles
+  // There was no room to list its tiles, so bins and `cut` are empty. It may be in any tile of `tile_box`.
+  bool unlisted = false;
+  Box3 tile_box;
 };
 
 struct Layer {

@@ -32,6 +32,13 @@ constexpr size_t kFreeBlocks = 256;      // kept, beside as many as are spare
 constexpr size_t kKeptEntries = 4096;    // of a list whose entries have gone
 constexpr size_t kMovedRun = 16;  // tiles that a worker draws one behind the other where more are
 
+bool Contains(const Box3& box, const int32_t at[3]) {
+  for (int a = 0; a < 3; ++a) {
+    if (at[a] < box.lo[a] || at[a] >= box.hi[a]) return false;
+  }
+  return true;
+}
+
 // Puts a layer's words over the colours of a tile.
 void BlendTile(const LayerRecord& layer, const uint32_t* words, uint32_t* colors) {
   if (layer.blend == BlendMode::kOver && layer.opacity == 255) {
@@ -148,9 +155,29 @@ void Volume::MarkDirty(uint32_t tile) {
   dirty_.push_back(tile);
 }
 
+template <typename Fn>
+void Volume::ForEachTile(const Drawable& d, Fn fn) const {
+  if (!d.unlisted) {
+    for (const uint32_t tile : d.bins.tiles) fn(tile);
+    return;
+  }
+  const Box3& box = d.tile_box;
+  for (int32_t k = box.lo[2]; k < box.hi[2]; ++k) {
+    for (int32_t j = box.lo[1]; j < box.hi[1]; ++j) {
+      for (int32_t i = box.lo[0]; i < box.hi[0]; ++i) {
+        const uint32_t tile = grid_.Index(i, j, k);
+        if (owned_[tile] != 0) fn(tile);
+      }
+    }
+  }
+}
+
 void Volume::OnLeave(Drawable& drawable) {
   executor_.ThrowIfAbandoned();
   if (drawable.pending || drawable.leaving) return;  // in no tile, or on its way out already
+  if (drawable.unlisted && drawable.layer->drawn) {
+    ForEachTile(drawable, [this](uint32_t tile) { MarkDirty(tile); });
+  }
   for (uint32_t tile : drawable.bins.tiles) {
     if (drawable.layer->drawn) MarkDirty(tile);
     if (!index_[tile].leaving) {
@@ -178,7 +205,7 @@ void Volume::OnLayerLook(Layer& layer, const LayerRecord& next) {
   // Nothing of it was to be seen, and where it will be is not known yet.
   if (!layer.drawn && !(now.transform == next.transform)) return;
   for (Drawable* drawable : layer.drawables) {
-    for (uint32_t tile : drawable->bins.tiles) MarkDirty(tile);
+    ForEachTile(*drawable, [this](uint32_t tile) { MarkDirty(tile); });
   }
 }
 
@@ -195,9 +222,11 @@ void Volume::TakeOutLeaving() {
     index_[tile].leaving = false;
   }
   leaving_.clear();
+  std::erase_if(unlisted_, [](const Drawable* d) { return d->leaving; });
   for (Drawable* drawable : left_) {
-    drawable->leaving = false;
+    drawable->leaving = drawable->unlisted = false;
     drawable->bins.Clear();
+    budget_.ReleaseLists(*drawable);
   }
   left_.clear();
   if (left_.capacity() > kKeptEntries) left_.shrink_to_fit();
@@ -232,9 +261,12 @@ void Volume::SetView(const TileGrid& grid, const Affine& view, std::vector<uint8
   singular_ = 0;
   counted_ = 0;
   most_kept_ = 0;
+  unlisted_.clear();
   for (const auto& [id, drawable] : scene_.drawables()) {
     drawable->pending = true;
+    drawable->unlisted = false;
     drawable->bins.Clear();
+    budget_.ReleaseLists(*drawable);
     pending_.push_back(drawable.get());
   }
   scratch_.resize(static_cast<size_t>(executor_.concurrency()));
@@ -254,7 +286,32 @@ bool Volume::Keep(Drawable& d, Executor& executor, uint64_t bytes, BinScratch& s
     budget_.Release(d);
     return false;
   }
-  return budget_.Keep(d);
+  if (!budget_.Keep(d)) return false;
+  ListOrForget(d);
+  return true;
+}
+
+void Volume::ListOrForget(Drawable& d) {
+  if (budget_.TryChargeLists(d)) return;
+  d.unlisted = true;
+  d.tile_box = {};
+  for (size_t r = 0; r < d.bins.tiles.size(); ++r) {
+    int32_t at[3];
+    grid_.Coordinates(d.bins.tiles[r], at);
+    for (int a = 0; a < 3; ++a) {
+      d.tile_box.lo[a] = r == 0 ? at[a] : std::min(d.tile_box.lo[a], at[a]);
+      d.tile_box.hi[a] = r == 0 ? at[a] + 1 : std::max(d.tile_box.hi[a], at[a] + 1);
+    }
+  }
+  Forget(d);
+}
+
+void Volume::Forget(Drawable& d) {
+  budget_.Release(d);
+  if (d.cut == nullptr) return;
+  d.source = {};
+  d.source.record = &d.geometry->view.record;
+  d.cut = nullptr;
 }
 
 void Volume::Prepare(std::span<Drawable* const> small, std::span<Drawable* const> large) {
@@ -268,8 +325,10 @@ void Volume::Prepare(std::span<Drawable* const> small, std::span<Drawable* const
   const auto keep_or_count = [&](Drawable& d) {
     if (Keep(d, executor_, budget_.room(), large_)) return;
     CountItems(d.source, grid_, owned_, executor_, budget_.room(), large_, d.bins);
+    ListOrForget(d);
   };
   for (size_t i = 0; i < small.size(); ++i) {
+    if (small[i]->unlisted) continue;
     // There may be room now for what was too much for one of the workers.
     const bool filled = FillIn(*small[i], budget_.room() / 2, executor_);
     if (kept[i] == 0 || filled) keep_or_count(*small[i]);
@@ -295,14 +354,17 @@ void Volume::PreparePending() {
     d->derived_bytes = DerivedBytes(*d);
     derived_bytes_ += d->derived_bytes;
     List(*d);
-    if (!d->layer->drawn) continue;
-    for (const uint32_t tile : d->bins.tiles) MarkDirty(tile);
+    if (d->layer->drawn) ForEachTile(*d, [this](uint32_t tile) { MarkDirty(tile); });
   }
   pending_.clear();
   if (pending_.capacity() > kKeptEntries) pending_.shrink_to_fit();
 }
 
 void Volume::List(Drawable& d) {
+  if (d.unlisted) {
+    unlisted_.push_back(&d);
+    return;
+  }
   for (uint32_t row = 0; row < d.bins.tiles.size(); ++row) {
     std::vector<Entry>& entries = index_[d.bins.tiles[row]].entries;
     if (entries.size() < entries.capacity()) {
@@ -313,6 +375,19 @@ void Volume::List(Drawable& d) {
     entries.push_back({&d, row});
     entries_bytes_ += BytesOf(entries);
   }
+}
+
+void Volume::RetryUnlisted() {
+  if (unlisted_.empty() || !budget_.RefusedWouldFit()) return;
+  for (Drawable* d : unlisted_) {
+    singular_ -= IsSingular(*d);
+    derived_bytes_ -= d->derived_bytes;
+    d->unlisted = false;
+    d->pending = true;
+    pending_.push_back(d);
+  }
+  unlisted_.clear();
+  PreparePending();
 }
 
 void Volume::KeepCounted() {
@@ -351,7 +426,9 @@ void Volume::DrawEntries(std::span<const Entry> entries, uint32_t tile, const Bo
                          uint32_t* words, TileRows& touched) {
   for (const Entry& e : entries) {
     const Bins& bins = e.drawable->bins;
-    if (bins.counted()) {
+    if (e.drawable->unlisted) {
+      DrawUnlisted(*e.drawable, tile, box, words, touched);
+    } else if (bins.counted()) {
       passes_.Draw(*e.drawable, tile, box, words, touched);
     } else {
       DrawItems(*e.drawable, bins, bins.row(e.row), grid_, box, words, touched);
@@ -377,6 +454,7 @@ bool Volume::DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, Til
   for (const Entry& e : index_[tile].entries) {
     if (e.drawable->layer->drawn) scratch.entries.push_back(e);
   }
+  scratch.entries.insert(scratch.entries.end(), scratch.unlisted.begin(), scratch.unlisted.end());
   const std::span<const Entry> entries = scratch.entries;
   if (!std::is_sorted(entries.begin(), entries.end(), Lower)) {
     std::sort(scratch.entries.begin(), scratch.entries.end(), Lower);
@@ -464,17 +542,42 @@ void Volume::DrawPass(TileRun run, TileObserver* observer, std::span<Drawn> draw
   if (passes_.Fill(drawables, tiles, grid_, budget_.room())) {
     return DrawRun(run, observer, drawn);
   }
-  if (tiles.size() == 1) {
-    passes_.FillByRanges(tiles[0], grid_, budget_.room());
-    const bool past_caches = dirty_.size() > kCachedTiles;
-    drawn[run.begin].lit_before = tiles_.lit(tiles[0]);
-    drawn[run.begin].differs = DrawTile(tiles[0], nullptr, past_caches, observer, scratch_[0]);
-    if (past_caches) FinishMoves();
-    return;
-  }
+  if (tiles.size() == 1) return DrawAlone(run.begin, observer, drawn);
   const size_t middle = run.begin + tiles.size() / 2;
   DrawPass({run.begin, middle}, observer, drawn);
   DrawPass({middle, run.end}, observer, drawn);
+}
+
+bool Volume::HasUnlisted(uint32_t tile) const {
+  int32_t at[3];
+  grid_.Coordinates(tile, at);
+  return std::ranges::any_of(
+      unlisted_, [&at](const Drawable* d) { return d->layer->drawn && Contains(d->tile_box, at); });
+}
+
+void Volume::DrawAlone(size_t i, TileObserver* observer, std::span<Drawn> drawn) {
+  const uint32_t tile = dirty_[i];
+  passes_.FillByRanges(tile, grid_, budget_.room());
+  Scratch& scratch = scratch_[0];
+  int32_t at[3];
+  grid_.Coordinates(tile, at);
+  for (Drawable* d : unlisted_) {
+    if (d->layer->drawn && Contains(d->tile_box, at)) scratch.unlisted.push_back({d, 0});
+  }
+  const bool past_caches = dirty_.size() > kCachedTiles;
+  drawn[i].lit_before = tiles_.lit(tile);
+  drawn[i].differs = DrawTile(tile, nullptr, past_caches, observer, scratch);
+  if (past_caches) FinishMoves();
+  scratch.unlisted.clear();
+}
+
+void Volume::DrawUnlisted(Drawable& d, uint32_t tile, const Box3& box, uint32_t* words,
+                          TileRows& touched) {
+  executor_.ThrowIfAbandoned();
+  const bool curved = IsCurved(d.geometry->view.record.kind);
+  if (curved) MapDrawable(d, view_, grid_, executor_);
+  passes_.Draw(d, tile, box, words, touched);
+  if (curved) Forget(d);
 }
 
 void Volume::DrawInPasses(TileObserver* observer, std::span<Drawn> drawn) {
@@ -485,12 +588,23 @@ void Volume::DrawInPasses(TileObserver* observer, std::span<Drawn> drawn) {
     }
   }
   large_ = BinScratch();  // the passes have its room
-  for (TileRun run : PlanPasses(items, budget_.room())) DrawPass(run, observer, drawn);
+  size_t begin = 0;
+  for (size_t i = 0; i <= dirty_.size(); ++i) {
+    const bool alone = i < dirty_.size() && HasUnlisted(dirty_[i]);
+    if (i < dirty_.size() && !alone) continue;
+    const std::span<const uint64_t> between = std::span(items).subspan(begin, i - begin);
+    for (const TileRun run : PlanPasses(between, budget_.room())) {
+      DrawPass({begin + run.begin, begin + run.end}, observer, drawn);
+    }
+    if (alone) DrawAlone(i, observer, drawn);
+    begin = i + 1;
+  }
   passes_.Release();
 }
 
 Volume::Changes Volume::Update(TileObserver* observer) {
   PreparePending();
+  RetryUnlisted();
   KeepCounted();
   most_kept_ = std::max(most_kept_, budget_.kept_bytes());
   std::sort(dirty_.begin(), dirty_.end());
@@ -498,7 +612,7 @@ Volume::Changes Volume::Update(TileObserver* observer) {
   changes.tiles_drawn = static_cast<uint32_t>(dirty_.size());
   std::vector<Drawn> drawn(dirty_.size());
   tiles_.Expect(dirty_);
-  if (counted_ == 0) {
+  if (counted_ == 0 && unlisted_.empty()) {
     DrawRun({0, dirty_.size()}, observer, drawn);
   } else {
     DrawInPasses(observer, drawn);

@@ -82,9 +82,9 @@ class TileObserver {
 // Thread-bound; the work inside is spread over `executor`.
 class Volume final : private SceneObserver {
  public:
-  // `index_bytes`: as EngineOptions has them.
-  explicit Volume(Executor& executor, uint64_t index_bytes = 0)
-      : executor_(executor), budget_(index_bytes), passes_(executor) {}
+  // `index_bytes`: as EngineOptions has them. `list_bytes`: as IndexBudget has them.
+  explicit Volume(Executor& executor, uint64_t index_bytes = 0, uint64_t list_bytes = 0)
+      : executor_(executor), budget_(index_bytes, list_bytes), passes_(executor) {}
 
   // All or nothing; InvalidArgument for a malformed delta.
   absl::Status Apply(std::span<const std::byte> delta, BulkSource* bulk);
@@ -109,6 +109,10 @@ class Volume final : private SceneObserver {
   uint64_t index_bytes() const;
   // That are drawn in passes.
   size_t counted_drawables() const { return counted_; }
+  // The number of drawables whose tile lists exceed the budget.
+  size_t unlisted_drawables() const { return unlisted_.size(); }
+  // Charged for lists of tiles and pieces of curves.
+  uint64_t listed_bytes() const { return budget_.listed_bytes(); }
   // Solids whose map has no inverse: they draw nothing.
   uint32_t singular_drawables() const { return singular_; }
 
@@ -131,6 +135,7 @@ class Volume final : private SceneObserver {
   struct Scratch {
     std::unique_ptr<TileWords> words, colors, mask;  // zeros between tiles
     std::vector<Entry> entries;
+    std::vector<Entry> unlisted;  // of the tile that is drawn by itself
     BinScratch bins;
   };
 
@@ -145,8 +150,17 @@ class Volume final : private SceneObserver {
   bool Keep(Drawable& drawable, Executor& executor, uint64_t bytes, BinScratch& scratch);
   void Prepare(std::span<Drawable* const> small, std::span<Drawable* const> large);
   void PreparePending();
-  // Enters a drawable in the lists of its tiles.
+  // Calls fn(tile) for each tile in which the drawable may be.
+  template <typename Fn>
+  void ForEachTile(const Drawable& drawable, Fn fn) const;
+  // Charges the lists of a drawable's tiles. If there is no room it becomes unlisted.
+  void ListOrForget(Drawable& drawable);
+  // Drops what ListOrForget could not keep.
+  void Forget(Drawable& drawable);
+  // Enters a drawable in the lists of its tiles, or among the unlisted ones.
   void List(Drawable& drawable);
+  // Prepares unlisted drawables again, if one of them would fit now.
+  void RetryUnlisted();
   // Keeps the bins of drawables that were only counted, if so much of the budget has become free that
   // it is worth trying.
   void KeepCounted();
@@ -165,6 +179,13 @@ class Volume final : private SceneObserver {
   void DrawRun(TileRun run, TileObserver* observer, std::span<Drawn> drawn);
   void DrawInPasses(TileObserver* observer, std::span<Drawn> drawn);
   void DrawPass(TileRun run, TileObserver* observer, std::span<Drawn> drawn);
+  // Whether an unlisted drawable that is to be seen may be in the tile.
+  bool HasUnlisted(uint32_t tile) const;
+  // Draws dirty_[i] by itself, with what does not fit into passes or is not listed.
+  void DrawAlone(size_t i, TileObserver* observer, std::span<Drawn> drawn);
+  // Draws an unlisted drawable into `words`, while DrawAlone draws its tile.
+  void DrawUnlisted(Drawable& drawable, uint32_t tile, const Box3& box, uint32_t* words,
+                    TileRows& touched);
 
   Executor& executor_;
   Scene scene_;
@@ -174,7 +195,7 @@ class Volume final : private SceneObserver {
   std::vector<TileIndex> index_;
   std::vector<uint32_t> dirty_;    // tiles
   std::vector<uint32_t> leaving_;  // tiles with leaving entries
-  std::vector<Drawable*> pending_, left_;
+  std::vector<Drawable*> pending_, left_, unlisted_;
   TileStore tiles_;
   std::vector<Scratch> scratch_;
   BinScratch large_;  // of drawables that all workers prepare

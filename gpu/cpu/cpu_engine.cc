@@ -32,7 +32,9 @@ std::unique_ptr<Engine> CreateCpuEngine(const EngineOptions& options, std::strin
   }
   return std::make_unique<CoreEngine<CpuCore>>(
       options, InfoOf(threads, std::move(reason)),
-      std::make_unique<CpuCore>(std::move(executor), options.part, options.index_bytes));
+      std::make_unique<CpuCore>(
+          std::move(executor), options.part,
+          options.index_bytes != 0 ? options.index_bytes : options.cpu_index_bytes));
 }
 
 }  // namespace voxeld::gpu

@@ -21,7 +21,7 @@
 
 namespace voxeld::gpu {
 
-inline constexpr uint32_t kWorkerProtocol = 5;
+inline constexpr uint32_t kWorkerProtocol = 6;
 
 enum class MessageType : uint32_t {
   // To the worker. Each but the segments' is answered once, under its own call number.
@@ -51,6 +51,7 @@ struct OpenMessage {
   int32_t device = 0;
   SlicePart part;
   uint64_t index_bytes = 0;
+  uint64_t cpu_index_bytes = 0;
 };
 
 struct SegmentMessage {

@@ -126,6 +126,7 @@ class Connection final : public WorkerConnection {
     options.device = open->device;
     options.part = open->part;
     options.index_bytes = open->index_bytes;
+    options.cpu_index_bytes = open->cpu_index_bytes;
     options.inline_execution = true;
     absl::StatusOr<std::unique_ptr<Engine>> engine = hooks_.make_engine(options);
     if (!engine.ok()) return Answer(message.call, engine.status());

@@ -84,6 +84,7 @@ class WorkerEngine final : public RankWorker {
     open.device = options_.device;
     open.part = options_.part;
     open.index_bytes = options_.index_bytes;
+    open.cpu_index_bytes = options_.cpu_index_bytes;
     const auto ask = [&](std::function<void(absl::Status)> answered) {
       channel_->Call(MakeMessage(MessageType::kOpen, 0, open), nullptr,
                      [this, answered = std::move(answered)](const absl::StatusOr<Message>& answer) {

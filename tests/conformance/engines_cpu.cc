@@ -5,8 +5,15 @@ namespace voxeld::gpu::conformance {
 std::vector<EngineCase> EngineCases() {
   return {
       CaseOf("cpu", EngineKind::kCpu, false),
-      // All of a scene in passes, of few items.
+      // Most of a scene in passes, of few items.
       {"cpu_tight",
+       [](EngineOptions options) {
+         options.kind = EngineKind::kCpu;
+         options.index_bytes = 1 << 16;
+         return CreateEngine(options);
+       }},
+      // Most of it unlisted.
+      {"cpu_unlisted",
        [](EngineOptions options) {
          options.kind = EngineKind::kCpu;
          options.index_bytes = 4096;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
@@ -101,8 +102,8 @@ SceneModel SceneOf(std::vector<ModelGeometry> geometries) {
 
 class PassesTest : public testing::Test {
  protected:
-  void Make(uint64_t index_bytes, SceneModel scene) {
-    volume_ = std::make_unique<Volume>(*executor_, index_bytes);
+  void Make(uint64_t index_bytes, SceneModel scene, uint64_t list_bytes = 1 << 20) {
+    volume_ = std::make_unique<Volume>(*executor_, index_bytes, list_bytes);
     volume_->SetView(grid_, Affine(), std::vector<uint8_t>(grid_.count(), kOwned));
     scene_ = std::move(scene);
     DeltaBuffer delta;
@@ -127,10 +128,12 @@ class PassesTest : public testing::Test {
     delta.Put(layer);
     Apply(delta);
   }
-  // As the oracle draws it; of its drawables so many in passes.
-  void ExpectDrawn(size_t counted) {
+  // As the oracle draws it; of its drawables so many in passes, if that is known.
+  void ExpectDrawn(std::optional<size_t> counted) {
     volume_->Update(nullptr);
-    EXPECT_EQ(volume_->counted_drawables(), counted);
+    if (counted.has_value()) {
+      EXPECT_EQ(volume_->counted_drawables(), *counted);
+    }
     const conformance::DenseVolume want = conformance::OracleVoxels(scene_, TargetOfSize());
     uint64_t lit = 0;
     for (int32_t z = 0; z < kSize[2]; ++z) {
@@ -263,6 +266,127 @@ TEST_F(PassesTest, TheIndexStaysWithinTheBudgetFromFrameToFrame) {
     EXPECT_LE(most, bytes);
     EXPECT_GT(most, bytes / 16);  // what fits is kept
   }
+}
+
+SceneModel EveryKind() {
+  ModelGeometry curve;
+  curve.record.id = 1;
+  curve.record.kind = PrimitiveKind::kCurves;
+  curve.record.vertex_count = 4;
+  curve.record.color = 0x20FF10;
+  curve.positions = {2, 2, 2, 90, 5, 60, 5, 75, 3, 92, 77, 61};
+  ModelGeometry thick = Lines(2, 300);
+  thick.record.thickness = 5;
+  return SceneOf(
+      {curve, thick, Lines(3, 100), Mesh(4, 40, 63), Items(5, PrimitiveKind::kPoints, 1, 3000, 0)});
+}
+
+TEST_F(PassesTest, UnlistedDrawablesAreDrawnTheSame) {
+  for (const uint64_t index_bytes : {uint64_t{512}, uint64_t{0}}) {
+    SCOPED_TRACE(index_bytes);
+    Make(index_bytes, EveryKind(), 1);
+    ExpectDrawn(0);
+    EXPECT_EQ(volume_->unlisted_drawables(), 5u);
+    EXPECT_EQ(volume_->listed_bytes(), 0u);
+  }
+  Move(1, 6.5);
+  Move(4, -8);
+  ExpectDrawn(0);
+  LayerRecord layer = scene_.layers[2];
+  layer.visible = 0;
+  Put(layer);
+  ExpectDrawn(0);
+  layer.visible = 1;
+  layer.opacity = 77;
+  Put(layer);
+  DeltaBuffer drop;
+  scene_.drawables.erase(2);
+  drop.Drop(Op::kDropDrawable, 2);
+  Apply(drop);
+  ExpectDrawn(0);
+  EXPECT_EQ(volume_->unlisted_drawables(), 4u);
+  volume_->SetView(grid_, Affine(), std::vector<uint8_t>(grid_.count(), kOwned));
+  ExpectDrawn(0);
+  EXPECT_EQ(volume_->unlisted_drawables(), 4u);
+}
+
+TEST_F(PassesTest, ListedCountedAndUnlistedDrawablesTogether) {
+  // Small drawables come first. The first of the large ones is counted; the lists have no room for the second.
+  constexpr uint64_t kShare = 9000;
+  SceneModel scene = SceneOf({Lines(1, 9000), Lines(2, 5), Mesh(3, 20, 8), Lines(4, 9000)});
+  Make(uint64_t{1} << 19, scene, kShare);
+  volume_->Update(nullptr);
+  EXPECT_EQ(volume_->unlisted_drawables(), 1u);
+  EXPECT_EQ(volume_->counted_drawables(), 1u);
+  EXPECT_LE(volume_->listed_bytes(), kShare);
+  ExpectDrawn(1);
+  for (uint64_t id : {2, 4, 1}) {
+    Move(id, static_cast<double>(id) * 3);
+    ExpectDrawn(std::nullopt);
+    EXPECT_LE(volume_->listed_bytes(), kShare);
+  }
+}
+
+TEST_F(PassesTest, OneThatNeedsNearlyTheWholeBudgetIsListedOnceItFits) {
+  const auto listed_bytes = [this](const ModelGeometry& geometry) {
+    Make(0, SceneOf({geometry}));
+    volume_->Update(nullptr);
+    return volume_->listed_bytes();
+  };
+  const ModelGeometry small = Lines(1, 3), large = Lines(2, 400);
+  const uint64_t small_bytes = listed_bytes(small), large_bytes = listed_bytes(large);
+  ASSERT_LT(small_bytes, large_bytes / 4);
+  Make(0, SceneOf({small, large}), large_bytes + small_bytes / 2);
+  volume_->Update(nullptr);
+  ASSERT_EQ(volume_->unlisted_drawables(), 1u);
+  ASSERT_EQ(volume_->listed_bytes(), small_bytes);
+  DeltaBuffer drop;
+  scene_.drawables.erase(1);
+  drop.Drop(Op::kDropDrawable, 1);
+  Apply(drop);
+  ExpectDrawn(0);
+  EXPECT_EQ(volume_->unlisted_drawables(), 0u);
+}
+
+TEST_F(PassesTest, UnlistedDrawablesAreListedAfterOthersAreRemoved) {
+  Make(0, SceneOf({Lines(1, 400), Lines(2, 400), Lines(3, 400)}), 10'000);
+  volume_->Update(nullptr);
+  const size_t unlisted = volume_->unlisted_drawables();
+  ASSERT_GT(unlisted, 0u);
+  ASSERT_LT(unlisted, 3u);
+  DeltaBuffer drop;
+  for (uint64_t id = 1; id <= unlisted; ++id) {
+    scene_.drawables.erase(id);
+    drop.Drop(Op::kDropDrawable, id);
+  }
+  Apply(drop);
+  ExpectDrawn(0);
+  EXPECT_EQ(volume_->unlisted_drawables(), 0u);
+  // They are where they were.
+  for (const auto& [id, drawable] : std::map(scene_.drawables)) Move(id, 5.5);
+  ExpectDrawn(0);
+}
+
+TEST_F(PassesTest, ListsStayWithinTheirShare) {
+  std::vector<ModelGeometry> spheres;
+  for (uint64_t id = 1; id <= 500; ++id) {
+    spheres.push_back(SolidOf(id, PrimitiveKind::kSphere, Fill::kSolid));
+  }
+  SceneModel scene = SceneOf(std::move(spheres));
+  for (auto& [id, drawable] : scene.drawables) {
+    for (size_t a = 0; a < 3; ++a) drawable.transform.m[4 * a + 3] = 30;
+  }
+  constexpr uint64_t kShare = 1 << 16;
+  Make(0, scene, kShare);
+  volume_->Update(nullptr);
+  EXPECT_LE(volume_->listed_bytes(), kShare);
+  EXPECT_GT(volume_->listed_bytes(), kShare / 2);
+  EXPECT_LT(volume_->unlisted_drawables(), 500u);
+  // Listing them all takes more than ten times the share.
+  Make(0, scene, uint64_t{1} << 30);
+  volume_->Update(nullptr);
+  EXPECT_EQ(volume_->unlisted_drawables(), 0u);
+  EXPECT_GT(volume_->listed_bytes(), 10 * kShare);
 }
 
 // Finding gives up before its memory exceeds the limit, and what fits is the same as without one.
