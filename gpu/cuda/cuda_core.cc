@@ -100,6 +100,7 @@ absl::StatusOr<FrameResult> CudaCore::SubmitFrame(const FrameRequest& request, F
   const absl::StatusOr<int64_t> slice = stopwatch_.Between(assembled, Mark::kPacked);
   if (!slice.ok()) return slice.status();
   result.singular_drawables = volume_.singular_drawables();
+  device_->pool().TrimAfterPeak();
   result.memory_bytes = device_->pool().held() + volume_.scene_bytes();
   result.assemble_ns = *assemble;
   result.slice_ns = *slice;

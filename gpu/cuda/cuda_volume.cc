@@ -374,6 +374,8 @@ absl::Status CudaVolume::TakeIn() {
   if (absl::Status status = PutLayers(); !status.ok()) return status;
   if (absl::Status status = MarkLeft(); !status.ok()) return status;
   if (absl::Status status = MoveCrowds(); !status.ok()) return status;
+  // Removed drawables have released their memory by now; this frame's allocations follow.
+  device_.pool().BeginPeak();
   if (absl::Status status = Enter(); !status.ok()) return status;
   for (const IndexedBy by : kByRegion) {
     if (absl::Status status = IndexOf(by).Merge(); !status.ok()) return status;

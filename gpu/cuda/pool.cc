@@ -9,6 +9,7 @@ namespace voxeld::gpu::cuda {
 namespace {
 
 constexpr size_t kLeast = 4096;
+constexpr size_t kKeptBytes = 64 << 20;  // are kept, however little is in use
 
 // In eighths of a power of two, so that a little more or less of something fits the same block.
 size_t RoundUp(size_t size) {
@@ -44,6 +45,18 @@ bool Pool::FreeAllKept() {
   bool any = whole.FreeKept();
   for (Pool* part : whole.parts_) any |= part->FreeKept();
   return any;
+}
+
+void Pool::BeginPeak() {
+  peak_ = used_;
+  for (Pool* part : parts_) part->BeginPeak();
+}
+
+void Pool::TrimAfterPeak() {
+  for (Pool* part : parts_) part->TrimAfterPeak();
+  size_t held = held_;
+  for (const Pool* part : parts_) held -= part->held_;
+  if (held > 2 * peak_ + kKeptBytes) FreeKept();
 }
 
 absl::StatusOr<Block> Pool::Acquire(size_t size) {

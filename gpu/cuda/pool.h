@@ -79,6 +79,12 @@ class Pool {
     return absl::OkStatus();
   }
 
+  // Starts to measure the peak of used(), here and in the parts.
+  void BeginPeak();
+  // Frees the kept blocks of each pool (this one and its parts) that holds more than twice its peak since BeginPeak, plus 64 MiB.
+  // Blocks until the device is idle.
+  void TrimAfterPeak();
+
   size_t held() const { return held_; }  // handed out or kept
   size_t used() const { return used_; }  // handed out
   size_t limit() const { return limit_; }
@@ -95,6 +101,7 @@ class Pool {
   bool FreeAllKept();
   Block HandOut(void* data, size_t size) {
     used_ += size;
+    if (used_ > peak_) peak_ = used_;
     return Block(this, data, size);
   }
 
@@ -102,8 +109,8 @@ class Pool {
   Pool* const whole_ = nullptr;
   const size_t limit_ = SIZE_MAX;
   std::vector<Pool*> parts_;
-  std::multimap<size_t, void*> free_;  // by size
-  size_t held_ = 0, used_ = 0;         // bytes
+  std::multimap<size_t, void*> free_;      // by size
+  size_t held_ = 0, used_ = 0, peak_ = 0;  // bytes
 };
 
 inline Block::~Block() {

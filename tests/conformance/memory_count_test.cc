@@ -12,17 +12,17 @@
 
 #include "gpu/derived_bytes.h"
 #include "tests/conformance/engine_driver.h"
+#include "tests/conformance/memory_case.h"
 #include "tests/conformance/scene_generator.h"
 
 namespace voxeld::gpu::conformance {
 namespace {
 
 constexpr int kSize = 64;
-constexpr size_t kDrawables = 1000;
 
 uint64_t Allocated() {
   const struct mallinfo2 heap = mallinfo2();
-  return uint64_t{heap.uordblks} + heap.hblkhd;
+  return uint64_t{heap.uordblks} + heap.hblkhd + DeviceBytes();
 }
 
 // Large blocks are aligned to large pages. The allocator counts the address space that it skips for that, which is never used, so
@@ -33,16 +33,16 @@ uint64_t Resident() {
   std::ifstream file("/proc/self/statm");
   uint64_t pages = 0, resident = 0;
   file >> pages >> resident;
-  return resident * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
+  return resident * static_cast<uint64_t>(sysconf(_SC_PAGESIZE)) + DeviceBytes();
 }
 
-// Repeats the scene's drawables, at other places.
-void Multiply(SceneModel& scene, SceneGenerator& chance) {
+// Repeats the scene's drawables, at other places, until there are `count`.
+void Multiply(SceneModel& scene, SceneGenerator& chance, size_t count) {
   if (scene.drawables.empty()) return;
   const std::vector<std::pair<uint64_t, DrawableRecord>> first(scene.drawables.begin(),
                                                                scene.drawables.end());
   uint64_t id = first.back().first;
-  while (scene.drawables.size() < kDrawables) {
+  while (scene.drawables.size() < count) {
     for (const auto& [from, drawable] : first) {
       DrawableRecord copy = drawable;
       copy.id = ++id;
@@ -52,17 +52,14 @@ void Multiply(SceneModel& scene, SceneGenerator& chance) {
   }
 }
 
-// Many drawables of one small geometry, as instances are.
-constexpr size_t kDots = 100'000;
-
-SceneModel Dots(SceneGenerator& chance) {
+SceneModel Dots(SceneGenerator& chance, size_t count) {
   SceneModel scene;
   scene.layers[1].id = 1;
   ModelGeometry& dot = scene.geometries[1];
   dot.record.id = 1;
   dot.record.vertex_count = 1;
   dot.positions = {0, 0, 0};
-  for (uint64_t id = 1; id <= kDots; ++id) {
+  for (uint64_t id = 1; id <= count; ++id) {
     DrawableRecord& drawable = scene.drawables[id];
     drawable.id = id;
     drawable.geometry = drawable.layer = 1;
@@ -73,12 +70,16 @@ SceneModel Dots(SceneGenerator& chance) {
 
 class MemoryCount : public ::testing::Test {
  protected:
-  MemoryCount() {
+  // Returns: an engine without a scene, instead of the one before.
+  EngineDriver& NewEngine() {
+    driver_.reset();
     EngineOptions options;
     options.kind = EngineKind::kCpu;
     options.inline_execution = true;
     options.threads = 1;
-    driver_.emplace(EngineCase{"cpu", [](EngineOptions o) { return CreateEngine(o); }}, options);
+    options.index_bytes = index_bytes_;
+    driver_.emplace(case_.engine, options);
+    return *driver_;
   }
 
   struct Growth {
@@ -87,6 +88,7 @@ class MemoryCount : public ::testing::Test {
   };
   // Returns: the growth from an empty scene to `scene`, drawn once.
   Growth Draw(const Target& target, const SceneModel& scene) {
+    NewEngine();
     EXPECT_TRUE(driver_->SetTarget(target).ok());
     DeltaBuffer nothing;
     nothing.Reset();
@@ -108,7 +110,10 @@ class MemoryCount : public ::testing::Test {
   }
 
   void DrawRandomScenes(uint64_t count);
+  void DrawLargeShapes(const ModelGeometry& shape, uint64_t count, uint64_t bytes_without_bound);
 
+  const MemoryCase case_ = MeasuredEngine();
+  uint64_t index_bytes_ = 0;
   std::optional<EngineDriver> driver_;
 };
 
@@ -119,7 +124,7 @@ void MemoryCount::DrawRandomScenes(uint64_t count) {
     SceneGenerator chance(seed + i);
     const Target target = chance.RandomTarget();
     SceneModel scene = chance.RandomScene(kSize);
-    Multiply(scene, chance);
+    Multiply(scene, chance, case_.drawables);
     if (scene.drawables.empty()) continue;
     const Growth growth = Draw(target, scene);
     ratios.push_back(growth.ratio());
@@ -141,22 +146,24 @@ TEST_F(MemoryCount, ManyScenesAreCountedAsTheyGrow) { DrawRandomScenes(200); }
 TEST_F(MemoryCount, InstancesTakeNoMoreThanWhatIsExpectedOfThem) {
   SceneGenerator chance(SeedOr(1));
   const Target target = chance.RandomTarget();
-  const SceneModel scene = Dots(chance);
+  const SceneModel scene = Dots(chance, case_.dots);
   const Growth growth = Draw(target, scene);
   EXPECT_GE(growth.ratio(), 0.8);
   EXPECT_LE(growth.ratio(), 1.25);
   EXPECT_LE(growth.measured,
-            static_cast<double>(kDots * MostDerivedBytes(scene.geometries.at(1).record)));
-  std::cout << growth.measured / kDots << " bytes a drawable, counted as " << growth.counted / kDots
+            static_cast<double>(case_.dots * MostDerivedBytes(scene.geometries.at(1).record)));
+  const auto dots = static_cast<double>(case_.dots);
+  std::cout << growth.measured / dots << " bytes a drawable, counted as " << growth.counted / dots
             << "\n";
 }
 
 TEST_F(MemoryCount, WhatGoesIsGivenBack) {
   SceneGenerator chance(SeedOr(1));
   const Target target = chance.RandomTarget();
+  NewEngine();
   ASSERT_TRUE(driver_->SetTarget(target).ok());
   ASSERT_TRUE(driver_->Frame().ok());
-  const SceneModel scene = Dots(chance);
+  const SceneModel scene = Dots(chance, case_.dots);
   const uint64_t before = Allocated();
   {
     DeltaBuffer delta;
@@ -171,7 +178,59 @@ TEST_F(MemoryCount, WhatGoesIsGivenBack) {
     ASSERT_TRUE(driver_->Apply(drops).ok());
     ASSERT_TRUE(driver_->Frame().ok());
   }
-  EXPECT_LT(Allocated(), before + (3 << 20));
+  EXPECT_LT(Allocated(), before + (3 << 20) + case_.kept_bytes);
+}
+
+// Drawables that fill a volume of 96×80×64, as many as would take several times what is allowed for lists and items.
+void MemoryCount::DrawLargeShapes(const ModelGeometry& shape, uint64_t count,
+                                  uint64_t bytes_without_bound) {
+  constexpr uint64_t kBytes = 1 << 20;
+  SceneGenerator chance(SeedOr(1));
+  Target target;
+  display::PlanarStack stack;
+  stack.width_px = 96, stack.height_px = 80;
+  for (int slice = 0; slice < 64; ++slice) stack.positions_mm.push_back(slice + 0.5);
+  target.geometry.shape = stack;
+  target.geometry.grid = {96, 80, 64, {1, 1, 1}, {}};
+  target.layout.slices = 64;
+  target.layout.width = 96;
+  target.layout.height = 80;
+  SceneModel scene = Dots(chance, 0);
+  scene.geometries[1] = shape;
+  scene.geometries[1].record.id = 1;
+  for (uint64_t id = 1; id <= count; ++id) {
+    DrawableRecord& drawable = scene.drawables[id];
+    drawable.id = id;
+    drawable.geometry = drawable.layer = 1;
+  }
+  index_bytes_ = kBytes;
+  const Growth growth = Draw(target, scene);
+  constexpr uint64_t kTiles = 6 * 5 * 4;
+  // A tile has 4,096 words of colours, and some more for rows.
+  const uint64_t bound =
+      count * MostDerivedBytes(shape.record) + kBytes / 4 * 5 + kTiles * 5 * 4096 + (1 << 20);
+  ASSERT_GT(bytes_without_bound, bound / 2 * 3);
+  EXPECT_LE(growth.measured, static_cast<double>(bound));
+}
+
+TEST_F(MemoryCount, ListsOfLargeShapesStayWithinTheirBound) {
+  ModelGeometry sphere;
+  sphere.record.kind = PrimitiveKind::kSphere;
+  sphere.record.fill = Fill::kSolid;
+  for (float& p : sphere.record.params) p = 200;
+  constexpr uint64_t kCount = 6000;
+  DrawLargeShapes(sphere, kCount, kCount * 120 * 32);
+}
+
+TEST_F(MemoryCount, InteriorsOfFilledMeshesStayWithinTheirBound) {
+  ModelGeometry mesh;
+  mesh.record.kind = PrimitiveKind::kFilled;
+  mesh.record.vertex_count = 4;
+  mesh.record.index_count = 12;
+  mesh.positions = {0, 0, 0, 190, 0, 0, 0, 160, 0, 0, 0, 120};
+  mesh.indices = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+  constexpr uint64_t kCount = 300;
+  DrawLargeShapes(mesh, kCount, kCount * 96 * 80 * 64 / 8);
 }
 
 }  // namespace
