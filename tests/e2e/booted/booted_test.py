@@ -1,6 +1,7 @@
 """The daemon as its package installs it, under systemd itself: what kills it or stops it, and how long clients wait then.
 Runs in the container that `run` boots, as root. Each test prints what it measured."""
 import os
+import re
 import signal
 import subprocess
 import time
@@ -68,6 +69,37 @@ class Booted(unittest.TestCase):
             os.kill(self.pid, number)
             self.back(began, 5, signal.Signals(number).name)  # RestartSec=1, and the start
             self.pid, self.restarts = int(shows("MainPID")), int(shows("NRestarts"))
+
+    def play_confined(self, without: str) -> "tuple[str, str]":
+        """Plays a file in a service confined like voxeld.service, as the daemon does with a file that a page sends. Lines of the unit that match
+        `without` are left out. Returns: the result of that service, and its output."""
+        unit = Path("/lib/systemd/system/voxeld.service").read_text(encoding="utf-8")
+        lines = [line for line in unit.splitlines()
+                 if re.match("(User|Group|UMask|Capability|Lock|NoNew|Private|Protect|Remove|Restrict|SystemCall)", line) and not re.search(without, line)]
+        folder = Path("/opt/booted/sent")
+        folder.mkdir(exist_ok=True)
+        (folder / "a.stl").write_text("solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n",
+                                      encoding="utf-8")
+        output = folder / "output"
+        output.unlink(missing_ok=True)
+        service = ["[Service]", "Type=oneshot", f"StandardOutput=file:{output}", "StandardError=inherit",
+                   f"ExecStart=/usr/bin/voxelctl --server {SERVER} play --other-files none {folder}/a.stl", *lines]
+        Path("/run/systemd/system/reader.service").write_text("\n".join(service) + "\n", encoding="utf-8")
+        systemctl("daemon-reload")
+        subprocess.run(["systemctl", "start", "reader.service"], check=False, capture_output=True)
+        self.addCleanup(subprocess.run, ["systemctl", "reset-failed", "reader.service"], check=False, capture_output=True)
+        return systemctl("show", "--value", "-p", "Result", "reader.service"), output.read_text(encoding="utf-8")
+
+    def test_files_of_strangers_are_read_in_the_units_confinement(self) -> None:
+        result, output = self.play_confined(without="^$")
+        if "Landlock" in output:
+            self.skipTest(output)  # this kernel has none
+        self.assertEqual(result, "success", output)
+        self.assertIn("1 presented", output)
+        # Where the unit forbids Landlock's calls they are refused, with the reason.
+        result, output = self.play_confined(without="landlock")
+        self.assertEqual(result, "exit-code", output)
+        self.assertIn("Landlock", output)
 
     def test_stopped_for_longer_than_its_watchdog(self) -> None:
         began = time.monotonic()

@@ -287,5 +287,154 @@ TEST(Contained, EndsWithWhoAsked) {
   ::close(reader);
 }
 
+// Frames of one point each, at the frame's number, except where `spoil` does something else.
+class Points final : public FrameSource {
+ public:
+  explicit Points(std::function<void(int64_t, Model&)> spoil) : spoil_(std::move(spoil)) {}
+  int64_t count() const override { return 5; }
+  absl::StatusOr<Model> Read(int64_t frame) override {
+    Model model;
+    model.path = "p";
+    model.parts.push_back({.kind = Kind::kPoints,
+                           .positions = {{static_cast<float>(frame), 0, 0}},
+                           .colors = {{1, 2, 3}}});
+    spoil_(frame, model);
+    return model;
+  }
+
+ private:
+  const std::function<void(int64_t, Model&)> spoil_;
+};
+
+absl::StatusOr<std::unique_ptr<FrameSource>> PointFrames(std::function<void(int64_t, Model&)> spoil,
+                                                         Interrupt* interrupt = nullptr) {
+  return OpenContained(
+      {.path = "p"},
+      [spoil = std::move(spoil)](SourceFile) -> absl::StatusOr<std::unique_ptr<FrameSource>> {
+        return std::make_unique<Points>(spoil);
+      },
+      interrupt);
+}
+
+TEST(ContainedFrames, AreReadInAnyOrderByAnotherProcess) {
+  const pid_t self = ::getpid();
+  const auto frames = PointFrames(
+      [self](int64_t, Model& model) { model.note = ::getpid() == self ? "here" : "elsewhere"; });
+  ASSERT_THAT(frames, IsOk());
+  EXPECT_EQ((*frames)->count(), 5);
+  for (const int64_t frame : {3, 0, 4, 4, 1}) {
+    const auto model = (*frames)->Read(frame);
+    ASSERT_THAT(model, IsOk());
+    EXPECT_EQ(model->note, "elsewhere");
+    EXPECT_EQ(model->parts[0].positions[0].x, static_cast<float>(frame));
+  }
+}
+
+TEST(ContainedFrames, ErrorFromOpenIsReturned) {
+  const auto frames = OpenContained({.path = "p"}, [](SourceFile) {
+    return absl::StatusOr<std::unique_ptr<FrameSource>>(absl::InvalidArgumentError("p: no frames"));
+  });
+  EXPECT_EQ(frames.status(), absl::InvalidArgumentError("p: no frames"));
+}
+
+TEST(ContainedFrames, ACrashEndsOnlyTheReader) {
+  const auto frames = PointFrames([](int64_t frame, Model&) {
+    if (frame == 2) *static_cast<volatile int*>(nullptr) = 1;
+  });
+  ASSERT_THAT(frames, IsOk());
+  EXPECT_THAT((*frames)->Read(1), IsOk());
+  const auto crashed = (*frames)->Read(2);
+  EXPECT_THAT(std::string(crashed.status().message()), HasSubstr("p: the library that reads it"));
+  // And it stays so.
+  EXPECT_EQ((*frames)->Read(1).status(), crashed.status());
+}
+
+TEST(ContainedFrames, EachFrameIsChecked) {
+  const auto frames = PointFrames([](int64_t frame, Model& model) {
+    if (frame == 1) model.parts[0].positions[0].x = std::nanf("");
+    if (frame == 2) model.parts[0].indices = {7};
+  });
+  ASSERT_THAT(frames, IsOk());
+  EXPECT_FALSE((*frames)->Read(1).ok());
+  EXPECT_FALSE((*frames)->Read(2).ok());
+  EXPECT_THAT((*frames)->Read(3), IsOk());
+}
+
+TEST(ContainedFrames, ReaderCannotOpenFilesOutsideOfTheFolder) {
+  TempFolder folder;
+  const std::string inside = folder.Write("inside", "x");
+  TempFolder other;
+  const std::string outside = other.Write("outside", "x");
+  if (!Sandbox::Get().CheckLandlock().ok()) GTEST_SKIP() << "this kernel has no Landlock";
+  const auto frames = OpenContained(
+      {.path = inside}, [&](SourceFile) -> absl::StatusOr<std::unique_ptr<FrameSource>> {
+        return std::make_unique<Points>([&](int64_t, Model& model) {
+          model.note = absl::StrCat(Opens(inside), Opens(outside));
+        });
+      });
+  ASSERT_THAT(frames, IsOk());
+  EXPECT_EQ((*frames)->Read(0)->note, "10");
+}
+
+// A reader that was taken over has the descriptors of the frame (3) and of the channel (4).
+constexpr int kFrameFile = 3, kChannel = 4;
+
+TEST(ContainedFrames, HalfAnAnswerDoesNotKeepTheParentWaiting) {
+  const auto frames = PointFrames([](int64_t frame, Model&) {
+    if (frame != 1) return;
+    (void)!::write(kChannel, "half", 4);
+    for (volatile bool forever = true; forever;) {
+    }
+  });
+  ASSERT_THAT(frames, IsOk());
+  EXPECT_FALSE((*frames)->Read(1).ok());
+}
+
+TEST(ContainedFrames, AnswersThatNobodyAskedForDoNotBlockTheParent) {
+  const auto frames = PointFrames([](int64_t frame, Model&) {
+    if (frame != 0) return;
+    // It answers a thousand times, and does not read what it is asked any more.
+    const int64_t answer = 0;
+    for (int i = 0; i < 1000; ++i) (void)!::write(kChannel, &answer, sizeof(answer));
+    for (volatile bool forever = true; forever;) {
+    }
+  });
+  ASSERT_THAT(frames, IsOk());
+  for (int i = 0; i < 1000; ++i) (void)(*frames)->Read(0);
+}
+
+TEST(ContainedFrames, CountsAndFramesHaveLimits) {
+  class Many final : public FrameSource {
+   public:
+    int64_t count() const override { return int64_t{1} << 40; }
+    absl::StatusOr<Model> Read(int64_t) override { return Model(); }
+  };
+  const auto many =
+      OpenContained({.path = "p"}, [](SourceFile) -> absl::StatusOr<std::unique_ptr<FrameSource>> {
+        return std::make_unique<Many>();
+      });
+  EXPECT_THAT(std::string(many.status().message()), HasSubstr("counts 1099511627776 frames"));
+  // A file with a hole costs the reader no memory, but its parent would copy it.
+  const auto frames =
+      PointFrames([](int64_t, Model&) { ::lseek(kFrameFile, off_t{4} << 30, SEEK_SET); });
+  ASSERT_THAT(frames, IsOk());
+  EXPECT_THAT(std::string((*frames)->Read(0).status().message()), HasSubstr("made a frame of "));
+}
+
+TEST(ContainedFrames, AnInterruptEndsAFrameThatTakesForEver) {
+  Interrupt interrupt(Interrupt::Watch::kNothing);
+  const auto frames = PointFrames(
+      [](int64_t frame, Model&) {
+        for (volatile bool forever = frame == 1; forever;) {
+        }
+      },
+      &interrupt);
+  ASSERT_THAT(frames, IsOk());
+  EXPECT_THAT((*frames)->Read(0), IsOk());
+  std::thread stop([&interrupt] { interrupt.Request(); });
+  EXPECT_EQ((*frames)->Read(1).status().code(), absl::StatusCode::kCancelled);
+  stop.join();
+}
+
 }  // namespace contained_test
 }  // namespace voxeld::voxelctl

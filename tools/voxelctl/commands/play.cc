@@ -250,6 +250,7 @@ class Player {
     };
     for (int64_t frame = 0; frame >= 0;) {
       absl::StatusOr<Model> model = ahead.Take();
+      if (!model.ok() && interrupt_.requested() && frame > 0) return absl::OkStatus();
       if (!model.ok()) return model.status();
       if (frame == 0) began = clock_.Now();
       if (frame > 0 && due(frame) >= end) break;
@@ -473,7 +474,7 @@ class Player {
 
 absl::Status Play(const PlayOptions& options, const Connector& connect, Interrupt& interrupt,
                   Console& console) {
-  const absl::StatusOr<std::unique_ptr<FrameSource>> frames = OpenFrames(options);
+  const absl::StatusOr<std::unique_ptr<FrameSource>> frames = OpenFrameSource(options, interrupt);
   if (!frames.ok()) return frames.status();
   absl::StatusOr<std::vector<Model>> models;
   if (*frames == nullptr) {

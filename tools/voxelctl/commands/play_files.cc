@@ -52,9 +52,11 @@ absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interru
   return models;
 }
 
-absl::StatusOr<std::unique_ptr<FrameSource>> OpenFrames(const PlayOptions& options) {
+absl::StatusOr<std::unique_ptr<FrameSource>> OpenFrameSource(const PlayOptions& options,
+                                                             Interrupt& interrupt) {
   if (options.animation) {
-    return OpenAnimation(options.files[0], *options.animation, options.fps, options.other_files);
+    return OpenAnimation(options.files[0], *options.animation, options.fps, options.other_files,
+                         &interrupt);
   }
   const bool one = options.files.size() == 1 && IsSequence(options.files[0]);
   if (!options.sequence && !one) {
@@ -63,10 +65,10 @@ absl::StatusOr<std::unique_ptr<FrameSource>> OpenFrames(const PlayOptions& optio
         "--loop is for sequences ('frame_####.obj', or several files with --sequence) and "
         "--animate");
   }
-  if (!one) return std::make_unique<FileFrames>(options.files, OptionsOf(options, nullptr));
+  if (!one) return std::make_unique<FileFrames>(options.files, OptionsOf(options, &interrupt));
   absl::StatusOr<std::vector<std::string>> files = FindSequence(options.files[0]);
   if (!files.ok()) return files.status();
-  return std::make_unique<FileFrames>(*std::move(files), OptionsOf(options, nullptr));
+  return std::make_unique<FileFrames>(*std::move(files), OptionsOf(options, &interrupt));
 }
 
 }  // namespace voxeld::voxelctl

@@ -18,6 +18,7 @@ absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interru
                                              Console& console);
 
 // Of a sequence or an animation. Null if all that there is stays as it is.
-absl::StatusOr<std::unique_ptr<FrameSource>> OpenFrames(const PlayOptions& options);
+absl::StatusOr<std::unique_ptr<FrameSource>> OpenFrameSource(const PlayOptions& options,
+                                                             Interrupt& interrupt);
 
 }  // namespace voxeld::voxelctl

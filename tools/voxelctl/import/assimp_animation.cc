@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <assimp/Importer.hpp>
 #include <cmath>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -168,23 +169,21 @@ class AnimationFrames final : public FrameSource {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenAnimation(const std::string& path, size_t number,
-                                                           double fps, OtherFiles other_files) {
+                                                           double fps, OtherFiles other_files,
+                                                           Interrupt* interrupt) {
   absl::StatusOr<SourceFile> file = ReadSourceFile(path, other_files);
   if (!file.ok()) return file.status();
   if (file->extension == "stl" || file->extension == "ply") {
     return FileError(*file, absl::StrCat("is .", file->extension, ", which has no animations"),
                      "a .glb, .gltf, .fbx, .dae or .bvh is expected");
   }
-  if (absl::Status status = CheckMeshFile(*file); !status.ok()) return status;
-  // First where a crash does no harm; what ends well there does so here.
-  const absl::StatusOr<Model> tried = ReadContained(*file, [&]() -> absl::StatusOr<Model> {
-    const absl::StatusOr<std::unique_ptr<FrameSource>> frames =
-        AnimationFrames::Open(*file, number, fps);
-    if (!frames.ok()) return frames.status();
-    return (*frames)->Read(0);
-  });
-  if (!tried.ok()) return tried.status();
-  return AnimationFrames::Open(*std::move(file), number, fps);
+  return OpenContained(
+      *std::move(file),
+      [number, fps](SourceFile own) -> absl::StatusOr<std::unique_ptr<FrameSource>> {
+        if (absl::Status status = CheckMeshFile(own); !status.ok()) return status;
+        return AnimationFrames::Open(std::move(own), number, fps);
+      },
+      interrupt);
 }
 
 }  // namespace voxeld::voxelctl

@@ -1,10 +1,13 @@
 #include "tools/voxelctl/import/contained.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -15,6 +18,8 @@
 #include <cstring>
 #include <exception>
 #include <filesystem>
+#include <memory>
+#include <span>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -23,6 +28,8 @@
 #include "absl/strings/str_cat.h"
 #include "common/text/printable.h"
 #include "daemon/address/descriptor.h"
+#include "tools/voxelctl/import/importer.h"
+#include "tools/voxelctl/import/model_bytes.h"
 #include "tools/voxelctl/import/sandbox.h"
 
 // Sanitizers reserve more address space than the limit.
@@ -43,177 +50,8 @@ constexpr unsigned kMostWaiting = 600;  // s
 constexpr int kNoSandbox = 2;           // exit status
 // Limit of what the reader may write: more than the largest model (kMaxModelVertices and the others).
 constexpr rlim_t kMostModelBytes = rlim_t{5} << 30;
-constexpr uint64_t kMostMessageBytes = 64 << 10;
-
-class ModelWriter {
- public:
-  explicit ModelWriter(int descriptor) : descriptor_(descriptor) {}
-  bool ok() const { return ok_; }
-
-  void Bytes(const void* bytes, size_t size) {
-    const char* at = static_cast<const char*>(bytes);
-    while (size > 0 && ok_) {
-      const ssize_t written = ::write(descriptor_, at, size);
-      if (written < 0 && errno == EINTR) continue;
-      ok_ = written > 0;
-      if (ok_) at += written, size -= static_cast<size_t>(written);
-    }
-  }
-  template <typename Vector>
-  void All(const Vector& values) {
-    const uint64_t count = values.size();
-    Bytes(&count, sizeof(count));
-    Bytes(values.data(), count * sizeof(values[0]));
-  }
-
- private:
-  const int descriptor_;
-  bool ok_ = true;
-};
-
-class ModelReader {
- public:
-  ModelReader(const char* at, size_t size) : at_(at), left_(size) {}
-  bool ok() const { return ok_; }
-
-  void Bytes(void* out, size_t size) {
-    ok_ &= size <= left_;
-    if (!ok_ || size == 0) return;
-    std::memcpy(out, at_, size);
-    at_ += size;
-    left_ -= size;
-  }
-  template <typename Vector>
-  void All(Vector* values) {
-    uint64_t count = 0;
-    Bytes(&count, sizeof(count));
-    ok_ &= count <= left_ / sizeof((*values)[0]);
-    if (!ok_) return;
-    values->resize(count);
-    Bytes(values->data(), count * sizeof((*values)[0]));
-  }
-
- private:
-  const char* at_;
-  size_t left_;
-  bool ok_ = true;
-};
-
-void WriteVolume(const SampledVolume& volume, ModelWriter& writer) {
-  const uint8_t has_window = volume.window.has_value();
-  writer.Bytes(&volume.size, sizeof(volume.size));
-  writer.Bytes(&volume.corners, sizeof(volume.corners));
-  writer.Bytes(&has_window, 1);
-  if (has_window) writer.Bytes(&*volume.window, sizeof(*volume.window));
-  writer.All(volume.samples);
-  writer.All(volume.colors);
-}
-
-SampledVolume ReadVolume(ModelReader& reader) {
-  SampledVolume volume;
-  uint8_t has_window = 0;
-  reader.Bytes(&volume.size, sizeof(volume.size));
-  reader.Bytes(&volume.corners, sizeof(volume.corners));
-  reader.Bytes(&has_window, 1);
-  if (has_window != 0) reader.Bytes(&volume.window.emplace(), sizeof(*volume.window));
-  reader.All(&volume.samples);
-  reader.All(&volume.colors);
-  return volume;
-}
-
-bool WriteModel(const absl::StatusOr<Model>& model, int descriptor) {
-  ModelWriter writer(descriptor);
-  const int code = model.status().raw_code();
-  writer.Bytes(&code, sizeof(code));
-  if (!model.ok()) {
-    writer.All(std::string(model.status().message()));
-    return writer.ok();
-  }
-  const uint64_t parts = model->parts.size(), volumes = model->volumes.size();
-  writer.All(model->path);
-  writer.All(model->format);
-  writer.All(model->note);
-  writer.Bytes(&model->up, sizeof(model->up));
-  writer.Bytes(&model->globe, sizeof(model->globe));
-  writer.Bytes(&model->lit_already, sizeof(model->lit_already));
-  writer.Bytes(&parts, sizeof(parts));
-  for (const Part& part : model->parts) {
-    writer.Bytes(&part.kind, sizeof(part.kind));
-    writer.Bytes(&part.thickness, sizeof(part.thickness));
-    writer.Bytes(&part.level, sizeof(part.level));
-    writer.All(part.positions);
-    writer.All(part.normals);
-    writer.All(part.colors);
-    writer.All(part.indices);
-  }
-  writer.Bytes(&volumes, sizeof(volumes));
-  for (const SampledVolume& volume : model->volumes) WriteVolume(volume, writer);
-  return writer.ok();
-}
-
-absl::Status Spoilt(const SourceFile& file, absl::string_view how) {
-  return FileError(file, absl::StrCat("the library that reads it ", how),
-                   "the file is damaged or not what its name says");
-}
-
-// One of those that readers use.
-absl::StatusCode CodeOf(int code) {
-  switch (static_cast<absl::StatusCode>(code)) {
-    case absl::StatusCode::kNotFound:
-    case absl::StatusCode::kPermissionDenied:
-    case absl::StatusCode::kFailedPrecondition:
-    case absl::StatusCode::kUnimplemented:
-    case absl::StatusCode::kResourceExhausted:
-      return static_cast<absl::StatusCode>(code);
-    default:
-      return absl::StatusCode::kInvalidArgument;
-  }
-}
-
-// The writer may be in a stranger's hands, so enumerations are checked; ImportFile checks the rest (CheckModel).
-absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_t size) {
-  ModelReader reader(bytes, size);
-  int code = 0;
-  reader.Bytes(&code, sizeof(code));
-  if (code != 0) {
-    std::string message;
-    reader.All(&message);
-    if (!reader.ok() || message.size() > kMostMessageBytes) return Spoilt(file, "gave up");
-    return absl::Status(CodeOf(code), message);
-  }
-  Model model;
-  uint64_t parts = 0, volumes = 0;
-  uint8_t up = 0, globe = 0, lit_already = 0;
-  reader.All(&model.path);
-  reader.All(&model.format);
-  reader.All(&model.note);
-  reader.Bytes(&up, 1);
-  reader.Bytes(&globe, 1);
-  reader.Bytes(&lit_already, 1);
-  if (up > static_cast<uint8_t>(Up::kZ)) return Spoilt(file, "gave up halfway");
-  model.up = static_cast<Up>(up);
-  model.globe = globe != 0;
-  model.lit_already = lit_already != 0;
-  reader.Bytes(&parts, sizeof(parts));
-  for (uint64_t i = 0; i < parts && reader.ok(); ++i) {
-    Part part;
-    uint8_t kind = 0;
-    reader.Bytes(&kind, 1);
-    if (kind > static_cast<uint8_t>(Kind::kTriangles)) return Spoilt(file, "gave up halfway");
-    part.kind = static_cast<Kind>(kind);
-    reader.Bytes(&part.thickness, sizeof(part.thickness));
-    reader.Bytes(&part.level, sizeof(part.level));
-    reader.All(&part.positions);
-    reader.All(&part.normals);
-    reader.All(&part.colors);
-    reader.All(&part.indices);
-    model.parts.push_back(std::move(part));
-  }
-  reader.Bytes(&volumes, sizeof(volumes));
-  for (uint64_t i = 0; i < volumes && reader.ok(); ++i) model.volumes.push_back(ReadVolume(reader));
-  if (!reader.ok()) return Spoilt(file, "gave up halfway");
-  return model;
-}
+// Of a frame of an animation, which this process copies.
+constexpr off_t kMostFrameBytes = off_t{1} << 30;
 
 // The folder below which the reader may open files: that of the file, or the one that is read.
 std::string Readable(const SourceFile& file) {
@@ -239,9 +77,17 @@ void Limit(int resource, rlim_t most) {
   return std::strtoull(text, nullptr, 10) * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE));
 }
 
-[[noreturn]] void RunChild(const SourceFile& file,
-                           const std::function<absl::StatusOr<Model>()>& read, int descriptor,
-                           pid_t parent) {
+absl::Status NoSandbox(const SourceFile& file, const absl::Status& why) {
+  return absl::FailedPreconditionError(
+      absl::StrCat(EscapeForTerminal(file.path), ": is not read, since ", why.message(),
+                   "; Linux 5.13 or later with Landlock and seccomp is expected"));
+}
+
+constexpr int kFirstKept = 3;  // of the descriptors of a reader
+
+// Call it in the child. Closes all descriptors except the standard streams and `kept`, which are renumbered in order from kFirstKept on,
+// and drops what reading does not need. Returns: false if the process could not be confined and the file must not be read without that.
+bool BecomeReader(const SourceFile& file, std::span<const int> kept, pid_t parent) {
   // Ends with the thread that waits for it, which may have ended already.
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(1);
@@ -251,34 +97,37 @@ void Limit(int resource, rlim_t most) {
   for (const int signal : {SIGINT, SIGTERM, SIGALRM, SIGABRT, SIGSEGV, SIGBUS, SIGFPE})
     ::signal(signal, SIG_DFL);
   // The connections of this process are not for the reader. What a library says is not for people.
-  constexpr int kModel = 3;
   const int nowhere = ::open("/dev/null", O_RDWR | O_CLOEXEC);
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, stream);
-  if (descriptor != kModel) ::dup2(descriptor, kModel);
-  ::close_range(kModel + 1, ~0U, 0);
+  // Move all of them above the target numbers first, so that no dup2 closes one that is still needed.
+  constexpr int kAside = 32;
+  int next = kFirstKept;
+  std::vector<int> aside;
+  for (const int descriptor : kept) aside.push_back(::fcntl(descriptor, F_DUPFD, kAside));
+  for (const int descriptor : aside) ::dup2(descriptor, next++);
+  ::close_range(static_cast<unsigned>(next), ~0U, 0);
   Limit(RLIMIT_CORE, 0);
-  Limit(RLIMIT_CPU, kMostSeconds);
   Limit(RLIMIT_NOFILE, kMostDescriptors);
   Limit(RLIMIT_FSIZE, kMostModelBytes);
 #if !defined(VOXELD_SHADOW_MEMORY)
   Limit(RLIMIT_AS, AddressSpace() + kMostMemory + kOfFile * file.bytes.size());
 #endif
-  ::alarm(kMostWaiting);
   // For a file of the user's own the sandbox is a second line: without Landlock the first remains.
-  const bool is_confined = Sandbox::Get().Enter(Readable(file)).ok();
-  if (!is_confined && file.other_files == OtherFiles::kNone) ::_exit(kNoSandbox);
+  return Sandbox::Get().Enter(Readable(file)).ok() || file.other_files != OtherFiles::kNone;
+}
+
+[[noreturn]] void RunChild(const SourceFile& file,
+                           const std::function<absl::StatusOr<Model>()>& read, int descriptor,
+                           pid_t parent) {
+  ::alarm(kMostWaiting);
+  Limit(RLIMIT_CPU, kMostSeconds);
+  if (!BecomeReader(file, {{descriptor}}, parent)) ::_exit(kNoSandbox);
   bool good = false;
   try {
-    good = WriteModel(read(), kModel);
+    good = WriteModel(read(), kFirstKept);
   } catch (const std::exception&) {
   }
   ::_exit(good ? 0 : 1);
-}
-
-absl::Status NoSandbox(const SourceFile& file, const absl::Status& why) {
-  return absl::FailedPreconditionError(
-      absl::StrCat(EscapeForTerminal(file.path), ": is not read, since ", why.message(),
-                   "; Linux 5.13 or later with Landlock and seccomp is expected"));
 }
 
 // Waits for the end of `child`, which `interrupt` brings about.
@@ -297,32 +146,23 @@ int Await(pid_t child, Interrupt* interrupt) {
   return state;
 }
 
-}  // namespace
+absl::Status NoReader(const SourceFile& file) {
+  return absl::ResourceExhaustedError(
+      absl::StrCat(EscapeForTerminal(file.path),
+                   ": cannot run the process that reads it: ", std::strerror(errno)));
+}
 
-absl::StatusOr<Model> ReadContained(const SourceFile& file,
-                                    const std::function<absl::StatusOr<Model>()>& read,
-                                    Interrupt* interrupt) {
-  const absl::Status landlock = Sandbox::Get().CheckLandlock();
-  if (file.other_files == OtherFiles::kNone && !landlock.ok()) return NoSandbox(file, landlock);
-  const auto failed = [&file] {
-    return absl::ResourceExhaustedError(
-        absl::StrCat(EscapeForTerminal(file.path), ": ", std::strerror(errno)));
-  };
-  const daemon::Descriptor descriptor(::memfd_create("voxelctl-model", MFD_CLOEXEC));
-  if (!descriptor.ok()) return failed();
-  const pid_t parent = ::getpid();
-  const pid_t child = ::fork();
-  if (child < 0) return failed();
-  if (child == 0) RunChild(file, read, descriptor.get(), parent);
-  const int state = Await(child, interrupt);
-  if (interrupt != nullptr && interrupt->requested()) return absl::CancelledError("interrupted");
+absl::Status TimedOut(const SourceFile& file, rlim_t seconds, absl::string_view of) {
+  return Spoilt(file, absl::StrCat("timed out after ", seconds, " s", of));
+}
+
+// Returns: why a reader that ended in this state did not do what it should; OK if it did.
+absl::Status EndOf(const SourceFile& file, int state) {
   if (WIFSIGNALED(state)) {
     const int signal = WTERMSIG(state);
     if (signal == SIGINT || signal == SIGTERM) return absl::CancelledError("interrupted");
-    if (signal == SIGXCPU)
-      return Spoilt(file, absl::StrCat("did not end within ", kMostSeconds, " s of the processor"));
-    if (signal == SIGALRM)
-      return Spoilt(file, absl::StrCat("did not end within ", kMostWaiting, " s"));
+    if (signal == SIGXCPU) return TimedOut(file, kMostSeconds, " of processor time");
+    if (signal == SIGALRM) return TimedOut(file, kMostWaiting, "");
     if (signal == SIGKILL)
       return Spoilt(file, "was killed, as the system does when memory is short");
     if (signal == SIGXFSZ) return Spoilt(file, "made more than a model may hold");
@@ -332,15 +172,210 @@ absl::StatusOr<Model> ReadContained(const SourceFile& file,
     return NoSandbox(file, absl::UnavailableError("its reader could not be confined"));
   }
   if (WEXITSTATUS(state) != 0) return Spoilt(file, "wanted more than 4 GiB of memory, or gave up");
+  return absl::OkStatus();
+}
+
+// The whole of `size` bytes. False if there are fewer.
+bool ReadAll(int descriptor, void* out, size_t size) {
+  char* at = static_cast<char*>(out);
+  while (size > 0) {
+    const ssize_t got = ::read(descriptor, at, size);
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) return false;
+    at += got, size -= static_cast<size_t>(got);
+  }
+  return true;
+}
+
+// A few bytes, of which a socket takes all or none.
+bool WriteNumber(int descriptor, int64_t number) {
+  return ::write(descriptor, &number, sizeof(number)) == sizeof(number);
+}
+
+// Runs in the child. Opens the source and answers with the number of its frames; on an error, writes that with WriteModel and answers -1.
+// Then, for each frame number that it receives, writes the frame and answers 0.
+[[noreturn]] void ServeFrames(SourceFile file, const OpenFrames& open, int model, int channel,
+                              pid_t parent) {
+  if (!BecomeReader(file, {{model, channel}}, parent)) ::_exit(kNoSandbox);
+  constexpr int kModel = kFirstKept, kChannel = kFirstKept + 1;
+  bool good = true;
+  try {
+    const absl::StatusOr<std::unique_ptr<FrameSource>> source = open(std::move(file));
+    if (!source.ok()) good = WriteModel(source.status(), kModel);
+    good = good && WriteNumber(kChannel, source.ok() ? (*source)->count() : -1);
+    for (int64_t frame = 0; good && source.ok() && ReadAll(kChannel, &frame, sizeof(frame));) {
+      good = WriteModel((*source)->Read(frame), kModel) && WriteNumber(kChannel, 0);
+    }
+  } catch (const std::exception&) {
+    good = false;
+  }
+  ::_exit(good ? 0 : 1);
+}
+
+class ContainedFrames final : public FrameSource {
+ public:
+  ContainedFrames(SourceFile file, Interrupt* interrupt)
+      : file_(std::move(file)), interrupt_(interrupt) {}
+  ~ContainedFrames() override {
+    if (child_ <= 0) return;
+    ::kill(child_, SIGKILL);
+    Await(child_, nullptr);
+  }
+
+  absl::Status Start(const OpenFrames& open) {
+    model_ = daemon::Descriptor(::memfd_create("voxelctl-frame", MFD_CLOEXEC));
+    int ends[2] = {-1, -1};
+    if (!model_.ok() || ::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
+      return NoReader(file_);
+    }
+    channel_ = daemon::Descriptor(ends[0]);
+    const daemon::Descriptor other(ends[1]);
+    const pid_t parent = ::getpid();
+    child_ = ::fork();
+    if (child_ < 0) return NoReader(file_);
+    if (child_ == 0) ServeFrames(std::move(file_), open, model_.get(), other.get(), parent);
+    file_.bytes = std::string();  // the reader has them
+    return absl::OkStatus();
+  }
+
+  // Waits for the source to be opened.
+  absl::Status Opened() {
+    const absl::StatusOr<int64_t> count = Answer();
+    if (!count.ok()) return count.status();
+    if (*count > kMaxFrames) return Spoilt(file_, absl::StrCat("counts ", *count, " frames"));
+    if (*count >= 1) {
+      count_ = *count;
+      return absl::OkStatus();
+    }
+    const absl::StatusOr<Model> error = Written();
+    return error.ok() ? Spoilt(file_, "gave up") : error.status();
+  }
+
+  int64_t count() const override { return count_; }
+
+  absl::StatusOr<Model> Read(int64_t frame) override {
+    if (!ended_.ok()) return ended_;
+    // The reader shares the file offset, so it writes from the beginning again.
+    if (::ftruncate(model_.get(), 0) != 0 || ::lseek(model_.get(), 0, SEEK_SET) != 0) {
+      return NoReader(file_);
+    }
+    // A reader that has ended, or does not take numbers any more, does not answer either.
+    (void)::send(channel_.get(), &frame, sizeof(frame), MSG_NOSIGNAL | MSG_DONTWAIT);
+    const absl::StatusOr<int64_t> answer = Answer();
+    if (!answer.ok()) return answer.status();
+    absl::StatusOr<Model> model = Written();
+    if (!model.ok()) return model;
+    const absl::Status sound = CheckModel(file_, *model);
+    if (!sound.ok()) return sound;
+    return model;
+  }
+
+ private:
+  // Waits for an answer, as long as the reader is within its limits.
+  absl::StatusOr<int64_t> Answer() {
+    if (!ended_.ok()) return ended_;
+    const int listener = interrupt_ == nullptr ? 0 : interrupt_->AddListener([child = child_] {
+      ::kill(child, SIGKILL);
+    });
+    int64_t answer = 0;
+    bool answered = false;
+    absl::Status over;
+    for (unsigned waited = 0; over.ok(); ++waited) {
+      pollfd ready = {channel_.get(), POLLIN, 0};
+      constexpr int kSecondMs = 1000;  // after which its time is looked at
+      const int found = ::poll(&ready, 1, kSecondMs);
+      if (found > 0) {
+        // The reader writes eight bytes at once. It must not keep this process waiting for the rest.
+        const ssize_t got = ::recv(channel_.get(), &answer, sizeof(answer), MSG_DONTWAIT);
+        answered = got == sizeof(answer);
+        if (got > 0 && !answered) over = Spoilt(file_, "gave up halfway");
+        break;
+      }
+      if (waited >= kMostWaiting) over = TimedOut(file_, kMostWaiting, "");
+      if (ProcessorSeconds() - used_ > static_cast<double>(kMostSeconds)) {
+        over = TimedOut(file_, kMostSeconds, " of processor time");
+      }
+    }
+    // What the reader uses while it is not asked for a frame counts for the next one.
+    used_ = ProcessorSeconds();
+    if (interrupt_ != nullptr) interrupt_->RemoveListener(listener);
+    if (answered) return answer;
+    ::kill(child_, SIGKILL);
+    const absl::Status end = EndOf(file_, Await(std::exchange(child_, -1), nullptr));
+    ended_ = interrupt_ != nullptr && interrupt_->requested() ? absl::CancelledError("interrupted")
+             : !over.ok()                                     ? over
+             : end.ok()                                       ? Spoilt(file_, "gave up")
+                                                              : end;
+    return ended_;
+  }
+
+  double ProcessorSeconds() const {
+    clockid_t clock = 0;
+    timespec used = {};
+    if (::clock_getcpuclockid(child_, &clock) != 0 || ::clock_gettime(clock, &used) != 0) return 0;
+    return static_cast<double>(used.tv_sec) + static_cast<double>(used.tv_nsec) * 1e-9;
+  }
+
+  // Returns: the model that the reader has written. The bytes are copied, not mapped, because the running reader could truncate the file.
+  absl::StatusOr<Model> Written() const {
+    const off_t size = ::lseek(model_.get(), 0, SEEK_END);
+    if (size <= 0) return Spoilt(file_, "gave up");
+    if (size > kMostFrameBytes) {
+      return Spoilt(file_, absl::StrCat("made a frame of ", size, " bytes, and ", kMostFrameBytes,
+                                        " are possible"));
+    }
+    const auto bytes = std::make_unique_for_overwrite<char[]>(static_cast<size_t>(size));
+    if (::lseek(model_.get(), 0, SEEK_SET) != 0 ||
+        !ReadAll(model_.get(), bytes.get(), static_cast<size_t>(size))) {
+      return Spoilt(file_, "gave up halfway");
+    }
+    return ReadModel(file_, bytes.get(), static_cast<size_t>(size));
+  }
+
+  SourceFile file_;
+  Interrupt* const interrupt_;
+  daemon::Descriptor model_, channel_;
+  pid_t child_ = -1;
+  int64_t count_ = 1;
+  double used_ = 0;     // s of processor time, when it last answered
+  absl::Status ended_;  // why the reader is not there any more
+};
+
+}  // namespace
+
+absl::StatusOr<Model> ReadContained(const SourceFile& file,
+                                    const std::function<absl::StatusOr<Model>()>& read,
+                                    Interrupt* interrupt) {
+  const absl::Status landlock = Sandbox::Get().CheckLandlock();
+  if (file.other_files == OtherFiles::kNone && !landlock.ok()) return NoSandbox(file, landlock);
+  const daemon::Descriptor descriptor(::memfd_create("voxelctl-model", MFD_CLOEXEC));
+  if (!descriptor.ok()) return NoReader(file);
+  const pid_t parent = ::getpid();
+  const pid_t child = ::fork();
+  if (child < 0) return NoReader(file);
+  if (child == 0) RunChild(file, read, descriptor.get(), parent);
+  const int state = Await(child, interrupt);
+  if (interrupt != nullptr && interrupt->requested()) return absl::CancelledError("interrupted");
+  if (absl::Status end = EndOf(file, state); !end.ok()) return end;
   const off_t size = ::lseek(descriptor.get(), 0, SEEK_END);
   if (size <= 0) return Spoilt(file, "gave up");
   void* bytes =
       ::mmap(nullptr, static_cast<size_t>(size), PROT_READ, MAP_PRIVATE, descriptor.get(), 0);
-  if (bytes == MAP_FAILED) return failed();
+  if (bytes == MAP_FAILED) return NoReader(file);
   absl::StatusOr<Model> model =
       ReadModel(file, static_cast<const char*>(bytes), static_cast<size_t>(size));
   ::munmap(bytes, static_cast<size_t>(size));
   return model;
+}
+
+absl::StatusOr<std::unique_ptr<FrameSource>> OpenContained(SourceFile file, const OpenFrames& open,
+                                                           Interrupt* interrupt) {
+  const absl::Status landlock = Sandbox::Get().CheckLandlock();
+  if (file.other_files == OtherFiles::kNone && !landlock.ok()) return NoSandbox(file, landlock);
+  auto frames = std::make_unique<ContainedFrames>(std::move(file), interrupt);
+  if (absl::Status status = frames->Start(open); !status.ok()) return status;
+  if (absl::Status status = frames->Opened(); !status.ok()) return status;
+  return frames;
 }
 
 }  // namespace voxeld::voxelctl

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 
 #include "absl/status/statusor.h"
+#include "tools/voxelctl/import/frames.h"
 #include "tools/voxelctl/import/model.h"
 #include "tools/voxelctl/import/source_file.h"
 #include "tools/voxelctl/process/interrupt.h"
@@ -18,5 +20,13 @@ namespace voxeld::voxelctl {
 absl::StatusOr<Model> ReadContained(const SourceFile& file,
                                     const std::function<absl::StatusOr<Model>()>& read,
                                     Interrupt* interrupt = nullptr);
+
+using OpenFrames = std::function<absl::StatusOr<std::unique_ptr<FrameSource>>(SourceFile file)>;
+
+// Returns a source of frames that `open` opens, and reads, in such a copy of this process, which lives as long as the result. The limits of
+// time hold for opening, and for each frame. Call it on a thread that lives as long as the result.
+// Errors: those of `open`, and as above; also of each frame.
+absl::StatusOr<std::unique_ptr<FrameSource>> OpenContained(SourceFile file, const OpenFrames& open,
+                                                           Interrupt* interrupt = nullptr);
 
 }  // namespace voxeld::voxelctl

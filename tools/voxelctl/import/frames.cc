@@ -16,7 +16,6 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr size_t kMostFrames = 1'000'000;
 constexpr size_t kMostDigits = 12;
 
 // A name with a place for a number.
@@ -87,8 +86,9 @@ absl::StatusOr<std::vector<std::string>> FindSequence(const std::string& path) {
     const std::string name = at->path().filename().string();
     const std::optional<uint64_t> number = NumberOf(*pattern, name);
     if (!number) continue;
-    if (found.size() >= kMostFrames) {
-      return absl::InvalidArgumentError(absl::StrCat(path, ": there are more than ", kMostFrames,
+    if (found.size() >= static_cast<size_t>(kMaxFrames)) {
+      return absl::InvalidArgumentError(absl::StrCat(path, ": there are more than ",
+                                                     static_cast<size_t>(kMaxFrames),
                                                      " such files; take a part of them"));
     }
     found.emplace_back(*number, whole.has_parent_path() ? (folder / name).string() : name);

@@ -13,6 +13,8 @@
 
 namespace voxeld::voxelctl {
 
+inline constexpr int64_t kMaxFrames = 1'000'000;  // of a source
+
 // Frames by their number. Used by one thread at a time.
 class FrameSource {
  public:

@@ -49,7 +49,7 @@ absl::StatusOr<Model> ReadFolder(const std::string& path) {
 }
 
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenAnimation(const std::string& path, size_t, double,
-                                                           OtherFiles) {
+                                                           OtherFiles, Interrupt*) {
   return NoImporter(path, "--animate");
 }
 

@@ -1,0 +1,193 @@
+#include "tools/voxelctl/import/model_bytes.h"
+
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+constexpr uint64_t kMostMessageBytes = 64 << 10;
+
+class ModelWriter {
+ public:
+  explicit ModelWriter(int descriptor) : descriptor_(descriptor) {}
+  bool ok() const { return ok_; }
+
+  void Bytes(const void* bytes, size_t size) {
+    const char* at = static_cast<const char*>(bytes);
+    while (size > 0 && ok_) {
+      const ssize_t written = ::write(descriptor_, at, size);
+      if (written < 0 && errno == EINTR) continue;
+      ok_ = written > 0;
+      if (ok_) at += written, size -= static_cast<size_t>(written);
+    }
+  }
+  template <typename Vector>
+  void All(const Vector& values) {
+    const uint64_t count = values.size();
+    Bytes(&count, sizeof(count));
+    Bytes(values.data(), count * sizeof(values[0]));
+  }
+
+ private:
+  const int descriptor_;
+  bool ok_ = true;
+};
+
+class ModelReader {
+ public:
+  ModelReader(const char* at, size_t size) : at_(at), left_(size) {}
+  bool ok() const { return ok_; }
+
+  void Bytes(void* out, size_t size) {
+    ok_ &= size <= left_;
+    if (!ok_ || size == 0) return;
+    std::memcpy(out, at_, size);
+    at_ += size;
+    left_ -= size;
+  }
+  template <typename Vector>
+  void All(Vector* values) {
+    uint64_t count = 0;
+    Bytes(&count, sizeof(count));
+    ok_ &= count <= left_ / sizeof((*values)[0]);
+    if (!ok_) return;
+    values->resize(count);
+    Bytes(values->data(), count * sizeof((*values)[0]));
+  }
+
+ private:
+  const char* at_;
+  size_t left_;
+  bool ok_ = true;
+};
+
+void WriteVolume(const SampledVolume& volume, ModelWriter& writer) {
+  const uint8_t has_window = volume.window.has_value();
+  writer.Bytes(&volume.size, sizeof(volume.size));
+  writer.Bytes(&volume.corners, sizeof(volume.corners));
+  writer.Bytes(&has_window, 1);
+  if (has_window) writer.Bytes(&*volume.window, sizeof(*volume.window));
+  writer.All(volume.samples);
+  writer.All(volume.colors);
+}
+
+SampledVolume ReadVolume(ModelReader& reader) {
+  SampledVolume volume;
+  uint8_t has_window = 0;
+  reader.Bytes(&volume.size, sizeof(volume.size));
+  reader.Bytes(&volume.corners, sizeof(volume.corners));
+  reader.Bytes(&has_window, 1);
+  if (has_window != 0) reader.Bytes(&volume.window.emplace(), sizeof(*volume.window));
+  reader.All(&volume.samples);
+  reader.All(&volume.colors);
+  return volume;
+}
+
+}  // namespace
+
+bool WriteModel(const absl::StatusOr<Model>& model, int descriptor) {
+  ModelWriter writer(descriptor);
+  const int code = model.status().raw_code();
+  writer.Bytes(&code, sizeof(code));
+  if (!model.ok()) {
+    writer.All(std::string(model.status().message()));
+    return writer.ok();
+  }
+  const uint64_t parts = model->parts.size(), volumes = model->volumes.size();
+  writer.All(model->path);
+  writer.All(model->format);
+  writer.All(model->note);
+  writer.Bytes(&model->up, sizeof(model->up));
+  writer.Bytes(&model->globe, sizeof(model->globe));
+  writer.Bytes(&model->lit_already, sizeof(model->lit_already));
+  writer.Bytes(&parts, sizeof(parts));
+  for (const Part& part : model->parts) {
+    writer.Bytes(&part.kind, sizeof(part.kind));
+    writer.Bytes(&part.thickness, sizeof(part.thickness));
+    writer.Bytes(&part.level, sizeof(part.level));
+    writer.All(part.positions);
+    writer.All(part.normals);
+    writer.All(part.colors);
+    writer.All(part.indices);
+  }
+  writer.Bytes(&volumes, sizeof(volumes));
+  for (const SampledVolume& volume : model->volumes) WriteVolume(volume, writer);
+  return writer.ok();
+}
+
+absl::Status Spoilt(const SourceFile& file, absl::string_view how) {
+  return FileError(file, absl::StrCat("the library that reads it ", how),
+                   "the file is damaged or not what its name says");
+}
+
+namespace {
+
+// One of those that readers use.
+absl::StatusCode CodeOf(int code) {
+  switch (static_cast<absl::StatusCode>(code)) {
+    case absl::StatusCode::kNotFound:
+    case absl::StatusCode::kPermissionDenied:
+    case absl::StatusCode::kFailedPrecondition:
+    case absl::StatusCode::kUnimplemented:
+    case absl::StatusCode::kResourceExhausted:
+      return static_cast<absl::StatusCode>(code);
+    default:
+      return absl::StatusCode::kInvalidArgument;
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_t size) {
+  ModelReader reader(bytes, size);
+  int code = 0;
+  reader.Bytes(&code, sizeof(code));
+  if (code != 0) {
+    std::string message;
+    reader.All(&message);
+    if (!reader.ok() || message.size() > kMostMessageBytes) return Spoilt(file, "gave up");
+    return absl::Status(CodeOf(code), message);
+  }
+  Model model;
+  uint64_t parts = 0, volumes = 0;
+  uint8_t up = 0, globe = 0, lit_already = 0;
+  reader.All(&model.path);
+  reader.All(&model.format);
+  reader.All(&model.note);
+  reader.Bytes(&up, 1);
+  reader.Bytes(&globe, 1);
+  reader.Bytes(&lit_already, 1);
+  if (up > static_cast<uint8_t>(Up::kZ)) return Spoilt(file, "gave up halfway");
+  model.up = static_cast<Up>(up);
+  model.globe = globe != 0;
+  model.lit_already = lit_already != 0;
+  reader.Bytes(&parts, sizeof(parts));
+  for (uint64_t i = 0; i < parts && reader.ok(); ++i) {
+    Part part;
+    uint8_t kind = 0;
+    reader.Bytes(&kind, 1);
+    if (kind > static_cast<uint8_t>(Kind::kTriangles)) return Spoilt(file, "gave up halfway");
+    part.kind = static_cast<Kind>(kind);
+    reader.Bytes(&part.thickness, sizeof(part.thickness));
+    reader.Bytes(&part.level, sizeof(part.level));
+    reader.All(&part.positions);
+    reader.All(&part.normals);
+    reader.All(&part.colors);
+    reader.All(&part.indices);
+    model.parts.push_back(std::move(part));
+  }
+  reader.Bytes(&volumes, sizeof(volumes));
+  for (uint64_t i = 0; i < volumes && reader.ok(); ++i) model.volumes.push_back(ReadVolume(reader));
+  if (!reader.ok()) return Spoilt(file, "gave up halfway");
+  return model;
+}
+
+}  // namespace voxeld::voxelctl
