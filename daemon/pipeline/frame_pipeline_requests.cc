@@ -209,9 +209,12 @@ void FramePipeline::ServeCaptures() {
       if (now < capture.deadline) {
         waiting.push_back(std::move(capture));
       } else {
-        capture.done(absl::DeadlineExceededError(absl::StrFormat(
-            "no volume with snapshot %d or a newer one was shown in time; the newest has %d",
-            capture.at_least.snapshot, shown_ ? shown_->snapshot : 0)));
+        capture.done(absl::DeadlineExceededError(
+            !showing()
+                ? absl::StrCat("timed out; ", WhyNotShowing())
+                : absl::StrFormat("timed out waiting for a volume with snapshot %d or newer; "
+                                  "the newest one shown has %d",
+                                  capture.at_least.snapshot, shown_ ? shown_->snapshot : 0)));
       }
       continue;
     }

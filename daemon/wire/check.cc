@@ -83,9 +83,10 @@ MaybeFault CheckFloat(const FieldPath& path, double value) {
 MaybeFault CheckPositive(const FieldPath& path, double value) {
   if (auto fault = CheckFloat(path, value)) return fault;
   if (value >= std::numeric_limits<float>::min()) return {};
+  const std::string least =
+      value > 0 ? absl::StrCat(" (at least ", Show(std::numeric_limits<float>::min()), ")") : "";
   return Fault{path.ToString(), Reason::kInvalidValue,
-               absl::StrCat("is ", Show(value), "; give a number greater than 0 (at least ",
-                            Show(std::numeric_limits<float>::min()), ")")};
+               absl::StrCat("is ", Show(value), "; give a number greater than 0", least)};
 }
 
 MaybeFault CheckVec3(const FieldPath& path, const v1::Vec3& vec) {

@@ -70,7 +70,17 @@ std::vector<std::string> ProfilePlaces(const std::function<std::string(const cha
                                        const std::string& program_folder) {
   std::vector<std::string> places;
   if (std::string named = environment("VOXELD_PROFILES"); !named.empty()) places.push_back(named);
-  if (!program_folder.empty()) places.push_back(program_folder + "/../share/voxeld/profiles");
+  if (!program_folder.empty()) {
+    places.push_back(program_folder + "/../share/voxeld/profiles");
+    // The source tree's profiles, if the program is in build/PRESET/bin.
+    const std::filesystem::path source =
+        std::filesystem::path(program_folder).parent_path().parent_path().parent_path() /
+        "display/profiles";
+    std::error_code error;
+    if (std::filesystem::exists(program_folder + "/../CMakeCache.txt", error)) {
+      places.push_back(source.string());
+    }
+  }
   places.emplace_back("/usr/share/voxeld/profiles");
   return places;
 }
@@ -106,6 +116,11 @@ absl::StatusOr<std::string> FindProfile(const std::string& name,
     const std::filesystem::path path = std::filesystem::path(place) / (name + kEnding);
     if (std::filesystem::is_regular_file(path, error)) return path.string();
     for (std::string& one : ProfilesIn(place)) known.insert(std::move(one));
+  }
+  std::error_code error;
+  if (std::filesystem::exists(name, error)) {
+    return absl::NotFoundError(
+        absl::StrCat("there is no profile \"", name, "\"; to read the file, write ./", name));
   }
   return absl::NotFoundError(
       absl::StrCat("there is no profile \"", name, "\" in ", absl::StrJoin(places, ", "),

@@ -78,6 +78,23 @@ TEST_F(Profiles, AreFoundByNameOrPath) {
               ElementsAre("/a", "/opt/bin/../share/voxeld/profiles", "/usr/share/voxeld/profiles"));
 }
 
+TEST_F(Profiles, ProgramOfASourceTreeFindsThoseOfTheTree) {
+  std::filesystem::create_directories(folder_ / "build/any/bin");
+  std::ofstream(folder_ / "build/any/CMakeCache.txt") << "#\n";
+  const std::string program_folder = (folder_ / "build/any/bin").string();
+  const auto environment = [](const char*) -> std::string { return ""; };
+  EXPECT_THAT(ProfilePlaces(environment, program_folder),
+              ElementsAre(program_folder + "/../share/voxeld/profiles",
+                          (folder_ / "display/profiles").string(), "/usr/share/voxeld/profiles"));
+}
+
+TEST_F(Profiles, FileWithoutItsFolderIsNamed) {
+  std::ofstream("here.txt") << "driver = \"simulated\"\n";
+  EXPECT_EQ(FindProfile("here.txt", {folder_.string()}).status().message(),
+            "there is no profile \"here.txt\"; to read the file, write ./here.txt");
+  std::filesystem::remove("here.txt");
+}
+
 TEST(ShippedProfiles, AreDisplaysThatCanBe) {
   int count = 0;
   for (const auto& entry : std::filesystem::directory_iterator(VOXELD_PROFILES_DIR)) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tests/tools/voxelctl/commands_fixture.h"
+#include "tools/voxelctl/commands/not_showing.h"
 #include "tools/voxelctl/import/more_formats.h"
 
 namespace voxeld::voxelctl {
@@ -480,6 +481,29 @@ TEST_F(CommandsTest, NobodyThere) {
   EXPECT_THAT(result.err, HasSubstr("unix:" + folder_.Path("nobody")));
   EXPECT_THAT(result.err, HasSubstr("start it with `voxeld`"));
   EXPECT_EQ(RunAnywhere({"--server", "nonsense", "stats"}).code, 2);
+}
+
+TEST(NotShowing, EachDisplayThatIsDarkWithTheReason) {
+  v1::ListDisplaysResponse displays;
+  v1::DisplayDescription* display = displays.add_displays();
+  display->set_name("here");
+  display->set_state(v1::DISPLAY_STATE_SHOWING);
+  EXPECT_TRUE(NotShowing(displays).empty());
+  display = displays.add_displays();
+  display->set_name(
+      "cu\x1b"
+      "be");
+  display->set_state(v1::DISPLAY_STATE_ATTACHING);
+  display->set_state_reason("board 1: no USB device 1d50:607a is attached");
+  display = displays.add_displays();
+  display->set_name("dark");
+  display->set_state(v1::DISPLAY_STATE_BLANKED);
+  display->set_state_reason("blanked");
+  EXPECT_THAT(NotShowing(displays),
+              testing::ElementsAre(
+                  "display cu\\u{1b}be shows nothing now: it is attaching (board 1: no USB "
+                  "device 1d50:607a is attached)",
+                  "display dark shows nothing now: it is blanked"));
 }
 
 }  // namespace

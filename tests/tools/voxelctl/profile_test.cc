@@ -91,7 +91,9 @@ TEST(Profile, WhatIsWrongIsSaid) {
   EXPECT_THAT(std::string(unknown.message()), HasSubstr("unknown option geometri"));
   const absl::Status other =
       Show({.profile = folder.Write("c.toml", "driver = \"fadecandy\"\n")}).status;
-  EXPECT_THAT(std::string(other.message()), HasSubstr("simulated or voxlink"));
+  EXPECT_THAT(
+      std::string(other.message()),
+      HasSubstr("To check it, run: voxeld --check-config --display NAME=fadecandy,profile="));
 }
 
 }  // namespace

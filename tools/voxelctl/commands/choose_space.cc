@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "common/text/printable.h"
+#include "tools/voxelctl/commands/not_showing.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -41,15 +42,19 @@ absl::StatusOr<Room> ChooseSpace(Connection& connection, const std::string& name
   if (!all.ok()) return all.status();
   std::vector<const v1::DisplayDescription*> displays;
   std::vector<std::string> names;
+  v1::ListDisplaysResponse chosen;
   for (const v1::DisplayDescription& display : all->displays()) {
     names.push_back(EscapeForTerminal(display.name()));
-    if (name.empty() || display.name() == name) displays.push_back(&display);
+    if (!name.empty() && display.name() != name) continue;
+    displays.push_back(&display);
+    *chosen.add_displays() = display;
   }
   if (!name.empty() && displays.empty()) {
     return absl::NotFoundError(absl::StrCat("there is no display \"", EscapeForTerminal(name),
                                             "\"; there are ", absl::StrJoin(names, ", ")));
   }
   if (displays.empty()) console.Say("the server has no display: the scene is put up unseen");
+  for (const std::string& sentence : NotShowing(chosen)) console.Say(sentence);
   return CommonRoom(displays);
 }
 

@@ -8,6 +8,7 @@
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/commands/display_names.h"
 #include "tools/voxelctl/commands/end_patterns.h"
+#include "tools/voxelctl/commands/not_showing.h"
 #include "tools/voxelctl/connection/owned_layers.h"
 #include "tools/voxelctl/shape/drawing.h"
 #include "tools/voxelctl/text/proto_json.h"
@@ -106,12 +107,13 @@ absl::Status Pattern(const PatternOptions& options, Connection& connection, Cons
     return absl::OkStatus();
   }
   for (const v1::DisplayDescription& display : updated.displays()) {
-    console.Say(absl::StrCat(
-        EscapeForTerminal(display.name()),
-        options.pattern == v1::TEST_PATTERN_NONE
-            ? ": the scene again"
-            : ": shows the pattern until `voxelctl pattern none` or `voxelctl clear`"));
+    console.Say(
+        absl::StrCat(EscapeForTerminal(display.name()),
+                     options.pattern == v1::TEST_PATTERN_NONE
+                         ? ": test pattern ended"
+                         : ": test pattern set until `voxelctl pattern none` or `voxelctl clear`"));
   }
+  for (const std::string& sentence : NotShowing(updated)) console.Say(sentence);
   return absl::OkStatus();
 }
 

@@ -9,6 +9,8 @@
 #include "absl/algorithm/container.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+#include "absl/strings/strip.h"
 #include "common/text/printable.h"
 #include "display/sync/clock.h"
 #include "tools/voxelctl/commands/choose_space.h"
@@ -80,14 +82,10 @@ void PassOver(const SceneAbout& about, const absl::Status& why, Console& console
   }
 }
 
-// Its data are not on this machine, or this build cannot read them, which is no fault.
+// Its data are not on this machine, which is no fault.
 void LeaveOut(const SceneAbout& about, const std::vector<std::string>& roots,
               const absl::Status& why, Console& console) {
   if (console.json()) return PassOver(about, why, console);
-  if (absl::IsUnimplemented(why)) {
-    console.Say(absl::StrCat(why.message(), "; the scene is left out"));
-    return;
-  }
   const auto missing = absl::c_find_if(
       about.needs, [&](const SceneFile& file) { return !FindSceneFile(file, roots).ok(); });
   const std::string by = missing == about.needs.end() ? "" : missing->brought_by;
@@ -268,14 +266,23 @@ absl::Status Demo(const DemoOptions& options, const Connector& connect, Interrup
   if (options.list) return ListScenes(options, console);
   const std::vector<std::string> roots = DataRoots(options.data, ProgramPath());
   std::vector<Playable> scenes;
+  std::vector<std::string> not_built;  // scenes whose files this build cannot read
+  std::string to_build;
   for (const SceneAbout& scene : Scenes()) {
     if (!IsChosen(options, scene)) continue;
     absl::StatusOr<std::vector<std::string>> files = FindWhatSceneNeeds(scene, roots);
     if (files.ok()) {
       scenes.push_back({&scene, *std::move(files)});
+    } else if (absl::IsUnimplemented(files.status()) && !console.json()) {
+      not_built.emplace_back(scene.name);
+      to_build =
+          std::string(absl::StripPrefix(files.status().message(), absl::StrCat(scene.name, ": ")));
     } else {
       LeaveOut(scene, roots, files.status(), console);
     }
+  }
+  if (!not_built.empty()) {
+    console.Say(absl::StrCat("left out: ", absl::StrJoin(not_built, ", "), "; ", to_build));
   }
   if (scenes.empty()) return absl::NotFoundError("none of these scenes can be played");
   const absl::StatusOr<std::unique_ptr<Connection>> connection = connect();

@@ -25,7 +25,8 @@ absl::Status Draw(const DrawOptions& options, const Connector& connect, Console&
                            {"shapes", shapes},
                            {"snapshot", put->snapshot},
                            {"notes", put->notes},
-                           {"stay", put->stay}},
+                           {"stay", put->stay},
+                           {"not_showing", put->not_showing}},
                           false));
     return absl::OkStatus();
   }
@@ -35,6 +36,7 @@ absl::Status Draw(const DrawOptions& options, const Connector& connect, Console&
       absl::StrCat(Counted(static_cast<uint64_t>(shapes), "shape"), " up, in the layer \"", kLayer,
                    "\"; `voxelctl snapshot OUT.png` shows what the display shows, `voxelctl "
                    "clear` takes it down"));
+  for (const std::string& sentence : put->not_showing) console.Say(sentence);
   return absl::OkStatus();
 }
 

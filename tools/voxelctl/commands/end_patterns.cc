@@ -3,6 +3,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "common/text/printable.h"
+#include "tools/voxelctl/commands/not_showing.h"
 #include "tools/voxelctl/connection/owned_layers.h"
 
 namespace voxeld::voxelctl {
@@ -11,6 +12,7 @@ absl::StatusOr<EndedPatterns> EndPatterns(Connection& connection) {
   const absl::StatusOr<v1::ListDisplaysResponse> displays = connection.ListDisplays();
   if (!displays.ok()) return displays.status();
   EndedPatterns patterns;
+  patterns.not_showing = NotShowing(*displays);
   for (const v1::DisplayDescription& display : displays->displays()) {
     if (display.test_pattern() == v1::TEST_PATTERN_NONE ||
         display.test_pattern() == v1::TEST_PATTERN_UNSPECIFIED)

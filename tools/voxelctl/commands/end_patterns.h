@@ -12,6 +12,7 @@ namespace voxeld::voxelctl {
 struct EndedPatterns {
   std::vector<std::string> ended;  // displays
   std::vector<std::string> stay;   // displays whose pattern the caller has not the scope to end
+  std::vector<std::string> not_showing;  // sentences, as NotShowing returns them
 };
 
 // Ends the test pattern of every display that shows one.

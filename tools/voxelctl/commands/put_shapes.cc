@@ -77,6 +77,7 @@ absl::StatusOr<ShapesPut> PutShapes(const v1::ApplyUpdateRequest& request, bool 
   for (std::string sentence : {OthersStay(taken->stay), PatternsStay(*patterns)}) {
     if (!sentence.empty()) put.stay.push_back(std::move(sentence));
   }
+  put.not_showing = patterns->not_showing;
   return put;
 }
 

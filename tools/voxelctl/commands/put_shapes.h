@@ -14,6 +14,7 @@ struct ShapesPut {
   uint64_t snapshot = 0;
   std::vector<std::string> notes;  // of shapes that are drawn otherwise than asked; for a terminal
   std::vector<std::string> stay;   // of what others have up that was not to be; for a terminal
+  std::vector<std::string> not_showing;  // of displays that show nothing now; for a terminal
 };
 
 // All of them or none; with `add` beside what is in the layer, else in its place. What others have in a layer of that

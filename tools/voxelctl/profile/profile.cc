@@ -119,8 +119,11 @@ absl::StatusOr<display::DisplayInfo> InfoOf(const std::string& name,
     return display::ReadDisplayInfo(given, reader);
   }
   return absl::InvalidArgumentError(absl::StrCat(
-      name, ": driver is \"", profile.driver,
-      "\"; what such a one takes is checked when the daemon starts, here simulated or voxlink"));
+      name,
+      ": `voxelctl profile check` checks only profiles of the drivers simulated and voxlink; the "
+      "driver of this one is ",
+      profile.driver, ". To check it, run: voxeld --check-config --display NAME=", profile.driver,
+      ",profile=", name));
 }
 
 absl::Status List(Console& console) {
