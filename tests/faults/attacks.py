@@ -1,13 +1,16 @@
 #!/usr/bin/env python3
 """Measures what hostile clients cost others: the time to be served beside silent connections, and memory.
 
-usage: attacks.py [--repetitions N] [--limit BYTES] [--json] [ports | instances | entities] ...
+usage: attacks.py [--repetitions N] [--limit BYTES] [--json] [ports | instances | owners | entities | shapes | curves] ...
 
   ports      /healthz beside 1,000 silent connections to its port; a new gRPC client beside 300 to its; the same while such
              connections are opened all the time
   instances  one instance that expands to a million parts, then to as many as are admitted; resident memory at its peak and after
              the owner has left
+  owners     instances of 1,000 parts from three owners at once, each until one is refused; resident memory as above
   entities   points as entities of their own until one is refused; the same
+  shapes     spheres that fill the display, until one is refused, but at most 20,000, since each is slow to draw; resident memory as above
+  curves     the same with curves across the display
 
 Paths are in VOXELD and PYTHONPATH (the client and tests/e2e). Times are of one machine: compare runs, not numbers."""
 import argparse
@@ -24,6 +27,7 @@ import time
 import urllib.request
 from pathlib import Path
 from types import TracebackType
+from typing import Callable
 
 import numpy as np
 import voxeld as voxel
@@ -167,28 +171,81 @@ def instances(_: int, limit: int) -> dict[str, list[float]]:
         return rows
 
 
-def entities(_: int, limit: int) -> dict[str, list[float]]:
+def owners(_: int, limit: int) -> dict[str, list[float]]:
+    with Daemon(limit) as daemon:
+        idle = daemon.memory_mib()
+        admitted = [0, 0, 0]
+        ready = threading.Barrier(len(admitted), timeout=PATIENCE)
+        errors: list[BaseException] = []
+
+        def attack(number: int) -> None:
+            issues: list[str] = []
+            with daemon.connect(f"owner {number}", issues) as v:
+                with v.object("dots") as dots:
+                    for i in range(1000):
+                        dots.points(f"p{i}", np.array([[0.001 * i, 0.2, 0.3]], np.float32))
+                v.commit().wait(PATIENCE)
+                ready.wait()
+                while not issues and admitted[number] < 4000:
+                    for _ in range(20):
+                        v.instance(f"some/{admitted[number]}", "dots")
+                        admitted[number] += 1
+                    v.commit().wait(PATIENCE)
+
+        def guarded(number: int) -> None:
+            try:
+                attack(number)
+            except BaseException as error:  # raised below, in the thread that waits
+                errors.append(error)
+
+        threads = [threading.Thread(target=guarded, args=(number,)) for number in range(len(admitted))]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        if errors:
+            raise errors[0]
+        rows: dict[str, list[float]] = {"parts sent by the three": [sum(admitted) * 1000]}
+        rows.update(after(daemon, idle))
+        return rows
+
+
+def until_refused(limit: int, most: int, at_once: int, put: "Callable[[voxel.Layer, str], None]") -> dict[str, list[float]]:
+    """Puts entities up, `at_once` in a commit, until one is refused or there are `most`."""
     with Daemon(limit) as daemon:
         idle = daemon.memory_mib()
         issues: list[str] = []
         count = 0
         with daemon.connect("owner", issues) as v:
-            point = np.array([[0.1, 0.2, 0.3]], np.float32)
-            layer = v.layer("points")
-            while not issues and count < 4_000_000:
-                for _ in range(20_000):
-                    layer.points(f"p{count}", point)
+            layer = v.layer("many")
+            while not issues and count < most:
+                for _ in range(at_once):
+                    put(layer, f"e{count}")
                     count += 1
                 v.commit().wait_shown(PATIENCE)
-        rows: dict[str, list[float]] = {"entities sent until one was refused": [count]}
+        rows: dict[str, list[float]] = {"entities sent until one was refused, or all": [count]}
         rows.update(after(daemon, idle))
         return rows
 
 
+def entities(_: int, limit: int) -> dict[str, list[float]]:
+    point = np.array([[0.1, 0.2, 0.3]], np.float32)
+    return until_refused(limit, 4_000_000, 20_000, lambda layer, name: layer.points(name, point))
+
+
+def shapes(_: int, limit: int) -> dict[str, list[float]]:
+    return until_refused(limit, 20_000, 1000, lambda layer, name: layer.sphere(name, radius=1.5, fill="solid"))
+
+
+def curves(_: int, limit: int) -> dict[str, list[float]]:
+    points = np.array([[-1, -1, -1], [1, -1, 1], [-1, 1, 1], [1, 1, -1]], np.float32)
+    return until_refused(limit, 20_000, 1000, lambda layer, name: layer.curve(name, points, form="bezier"))
+
+
 def main() -> int:
-    attacks = {"ports": ports, "instances": instances, "entities": entities}
+    attacks = {"ports": ports, "instances": instances, "owners": owners, "entities": entities, "shapes": shapes, "curves": curves}
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("attack", nargs="*", help="ports, instances, entities; none: all")
+    parser.add_argument("attack", nargs="*", help="which of them (none: all)")
     parser.add_argument("--repetitions", type=int, default=10, help="of each time (default: 10)")
     parser.add_argument("--limit", type=int, default=1 << 30, help="max_memory_bytes (default: 1 GiB)")
     parser.add_argument("--json", action="store_true")

@@ -2,8 +2,8 @@
 """A long day in short: the real voxeld with three displays, state and http, and clients of every kind that come, draw, err and go. Its
 resident memory, what of it is held, descriptors, threads and latencies are measured all the while, and lines are laid through them.
 
-usage: soak.py [--minutes M] [--warm-up M] [--roles NAME,…] [--no-thread-caches] [--csv FILE] [--svg FILE] [--json]      Paths are in VOXELD and
-PYTHONPATH (the client and tests/e2e).
+usage: soak.py [--minutes M] [--warm-up M] [--roles NAME,…] [--environment NAME=VALUE]… [--csv FILE] [--svg FILE] [--json]      Paths are in
+VOXELD and PYTHONPATH (the client and tests/e2e).
 
 Ends with 1 if a commit has not had all that it is owed, or if something grows: the 95 % confidence interval of its slope (by medians of
 elevenths of what comes after warming up) lies above zero by more than GROWTH says an hour."""
@@ -205,8 +205,8 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=45, help="how long (default: %(default)s)")
     parser.add_argument("--warm-up", type=float, default=None, help=f"minutes from its start of which slopes know nothing (default: {WARM_UP}, or a third of a short run)")
     parser.add_argument("--roles", default=",".join(ROLES), help="which clients there are (default: %(default)s)")
-    parser.add_argument("--no-thread-caches", action="store_true", help="have the C library keep nothing of what is freed for each thread, which fills slowly, up to 0.24 MB a thread, "
-                        "and hides what else grows")
+    parser.add_argument("--environment", action="append", default=[], metavar="NAME=VALUE", help="for the daemon; may be repeated. To compare allocators: "
+                        "GLIBC_TUNABLES=glibc.malloc.tcache_count=0, or LD_PRELOAD=LIBRARY")
     parser.add_argument("--csv", help="a file for each measurement, a line each")
     parser.add_argument("--svg", help="a file for a picture of them")
     parser.add_argument("--json", action="store_true", help="what came of it as JSON, on standard output")
@@ -223,7 +223,7 @@ def main() -> int:
             [*ENDS_WITH_US, voxeld, "--config", f"{folder}/voxeld.toml", "--listen", server, "--http", "127.0.0.1:0", "--state-dir", f"{folder}/state", "--log-level", "info", "--engine", "cpu",
              "--display", "stack=simulated,size=24x24x16,rate=60", "--display", "rotor=simulated,geometry=rotor,size=24x16,slices=60,rate=30",
              "--display", "lattice=simulated,profile=" + str(Path(__file__).parents[2] / "display/profiles/lattice-8.toml")],
-            stdout=log, stderr=subprocess.STDOUT, env=dict(os.environ, **({"GLIBC_TUNABLES": "glibc.malloc.tcache_count=0"} if options.no_thread_caches else {})))
+            stdout=log, stderr=subprocess.STDOUT, env=dict(os.environ, **dict(each.split("=", 1) for each in options.environment)))
 
         def listens() -> int:
             said = Path(f"{folder}/log").read_text(encoding="utf-8")
