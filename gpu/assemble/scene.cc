@@ -70,12 +70,9 @@ uint64_t Scene::memory_bytes() const {
   constexpr uint64_t kLink = (sizeof(Drawable*) + 1) * 3 / 2;
   constexpr uint64_t kDrawable = HeapBytes(sizeof(Drawable)) + 2 * kLink;
   static_assert(kDrawable + 3 * HeapBytes(1) + 64 <= kMostDrawableBytes);
-  const auto slots = [](const auto& map) {
-    using Slot = typename std::remove_cvref_t<decltype(map)>::value_type;
-    return HeapBytes(map.capacity() * (sizeof(Slot) + 1));
-  };
   // Each geometry has a block for its set of users.
-  return slots(drawables_) + slots(geometries_) + slots(layers_) + drawables_.size() * kDrawable +
+  return HashBytes(drawables_) + HashBytes(geometries_) + HashBytes(layers_) +
+         drawables_.size() * kDrawable +
          geometries_.size() * (HeapBytes(sizeof(RetainedGeometry) + 16) + HeapBytes(1)) +
          layers_.size() * HeapBytes(sizeof(Layer)) + copied_bytes_;
 }

@@ -14,16 +14,12 @@
 namespace voxeld::gpu {
 namespace {
 
-template <typename T>
-uint64_t BytesOf(const std::vector<T>& values) {
-  return HeapBytes(values.capacity() * sizeof(T));
-}
-
 // Without its entries in tiles, which entries_bytes_ counts.
 uint64_t DerivedBytes(const Drawable& d) {
-  return BytesOf(d.vertices) + BytesOf(d.hoisted) + BytesOf(d.inside) +
-         (d.cut != nullptr ? d.cut->bytes() : 0) + BytesOf(d.bins.tiles) + BytesOf(d.bins.begin) +
-         BytesOf(d.bins.counts) + BytesOf(d.bins.triangles) + d.bins.item_bytes();
+  return VectorBytes(d.vertices) + VectorBytes(d.hoisted) + VectorBytes(d.inside) +
+         (d.cut != nullptr ? d.cut->bytes() : 0) + VectorBytes(d.bins.tiles) +
+         VectorBytes(d.bins.begin) + VectorBytes(d.bins.counts) + VectorBytes(d.bins.triangles) +
+         d.bins.item_bytes();
 }
 
 constexpr size_t kSmallDrawable = 2048;  // vertices: prepared by one thread
@@ -215,9 +211,9 @@ void Volume::TakeOutLeaving() {
     std::vector<Entry>& entries = index_[tile].entries;
     std::erase_if(entries, [](const Entry& e) { return e.drawable->leaving; });
     if (entries.capacity() > kKeptEntries && entries.size() < entries.capacity() / 8) {
-      entries_bytes_ -= BytesOf(entries);
+      entries_bytes_ -= VectorBytes(entries);
       entries.shrink_to_fit();
-      entries_bytes_ += BytesOf(entries);
+      entries_bytes_ += VectorBytes(entries);
     }
     index_[tile].leaving = false;
   }
@@ -371,9 +367,9 @@ void Volume::List(Drawable& d) {
       entries.push_back({&d, row});
       continue;
     }
-    entries_bytes_ -= BytesOf(entries);
+    entries_bytes_ -= VectorBytes(entries);
     entries.push_back({&d, row});
-    entries_bytes_ += BytesOf(entries);
+    entries_bytes_ += VectorBytes(entries);
   }
 }
 

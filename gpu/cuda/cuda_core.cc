@@ -101,7 +101,7 @@ absl::StatusOr<FrameResult> CudaCore::SubmitFrame(const FrameRequest& request, F
   if (!slice.ok()) return slice.status();
   result.singular_drawables = volume_.singular_drawables();
   device_->pool().TrimAfterPeak();
-  result.memory_bytes = device_->pool().held() + volume_.scene_bytes();
+  result.memory_bytes = device_->pool().held() + volume_.host_bytes();
   result.assemble_ns = *assemble;
   result.slice_ns = *slice;
   result.copy_ns = std::max<int64_t>(0, clock.Now() - start - *assemble - *slice);

@@ -9,6 +9,7 @@
 #include "gpu/cuda/draw_kernels.h"
 #include "gpu/cuda/item_lists.h"
 #include "gpu/cuda/kernels.h"
+#include "gpu/derived_bytes.h"
 
 namespace voxeld::gpu::cuda {
 namespace {
@@ -368,6 +369,15 @@ absl::Status CudaVolume::Draw(DrawView& view, DrawTo to, cudaStream_t stream) {
 double CudaVolume::ItemsToDraw() const {
   const uint64_t items = live_items_ + lines_.live() + points_.live() + triangles_.live();
   return static_cast<double>(items) * dirty_.ShareOf(tiles_.regions);
+}
+
+uint64_t CudaVolume::host_bytes() const {
+  uint64_t bytes = scene_.memory_bytes() + VectorBytes(slots_) + HashBytes(slot_of_) +
+                   HashBytes(pending_) + index_.host_bytes();
+  for (const std::vector<uint32_t>* slots : {&free_slots_, &dead_slots_, &marks_, &left_}) {
+    bytes += VectorBytes(*slots);
+  }
+  return bytes + lines_.host_bytes() + points_.host_bytes() + triangles_.host_bytes();
 }
 
 absl::Status CudaVolume::TakeIn() {

@@ -111,7 +111,7 @@ class CudaVolume final : private SceneObserver {
   VolumeView view() const { return tiles_.view(); }
   uint32_t singular_drawables() const { return singular_; }
   // In the host's memory.
-  uint64_t scene_bytes() const { return scene_.memory_bytes(); }
+  uint64_t host_bytes() const;
 
  private:
   // By which index a drawable's items are drawn.

@@ -19,6 +19,7 @@
 #include "gpu/cuda/draw_types.h"
 #include "gpu/cuda/item_lists.h"
 #include "gpu/cuda/list_budget.h"
+#include "gpu/derived_bytes.h"
 
 namespace voxeld::gpu::cuda {
 
@@ -73,6 +74,10 @@ class PairIndex {
 
   BatchList view() const;
   UnlistedItems unlisted() const { return unlisted_; }
+  // In the host's memory.
+  uint64_t host_bytes() const {
+    return VectorBytes(batches_) + HashBytes(whole_) + VectorBytes(deferred_);
+  }
 
  private:
   struct Batch {

@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "gpu/cuda/item_lists.h"
 #include "gpu/cuda/kernels.h"
+#include "gpu/derived_bytes.h"
 
 namespace voxeld::gpu::cuda {
 
@@ -37,6 +38,12 @@ uint64_t RegionIndex::live() const {
   uint64_t items = 0;
   for (const auto& [number, batch] : batches_) items += batch.live;
   return items;
+}
+
+uint64_t RegionIndex::host_bytes() const {
+  uint64_t bytes = HashBytes(batches_) + HashBytes(places_);
+  for (const auto& [number, batch] : batches_) bytes += VectorBytes(batch.members);
+  return bytes;
 }
 
 absl::flat_hash_set<uint32_t> RegionIndex::Layers() const {

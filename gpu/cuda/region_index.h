@@ -50,6 +50,8 @@ class RegionIndex {
   void Reset(const TileGrid& grid, std::span<const uint8_t> owned);
   // The slots of layers that have items here; no more than kMaxRegionLayers may.
   absl::flat_hash_set<uint32_t> Layers() const;
+  // In the host's memory.
+  uint64_t host_bytes() const;
   uint64_t live() const;  // items
   // Items that may come in one Add.
   uint64_t most_items() const { return most_items_; }

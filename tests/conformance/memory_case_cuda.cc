@@ -21,8 +21,8 @@ MemoryCase MeasuredEngine() {
                        return CreateCudaEngine(options, "a test", {},
                                                {.compile_formulas = cuda::CompileFormulas::kNever});
                      }},
-          .drawables = 100'000,
-          .dots = 1'000'000,
+          .drawables = 10'000,
+          .dots = 300'000,
           .kept_bytes = 80 << 20};
 }
 
