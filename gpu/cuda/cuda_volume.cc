@@ -16,6 +16,7 @@ namespace {
 
 // Beyond as many items as there are, what has gone is swept out of the index.
 constexpr uint64_t kSpareItems = 65536;
+constexpr size_t kSpareSlots = 1 << 16;  // of tables, which are never made smaller than that
 
 uint64_t IndexBytes(const Tuning& tuning, const cudaDeviceProp& device) {
   if (tuning.index_bytes != 0) return tuning.index_bytes;
@@ -101,26 +102,31 @@ absl::Status CudaVolume::SetView(DeviceTiles tiles, const Affine& view, bool all
   listed_ = all_dirty;
   dirty_ = all_dirty ? RoughBox::Everything() : RoughBox::Nothing();
   counted_ = true;
+  lines_suit_ = LineIndex::Suits(device_.api(), tiles_.grid);
+  points_suit_ = PointIndex::Suits(device_.api(), tiles_.grid);
+  pass_planes_ = INT32_MAX;
+  marks_.clear();
+  left_.clear();
+  kept_.clear();
+  EnterAllAgain();
+  return absl::OkStatus();
+}
+
+void CudaVolume::EnterAllAgain() {
   index_.Clear();
   lines_.Reset(tiles_.grid, tiles_.owned_here);
   points_.Reset(tiles_.grid, tiles_.owned_here);
   triangles_.Reset(tiles_.grid, tiles_.owned_here);
-  lines_suit_ = LineIndex::Suits(device_.api(), tiles_.grid);
-  points_suit_ = PointIndex::Suits(device_.api(), tiles_.grid);
-  pass_planes_ = INT32_MAX;
-  slots_.clear();
-  free_slots_.clear();
-  dead_slots_.clear();
-  slot_of_.clear();
-  pending_.clear();
+  slots_ = std::vector<Slot>();
+  free_slots_ = std::vector<uint32_t>();
+  dead_slots_ = std::vector<uint32_t>();
+  slot_of_ = {};
+  pending_ = {};
   crowds_.clear();
-  marks_.clear();
-  left_.clear();
-  kept_.clear();
+  table_ = Block();
   live_items_ = dead_items_ = 0;
   singular_ = 0;
   for (const auto& [id, drawable] : scene_.drawables()) pending_.insert(drawable.get());
-  return absl::OkStatus();
 }
 
 // ------------------------------------------------------------------------------------------- frames
@@ -285,6 +291,8 @@ absl::Status CudaVolume::MarkLeft() {
     dead_slots_.clear();
     dead_items_ = 0;
   }
+  // Tables do not shrink. When most of their places are free, the few drawables that are left get new ones.
+  if (slots_.size() > kSpareSlots && slot_of_.size() < slots_.size() / 8) EnterAllAgain();
   return absl::OkStatus();
 }
 

@@ -154,6 +154,8 @@ class CudaVolume final : private SceneObserver {
     if (by == IndexedBy::kPoints) return points_;
     return triangles_;
   }
+  // Forgets all places, in tables and indexes. All drawables are pending.
+  void EnterAllAgain();
   absl::Status KillPairs();
   absl::Status MarkLeft();
   absl::Status MarkPairs(std::span<const uint32_t> slots);

@@ -70,6 +70,15 @@ SceneModel Dots(SceneGenerator& chance, size_t count) {
 
 class MemoryCount : public ::testing::Test {
  protected:
+  // The first scenes that a GPU draws also take memory for its kernels.
+  void SetUp() override {
+    for (uint64_t seed = 1; seed <= 4; ++seed) {
+      SceneGenerator chance(seed);
+      const Target target = chance.RandomTarget();
+      Draw(target, chance.RandomScene(kSize));
+    }
+  }
+
   // Returns: an engine without a scene, instead of the one before.
   EngineDriver& NewEngine() {
     driver_.reset();
@@ -119,12 +128,6 @@ class MemoryCount : public ::testing::Test {
 
 void MemoryCount::DrawRandomScenes(uint64_t count) {
   const uint64_t seed = SeedOr(1);
-  {
-    // The first scene that a GPU draws also takes memory for its kernels.
-    SceneGenerator chance(seed);
-    const Target target = chance.RandomTarget();
-    Draw(target, chance.RandomScene(kSize));
-  }
   std::vector<double> ratios;
   for (uint64_t i = 0; i < count; ++i) {
     SceneGenerator chance(seed + i);
@@ -185,6 +188,30 @@ TEST_F(MemoryCount, WhatGoesIsGivenBack) {
     ASSERT_TRUE(driver_->Frame().ok());
   }
   EXPECT_LT(Allocated(), before + (3 << 20) + case_.kept_bytes);
+}
+
+TEST_F(MemoryCount, WhatGoesIsGivenBackWhileOthersStay) {
+  SceneGenerator chance(SeedOr(1));
+  const Target target = chance.RandomTarget();
+  NewEngine();
+  ASSERT_TRUE(driver_->SetTarget(target).ok());
+  ASSERT_TRUE(driver_->Frame().ok());
+  const SceneModel scene = Dots(chance, case_.dots);
+  const uint64_t before = Allocated();
+  {
+    DeltaBuffer delta;
+    delta.PutWhole(scene);
+    ASSERT_TRUE(driver_->Apply(delta).ok());
+    ASSERT_TRUE(driver_->Frame().ok());
+    DeltaBuffer drops;
+    // The last of each thousand stays.
+    for (const auto& [id, drawable] : scene.drawables) {
+      if (id % 1000 != 0) drops.Drop(Op::kDropDrawable, id);
+    }
+    ASSERT_TRUE(driver_->Apply(drops).ok());
+    ASSERT_TRUE(driver_->Frame().ok());
+  }
+  EXPECT_LT(Allocated(), before + (6 << 20) + case_.kept_bytes);
 }
 
 // Drawables that fill a volume of 160³, as many as would take several times what is allowed for lists and items. They erase, so that
