@@ -217,10 +217,13 @@ class Guides(unittest.TestCase):
         use = readme[readme.index("## Use\n"):]
         pasted = next(one.text for one in blocks(use) if "voxelctl play" in one.text)
         reader.serve("voxeld\n")
-        self.assertIn("export PATH", pasted)
+        self.assertIn("export PATH=$PWD/build/demo/bin:$PATH", readme[:readme.index("## Use\n")])
         # Fewer pictures; those of a gallery are tested elsewhere.
         short = re.sub(r"(?m)^voxelctl gallery .*\n", "", pasted).replace("turn.gif", "turn.gif --frames 4")
         said = reader.shell(short)
+        recorded = "voxelctl record --still build/preset.mcap"
+        self.assertIn(f"`{recorded}`", use)
+        said += reader.shell(f'voxelctl draw "sphere radius=0.5"\n{recorded}\n')
         for made in ("picture.png", "turn.gif", "scene.npz", "preset.mcap"):
             self.assertTrue((reader.folder / "build" / made).is_file(), said)
 
