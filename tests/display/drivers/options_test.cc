@@ -1,12 +1,14 @@
 #include "display/drivers/options.h"
 
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
 #include <cmath>
 #include <map>
 #include <string>
 
 #include "display/drivers/registry.h"
 #include "display/sync/fake_clock.h"
-#include "gtest/gtest.h"
 
 namespace voxeld::display {
 namespace {
