@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 #include "gpu/records.h"
 
@@ -23,7 +24,10 @@ uint64_t VectorBytes(const Vector& vector) {
 // Returns: the bytes of the slots of a hash map or set of Abseil's, each of which has a control byte.
 template <typename Map>
 uint64_t HashBytes(const Map& map) {
-  return HeapBytes(map.capacity() * (sizeof(typename Map::value_type) + 1));
+  using Slot = typename std::remove_cvref_t<Map>::value_type;
+  return HeapBytes(
+      map.capacity() *
+      (sizeof(Slot) + 1));  // NOLINT(bugprone-sizeof-expression): a set may hold pointers
 }
 
 // An upper bound for a drawable without vertices: its record, its places in indexes, and the smallest lists (assemble/scene.cc checks it).
