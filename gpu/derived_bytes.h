@@ -25,9 +25,8 @@ uint64_t VectorBytes(const Vector& vector) {
 template <typename Map>
 uint64_t HashBytes(const Map& map) {
   using Slot = typename std::remove_cvref_t<Map>::value_type;
-  return HeapBytes(
-      map.capacity() *
-      (sizeof(Slot) + 1));  // NOLINT(bugprone-sizeof-expression): a set may hold pointers
+  // NOLINTNEXTLINE(bugprone-sizeof-expression): a set may hold pointers
+  return HeapBytes(map.capacity() * (sizeof(Slot) + 1));
 }
 
 // An upper bound for a drawable without vertices: its record, its places in indexes, and the smallest lists (assemble/scene.cc checks it).
