@@ -9,8 +9,8 @@ usage: attacks.py [--repetitions N] [--limit BYTES] [--json] [ports | instances 
              the owner has left
   owners     instances of 1,000 parts from three owners at once, each until one is refused; resident memory as above
   entities   points as entities of their own until one is refused; the same
-  shapes     spheres that fill the display, until one is refused, but at most 20,000, since each is slow to draw; resident memory as above
-  curves     the same with curves across the display
+  shapes     12,000 spheres that fill the display, in one commit; resident memory as above
+  curves     12,000 curves across the display, in one commit; resident memory as above
 
 Paths are in VOXELD and PYTHONPATH (the client and tests/e2e). Times are of one machine: compare runs, not numbers."""
 import argparse
@@ -222,7 +222,7 @@ def until_refused(limit: int, most: int, at_once: int, put: "Callable[[voxel.Lay
                 for _ in range(at_once):
                     put(layer, f"e{count}")
                     count += 1
-                v.commit().wait_shown(PATIENCE)
+                v.commit().wait_shown(10 * PATIENCE)
         rows: dict[str, list[float]] = {"entities sent until one was refused, or all": [count]}
         rows.update(after(daemon, idle))
         return rows
@@ -234,12 +234,12 @@ def entities(_: int, limit: int) -> dict[str, list[float]]:
 
 
 def shapes(_: int, limit: int) -> dict[str, list[float]]:
-    return until_refused(limit, 20_000, 1000, lambda layer, name: layer.sphere(name, radius=1.5, fill="solid"))
+    return until_refused(limit, 12_000, 12_000, lambda layer, name: layer.sphere(name, radius=1.5, fill="solid"))
 
 
 def curves(_: int, limit: int) -> dict[str, list[float]]:
     points = np.array([[-1, -1, -1], [1, -1, 1], [-1, 1, 1], [1, 1, -1]], np.float32)
-    return until_refused(limit, 20_000, 1000, lambda layer, name: layer.curve(name, points, form="bezier"))
+    return until_refused(limit, 12_000, 12_000, lambda layer, name: layer.curve(name, points, form="bezier"))
 
 
 def main() -> int:
