@@ -182,8 +182,7 @@ void Welcome(Core& core, const http::Server* http, const viewer::Viewer& viewer,
       std::printf("see:    %s\n", page.c_str());
     }
   } else {
-    std::printf("see:    voxelctl %ssnapshot picture.png (there is no http port)\n",
-                server.c_str());
+    std::printf("see:    voxelctl %ssnapshot picture.png (no http port)\n", server.c_str());
   }
   std::printf("try:    voxelctl %sdemo\n", server.c_str());
   std::promise<absl::StatusOr<Stats>> promise;

@@ -16,12 +16,13 @@ constexpr uint64_t HeapBytes(uint64_t bytes) {
   return block < 32 ? 32 : block;
 }
 
+// Returns: the bytes of the vector's block, unused capacity included.
 template <typename Vector>
 uint64_t VectorBytes(const Vector& vector) {
   return HeapBytes(vector.capacity() * sizeof(vector[0]));
 }
 
-// Returns: the bytes of the slots of a hash map or set of Abseil's, each of which has a control byte.
+// Returns: the bytes of the slots of an Abseil hash map or set, with a control byte for each.
 template <typename Map>
 uint64_t HashBytes(const Map& map) {
   using Slot = typename std::remove_cvref_t<Map>::value_type;

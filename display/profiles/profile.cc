@@ -120,7 +120,7 @@ absl::StatusOr<std::string> FindProfile(const std::string& name,
   std::error_code error;
   if (std::filesystem::exists(name, error)) {
     return absl::NotFoundError(
-        absl::StrCat("there is no profile \"", name, "\"; to read the file, write ./", name));
+        absl::StrCat("no profile is named \"", name, "\"; to read the file, write ./", name));
   }
   return absl::NotFoundError(
       absl::StrCat("there is no profile \"", name, "\" in ", absl::StrJoin(places, ", "),

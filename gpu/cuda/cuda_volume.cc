@@ -16,7 +16,7 @@ namespace {
 
 // Beyond as many items as there are, what has gone is swept out of the index.
 constexpr uint64_t kSpareItems = 65536;
-constexpr size_t kSpareSlots = 1 << 16;  // of tables, which are never made smaller than that
+constexpr size_t kSpareSlots = 1 << 16;  // tables with fewer places are never made smaller
 
 uint64_t IndexBytes(const Tuning& tuning, const cudaDeviceProp& device) {
   if (tuning.index_bytes != 0) return tuning.index_bytes;

@@ -91,7 +91,7 @@ TEST_F(Profiles, ProgramOfASourceTreeFindsThoseOfTheTree) {
 TEST_F(Profiles, FileWithoutItsFolderIsNamed) {
   std::ofstream("here.txt") << "driver = \"simulated\"\n";
   EXPECT_EQ(FindProfile("here.txt", {folder_.string()}).status().message(),
-            "there is no profile \"here.txt\"; to read the file, write ./here.txt");
+            "no profile is named \"here.txt\"; to read the file, write ./here.txt");
   std::filesystem::remove("here.txt");
 }
 

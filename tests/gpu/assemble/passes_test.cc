@@ -122,6 +122,15 @@ class PassesTest : public testing::Test {
     delta.Put(d);
     Apply(delta);
   }
+  // Removes the drawables 1 to `count`.
+  void RemoveFirst(uint64_t count) {
+    DeltaBuffer drop;
+    for (uint64_t id = 1; id <= count; ++id) {
+      scene_.drawables.erase(id);
+      drop.Drop(Op::kDropDrawable, id);
+    }
+    Apply(drop);
+  }
   void Put(const LayerRecord& layer) {
     scene_.layers[layer.id] = layer;
     DeltaBuffer delta;
@@ -237,12 +246,7 @@ TEST_F(PassesTest, WhatWasCountedIsKeptWhenOthersHaveGone) {
   ASSERT_GT(counted, 0u);
   ASSERT_LT(counted, 4u);
   // The first ones fitted.
-  DeltaBuffer drop;
-  for (uint64_t id = 1; id <= counted; ++id) {
-    scene_.drawables.erase(id);
-    drop.Drop(Op::kDropDrawable, id);
-  }
-  Apply(drop);
+  RemoveFirst(counted);
   ExpectDrawn(0);
   EXPECT_LE(volume_->index_bytes(), uint64_t{1} << 19);
   // They are where they were.
@@ -354,12 +358,7 @@ TEST_F(PassesTest, UnlistedDrawablesAreListedAfterOthersAreRemoved) {
   const size_t unlisted = volume_->unlisted_drawables();
   ASSERT_GT(unlisted, 0u);
   ASSERT_LT(unlisted, 3u);
-  DeltaBuffer drop;
-  for (uint64_t id = 1; id <= unlisted; ++id) {
-    scene_.drawables.erase(id);
-    drop.Drop(Op::kDropDrawable, id);
-  }
-  Apply(drop);
+  RemoveFirst(unlisted);
   ExpectDrawn(0);
   EXPECT_EQ(volume_->unlisted_drawables(), 0u);
   // They are where they were.
