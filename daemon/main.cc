@@ -393,7 +393,8 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   });
   auto ticker = std::make_unique<access::Ticker>(clock, access::Security::kLookInterval, [&] {
     security->Look();
-    process.Look(core.budget()->used_bytes());
+    const uint64_t peak = core.budget()->TakePeakBytes();
+    if (process.Look(core.budget()->used_bytes(), peak)) core.bulk().GiveBackUnused();
   });
   watch.Tell([server = server->get()](bool serving) { server->SetServing(serving); });
   *phase = http::Phase::kServing;

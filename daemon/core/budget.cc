@@ -8,11 +8,12 @@ bool Budget::Charge(Use use, uint64_t bytes) {
     if (bytes > limit_ || total > limit_ - bytes) return false;
   } while (!total_.compare_exchange_weak(total, total + bytes, std::memory_order_relaxed));
   Of(use).fetch_add(bytes, std::memory_order_relaxed);
+  RaisePeak(total + bytes);
   return true;
 }
 
 void Budget::ChargeAnyway(Use use, uint64_t bytes) {
-  total_.fetch_add(bytes, std::memory_order_relaxed);
+  RaisePeak(total_.fetch_add(bytes, std::memory_order_relaxed) + bytes);
   Of(use).fetch_add(bytes, std::memory_order_relaxed);
 }
 
@@ -28,7 +29,14 @@ void Budget::Move(Use from, Use to, uint64_t bytes) {
 
 void Budget::Set(Use use, uint64_t bytes) {
   const uint64_t before = Of(use).exchange(bytes, std::memory_order_relaxed);
-  total_.fetch_add(bytes - before, std::memory_order_relaxed);  // modulo 2⁶⁴, so less too
+  // Modulo 2⁶⁴, so less too.
+  RaisePeak(total_.fetch_add(bytes - before, std::memory_order_relaxed) + bytes - before);
+}
+
+void Budget::RaisePeak(uint64_t total) {
+  uint64_t peak = peak_.load(std::memory_order_relaxed);
+  while (peak < total && !peak_.compare_exchange_weak(peak, total, std::memory_order_relaxed)) {
+  }
 }
 
 }  // namespace voxeld::daemon

@@ -31,6 +31,8 @@ class Budget {
   uint64_t limit_bytes() const { return limit_; }
   uint64_t used_bytes() const { return total_.load(std::memory_order_relaxed); }
   uint64_t used_bytes(Use use) const { return Of(use).load(std::memory_order_relaxed); }
+  // The greatest used_bytes() since the last call, however short it lasted. For one thread.
+  uint64_t TakePeakBytes() { return peak_.exchange(used_bytes(), std::memory_order_relaxed); }
 
   // False, and nothing is charged, if it would go past the limit.
   bool Charge(Use use, uint64_t bytes);
@@ -52,8 +54,10 @@ class Budget {
   std::atomic<uint64_t>& Of(Use use) { return uses_[static_cast<size_t>(use)]; }
   const std::atomic<uint64_t>& Of(Use use) const { return uses_[static_cast<size_t>(use)]; }
 
+  void RaisePeak(uint64_t total);
+
   const uint64_t limit_;
-  std::atomic<uint64_t> total_ = 0, derived_ = 0;
+  std::atomic<uint64_t> total_ = 0, peak_ = 0, derived_ = 0;
   std::array<std::atomic<uint64_t>, kUses> uses_ = {};
 };
 

@@ -21,10 +21,10 @@ class ProcessWatch {
   static constexpr sync::TimeNs kGiveBack = 60 * sync::kSecond, kCount = sync::kSecond;
   static constexpr int64_t kRest = 1000;
   // If this much was freed since memory was last returned, as when a large scene goes, it is returned at once, and again after
-  // kGiveBackAgain, when the rest of the scene may have followed. This may take a hundredth of the time.
-  static constexpr uint64_t kMuch = uint64_t{32} << 20;
+  // kGiveBackAgain, when the rest of the scene may have followed. This may take a twentieth of the time.
+  static constexpr uint64_t kMuch = uint64_t{8} << 20;
   static constexpr sync::TimeNs kGiveBackAgain = 3 * sync::kSecond;
-  static constexpr int64_t kRestOfMuch = 100;
+  static constexpr int64_t kRestOfMuch = 20;
 
   struct Allocator {
     void (*give_back)() = &GiveBackFreeMemory;
@@ -41,8 +41,10 @@ class ProcessWatch {
         give_back_at_(clock.Now() + kGiveBack),
         count_at_(clock.Now() + kCount) {}
 
-  // Call every second or so, from one thread. `held_bytes`: what clients' scenes take, as the budget has it.
-  void Look(uint64_t held_bytes = 0);
+  // Call every second or so, from one thread. `held_bytes`: the memory of clients' scenes according to the budget, and
+  // `peak_bytes` its peak since the last call. Returns true if free memory was returned to the system; the caller then
+  // returns the unused memory of its own pools.
+  bool Look(uint64_t held_bytes = 0, uint64_t peak_bytes = 0);
   void LookAtTime() { time_.Look(); }  // as TimeWatch says
   ProcessFigures figures() const;
 

@@ -25,8 +25,15 @@ uint64_t DerivedBytes(const Drawable& d) {
 constexpr size_t kSmallDrawable = 2048;  // vertices: prepared by one thread
 constexpr size_t kCachedTiles = 1024;    // drawn in one frame: so many colours may stay in caches
 constexpr size_t kFreeBlocks = 256;      // kept, beside as many as are spare
-constexpr size_t kKeptEntries = 4096;    // of a list whose entries have gone
+constexpr size_t kKeptEntries = 4096;    // of a list of drawables whose entries have gone
+constexpr size_t kKeptInTile = 64;       // the same, of the list of a tile
 constexpr size_t kMovedRun = 16;  // tiles that a worker draws one behind the other where more are
+
+// Of a list that was long once and is short now.
+template <typename T>
+void GiveBack(std::vector<T>& list, size_t kept) {
+  if (list.capacity() > kept && list.size() < list.capacity() / 8) list.shrink_to_fit();
+}
 
 bool Contains(const Box3& box, const int32_t at[3]) {
   for (int a = 0; a < 3; ++a) {
@@ -210,11 +217,9 @@ void Volume::TakeOutLeaving() {
   for (uint32_t tile : leaving_) {
     std::vector<Entry>& entries = index_[tile].entries;
     std::erase_if(entries, [](const Entry& e) { return e.drawable->leaving; });
-    if (entries.capacity() > kKeptEntries && entries.size() < entries.capacity() / 8) {
-      entries_bytes_ -= VectorBytes(entries);
-      entries.shrink_to_fit();
-      entries_bytes_ += VectorBytes(entries);
-    }
+    entries_bytes_ -= VectorBytes(entries);
+    GiveBack(entries, kKeptInTile);
+    entries_bytes_ += VectorBytes(entries);
     index_[tile].leaving = false;
   }
   leaving_.clear();
@@ -225,7 +230,7 @@ void Volume::TakeOutLeaving() {
     budget_.ReleaseLists(*drawable);
   }
   left_.clear();
-  if (left_.capacity() > kKeptEntries) left_.shrink_to_fit();
+  GiveBack(left_, kKeptEntries);
 }
 
 absl::Status Volume::Apply(std::span<const std::byte> delta, BulkSource* bulk) {
@@ -353,7 +358,7 @@ void Volume::PreparePending() {
     if (d->layer->drawn) ForEachTile(*d, [this](uint32_t tile) { MarkDirty(tile); });
   }
   pending_.clear();
-  if (pending_.capacity() > kKeptEntries) pending_.shrink_to_fit();
+  GiveBack(pending_, kKeptEntries);
 }
 
 void Volume::List(Drawable& d) {
@@ -621,6 +626,10 @@ Volume::Changes Volume::Update(TileObserver* observer) {
     if (!drawn[i].differs) continue;
     changes.tiles.push_back(tile);
     changes.was_lit.push_back(drawn[i].lit_before != 0);
+  }
+  for (Scratch& scratch : scratch_) {
+    GiveBack(scratch.entries, kKeptEntries);
+    GiveBack(scratch.unlisted, kKeptEntries);
   }
   tiles_.Recycle(dirty_, static_cast<size_t>(lit_tiles_ / 2));
   dirty_.clear();

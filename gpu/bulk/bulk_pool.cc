@@ -166,6 +166,12 @@ absl::StatusOr<BulkPool::Fresh> BulkPool::Allocate(size_t size) {
   return Fresh{BulkBlock(std::move(extent)), bytes};
 }
 
+void BulkPool::GiveBackUnused() {
+  Released released;
+  sync::MutexLock lock(state_->mutex);
+  state_->Trim(0, &released);
+}
+
 uint64_t BulkPool::limit_bytes() const { return state_->options.limit_bytes; }
 
 uint64_t BulkPool::used_bytes() const {

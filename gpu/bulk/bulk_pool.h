@@ -21,7 +21,7 @@ namespace voxeld::gpu {
 struct BulkPoolOptions {
   uint64_t limit_bytes = uint64_t{1} << 30;  // of all segments together, used or not
   size_t segment_bytes = size_t{32} << 20;   // a block that is greater has a segment to itself
-  // Of segments in which nothing is used: kept for the next block rather than given back.
+  // Of segments in which nothing is used: kept for the next block until GiveBackUnused.
   uint64_t keep_bytes = uint64_t{64} << 20;
   // Can be handed to another process, which then cannot write to it.
   bool shared = true;
@@ -43,6 +43,9 @@ class BulkPool {
   // `size` bytes (at least 1), 64-byte aligned. ResourceExhausted past the limit or if the system
   // has none left, with the figures. The smallest free place that is large enough is taken.
   absl::StatusOr<Fresh> Allocate(size_t size);
+
+  // Returns all segments in which nothing is used to the system. For when clients have left.
+  void GiveBackUnused();
 
   uint64_t limit_bytes() const;
   uint64_t used_bytes() const;  // of all blocks, each a multiple of 64

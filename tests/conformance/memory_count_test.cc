@@ -68,6 +68,45 @@ SceneModel Dots(SceneGenerator& chance, size_t count) {
   return scene;
 }
 
+// 160³ voxels, 1,000 tiles.
+Target LargeTarget() {
+  constexpr int kEdge = 160;
+  Target target;
+  display::PlanarStack stack;
+  stack.width_px = stack.height_px = kEdge;
+  for (int slice = 0; slice < kEdge; ++slice) stack.positions_mm.push_back(slice + 0.5);
+  target.geometry.shape = stack;
+  target.geometry.grid = {kEdge, kEdge, kEdge, {1, 1, 1}, {}};
+  target.layout.slices = target.layout.width = target.layout.height = kEdge;
+  return target;
+}
+
+ModelGeometry SphereThatFills() {
+  ModelGeometry sphere;
+  sphere.record.kind = PrimitiveKind::kSphere;
+  sphere.record.fill = Fill::kSolid;
+  for (float& p : sphere.record.params) p = 400;
+  return sphere;
+}
+
+// The CPU keeps 256 blocks for tiles that will be lit.
+constexpr uint64_t kSpareTiles = 256 * 18 * 1024;
+
+// Drawables of one shape that erase, so that nothing is lit, which would take memory too.
+SceneModel Erasers(const ModelGeometry& shape, uint64_t count) {
+  SceneModel scene;
+  scene.layers[1].id = 1;
+  scene.geometries[1] = shape;
+  scene.geometries[1].record.id = 1;
+  for (uint64_t id = 1; id <= count; ++id) {
+    DrawableRecord& drawable = scene.drawables[id];
+    drawable.id = id;
+    drawable.geometry = drawable.layer = 1;
+    drawable.erase = 1;
+  }
+  return scene;
+}
+
 class MemoryCount : public ::testing::Test {
  protected:
   // The first scenes that a GPU draws also take memory for its kernels.
@@ -119,7 +158,9 @@ class MemoryCount : public ::testing::Test {
   }
 
   void DrawRandomScenes(uint64_t count);
-  void DrawAndRemove(uint64_t stays, uint64_t most);
+  void DrawAndRemove(const Target& target, const SceneModel& scene, uint64_t least, uint64_t stays,
+                     uint64_t most);
+  void DrawAndRemoveDots(uint64_t stays, uint64_t most);
   void DrawLargeShapes(const ModelGeometry& shape, uint64_t count, uint64_t bytes_without_bound);
 
   const MemoryCase case_ = MeasuredEngine();
@@ -167,22 +208,20 @@ TEST_F(MemoryCount, InstancesTakeNoMoreThanWhatIsExpectedOfThem) {
             << "\n";
 }
 
-// Draws many drawables and removes them, except each `stays`-th (0: none stays, nor do their geometry and layer). `most` bytes may be
-// left, beside what the engine keeps.
-void MemoryCount::DrawAndRemove(uint64_t stays, uint64_t most) {
-  SceneGenerator chance(SeedOr(1));
-  const Target target = chance.RandomTarget();
+// Draws a scene, which takes `least` bytes, and removes its drawables, except each `stays`-th (0: none stays, nor do their geometry
+// and layer). `most` bytes may be left, beside what the engine keeps.
+void MemoryCount::DrawAndRemove(const Target& target, const SceneModel& scene, uint64_t least,
+                                uint64_t stays, uint64_t most) {
   NewEngine();
   ASSERT_TRUE(driver_->SetTarget(target).ok());
   ASSERT_TRUE(driver_->Frame().ok());
-  const SceneModel scene = Dots(chance, case_.dots);
   const uint64_t before = Allocated();
   {
     DeltaBuffer delta;
     delta.PutWhole(scene);
     ASSERT_TRUE(driver_->Apply(delta).ok());
     ASSERT_TRUE(driver_->Frame().ok());
-    ASSERT_GT(Allocated(), before + (60 << 20));
+    ASSERT_GT(Allocated(), before + least);
     DeltaBuffer drops;
     for (const auto& [id, drawable] : scene.drawables) {
       if (stays == 0 || id % stays != 0) drops.Drop(Op::kDropDrawable, id);
@@ -197,37 +236,27 @@ void MemoryCount::DrawAndRemove(uint64_t stays, uint64_t most) {
   EXPECT_LT(Allocated(), before + most + case_.kept_bytes);
 }
 
-TEST_F(MemoryCount, WhatGoesIsGivenBack) { DrawAndRemove(0, 3 << 20); }
+void MemoryCount::DrawAndRemoveDots(uint64_t stays, uint64_t most) {
+  SceneGenerator chance(SeedOr(1));
+  const Target target = chance.RandomTarget();
+  DrawAndRemove(target, Dots(chance, case_.dots), 60 << 20, stays, most);
+}
 
-TEST_F(MemoryCount, MemoryIsGivenBackWhileOthersStay) { DrawAndRemove(1000, 6 << 20); }
+TEST_F(MemoryCount, WhatGoesIsGivenBack) { DrawAndRemoveDots(0, 3 << 20); }
 
-// Drawables that fill a volume of 160³, as many as would take several times what is allowed for lists and items. They erase, so that
-// nothing is lit, which would take memory too.
+TEST_F(MemoryCount, MemoryIsGivenBackWhileOthersStay) { DrawAndRemoveDots(1000, 6 << 20); }
+
+TEST_F(MemoryCount, ListsOfTilesAreGivenBack) {
+  DrawAndRemove(LargeTarget(), Erasers(SphereThatFills(), 600), 9 << 20, 0,
+                kSpareTiles + (1 << 20));
+}
+
+// Drawables that fill the volume, as many as would take several times what is allowed for lists and items.
 void MemoryCount::DrawLargeShapes(const ModelGeometry& shape, uint64_t count,
                                   uint64_t bytes_without_bound) {
   constexpr uint64_t kBytes = 1 << 20;
-  constexpr int kEdge = 160;
-  SceneGenerator chance(SeedOr(1));
-  Target target;
-  display::PlanarStack stack;
-  stack.width_px = stack.height_px = kEdge;
-  for (int slice = 0; slice < kEdge; ++slice) stack.positions_mm.push_back(slice + 0.5);
-  target.geometry.shape = stack;
-  target.geometry.grid = {kEdge, kEdge, kEdge, {1, 1, 1}, {}};
-  target.layout.slices = target.layout.width = target.layout.height = kEdge;
-  SceneModel scene = Dots(chance, 0);
-  scene.geometries[1] = shape;
-  scene.geometries[1].record.id = 1;
-  for (uint64_t id = 1; id <= count; ++id) {
-    DrawableRecord& drawable = scene.drawables[id];
-    drawable.id = id;
-    drawable.geometry = drawable.layer = 1;
-    drawable.erase = 1;
-  }
   index_bytes_ = kBytes;
-  const Growth growth = Draw(target, scene);
-  // The CPU keeps 256 blocks for tiles that will be lit.
-  constexpr uint64_t kSpareTiles = 256 * 18 * 1024;
+  const Growth growth = Draw(LargeTarget(), Erasers(shape, count));
   const uint64_t bound =
       count * MostDerivedBytes(shape.record) + kBytes / 4 * 5 + kSpareTiles + (1 << 20);
   ASSERT_GT(bytes_without_bound, 2 * bound);
@@ -235,13 +264,9 @@ void MemoryCount::DrawLargeShapes(const ModelGeometry& shape, uint64_t count,
 }
 
 TEST_F(MemoryCount, ListsOfLargeShapesStayWithinTheirBound) {
-  ModelGeometry sphere;
-  sphere.record.kind = PrimitiveKind::kSphere;
-  sphere.record.fill = Fill::kSolid;
-  for (float& p : sphere.record.params) p = 400;
   constexpr uint64_t kCount = 600;
   constexpr uint64_t kTiles = 10 * 10 * 10;
-  DrawLargeShapes(sphere, kCount, kCount * kTiles * 32);
+  DrawLargeShapes(SphereThatFills(), kCount, kCount * kTiles * 32);
 }
 
 TEST_F(MemoryCount, InteriorsOfFilledMeshesStayWithinTheirBound) {

@@ -39,6 +39,21 @@ TEST(Budget, MovesAndSetsKeepTheSum) {
   EXPECT_FALSE(budget.Charge(Use::kStaged, 1));
 }
 
+TEST(Budget, TellsItsPeakSinceItWasAskedLast) {
+  Budget budget(100);
+  ASSERT_TRUE(budget.Charge(Use::kStaged, 60));
+  EXPECT_FALSE(budget.Charge(Use::kStaged, 50));
+  budget.Release(Use::kStaged, 60);
+  EXPECT_EQ(budget.TakePeakBytes(), 60u) << "what was refused does not count";
+  EXPECT_EQ(budget.TakePeakBytes(), 0u);
+  budget.Set(Use::kEngines, 40);
+  budget.Set(Use::kEngines, 30);
+  budget.ChargeAnyway(Use::kOwed, 90);
+  budget.Release(Use::kOwed, 85);
+  EXPECT_EQ(budget.TakePeakBytes(), 120u);
+  EXPECT_EQ(budget.TakePeakBytes(), 35u) << "what is held";
+}
+
 TEST(Budget, ThreadsTogetherNeverPassTheLimit) {
   Budget budget(1000);
   std::vector<std::thread> threads;

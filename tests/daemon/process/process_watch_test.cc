@@ -41,14 +41,15 @@ class ScriptedAllocator : public ::testing::Test {
     bytes_.reset();
   }
 
-  void Look(uint64_t bytes) {
+  void Look(uint64_t bytes, uint64_t held = 0, uint64_t peak = 0) {
     bytes_ = bytes;
-    Watch(1);
+    Watch(1, held, peak);
   }
-  void Watch(int seconds) {
+  void Watch(int seconds, uint64_t held = 0, uint64_t peak = 0) {
     for (int i = 0; i < seconds; ++i) {
       clock_.Advance(sync::kSecond);
-      watch_.Look();
+      const int before = given_back_;
+      EXPECT_EQ(watch_.Look(held, peak), given_back_ != before);
     }
   }
 
@@ -99,15 +100,15 @@ TEST_F(ScriptedAllocator, HasAThousandthOfTheTime) {
 
 TEST_F(ScriptedAllocator, MuchThatWasFreedIsGivenBackAtOnce) {
   Look(100 << 20);
-  Look(80 << 20);
+  Look(95 << 20);
   EXPECT_EQ(given_back_, 0) << "too little";
-  Look(68 << 20);
-  EXPECT_EQ(given_back_, 1) << "32 MiB since the most";
-  Look(68 << 20);
+  Look(92 << 20);
+  EXPECT_EQ(given_back_, 1) << "8 MiB since the most";
+  Look(92 << 20);
   EXPECT_EQ(given_back_, 1) << "again without a reason";
-  for (int i = 0; i < 3; ++i) Look(68 << 20);
+  for (int i = 0; i < 3; ++i) Look(92 << 20);
   EXPECT_EQ(given_back_, 2) << "the rest may have followed";
-  for (int i = 0; i < 50; ++i) Look(68 << 20);
+  for (int i = 0; i < 50; ++i) Look(92 << 20);
   EXPECT_EQ(given_back_, 2);
   Look(200 << 20);
   Look(10 << 20);
@@ -115,19 +116,22 @@ TEST_F(ScriptedAllocator, MuchThatWasFreedIsGivenBackAtOnce) {
 }
 
 TEST_F(ScriptedAllocator, WhatTheBudgetSaysIsEnough) {
-  bytes_ = 0;
-  for (const uint64_t held : {uint64_t{100} << 20, uint64_t{69} << 20}) {
-    clock_.Advance(sync::kSecond);
-    watch_.Look(held);
-  }
+  Look(0, 100 << 20);
+  Look(0, 93 << 20);
   EXPECT_EQ(given_back_, 0);
-  clock_.Advance(sync::kSecond);
-  watch_.Look(uint64_t{68} << 20);
+  Look(0, 92 << 20);
   EXPECT_EQ(given_back_, 1);
 }
 
-TEST_F(ScriptedAllocator, HasAHundredthOfTheTimeForThat) {
-  gives_back_for_ = 50 * sync::kMillisecond;
+TEST_F(ScriptedAllocator, ASceneThatCameAndWentBetweenTwoLooksIsNoticed) {
+  Look(0, 0, 7 << 20);
+  EXPECT_EQ(given_back_, 0);
+  Look(0, 0, 8 << 20);
+  EXPECT_EQ(given_back_, 1);
+}
+
+TEST_F(ScriptedAllocator, HasATwentiethOfTheTimeForThat) {
+  gives_back_for_ = 250 * sync::kMillisecond;
   for (int i = 0; i < 60; ++i) Look(i % 2 == 0 ? 100 << 20 : 0);
   EXPECT_LE(given_back_, 13) << "each five seconds";
   EXPECT_GE(given_back_, 5);

@@ -106,6 +106,17 @@ TEST(BulkPool, UnusedSegmentsAreKeptAsFarAsAskedForButNeverInTheWay) {
   EXPECT_TRUE(pool->Allocate(3 * kSegment).ok());
 }
 
+TEST(BulkPool, GivesBackKeptSegmentsThatAreNotUsed) {
+  const auto pool = Small(3 * kSegment, 3 * kSegment);
+  const BulkBlock used = Filled(*pool, 10, 4);
+  { const BulkBlock left = Filled(*pool, kSegment, 5); }
+  EXPECT_EQ(pool->held_bytes(), 2 * kSegment);
+  pool->GiveBackUnused();
+  EXPECT_EQ(pool->held_bytes(), kSegment);
+  EXPECT_TRUE(Holds(used, 10, 4));
+  EXPECT_TRUE(pool->Allocate(2 * kSegment).ok());
+}
+
 TEST(BulkPool, BlocksOutliveIt) {
   auto pool = Small();
   BulkBlock block = Filled(*pool, 500, 9);
