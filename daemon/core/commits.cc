@@ -292,7 +292,11 @@ void Core::Impl::ApplySlice(Session& session, UnderWay& under_way) {
   }
   UnderWay done = std::move(under_way);
   under_way_.erase(session.owner);
-  Conclude(session, std::move(done.commit), done.stages, store_.Finish(std::move(done.pending)));
+  CommitResult result = store_.Finish(std::move(done.pending));
+  if (result.spent.size() >= kSliceOperations) {
+    Retire(std::make_shared<std::vector<Operation>>(std::move(result.spent)));
+  }
+  Conclude(session, std::move(done.commit), done.stages, std::move(result));
   for (const SessionId id : done.waiting) PostTurn(id);
 }
 
@@ -362,7 +366,7 @@ void Core::Impl::Conclude(Session& session, WaitingCommit commit, Stages stages,
 
 void Core::Impl::Ride(Session& session, const WaitingCommit& commit, const Stages& stages,
                       bool hidden) {
-  published_ = store_.snapshot();
+  Retire(std::exchange(published_, store_.snapshot()));
   OfferState(undurable_.contains(published_->number));
   budget_->Set(Budget::Use::kScene, published_->total.bytes);
   if (commit.commit.must_show && !displays_.empty() && !session.closing) {

@@ -33,6 +33,7 @@ class Core::Impl {
   // ---- any thread
   const CoreOptions& options() const { return options_; }
   Loop& loop() { return *loop_; }
+  void Retire(std::shared_ptr<const void> what);
   SceneWatch& scene_watch() { return scene_watch_; }
   const std::shared_ptr<Budget>& budget() const { return budget_; }
   CaptureId NewCapture() { return next_capture_++; }  // watches count along
@@ -278,6 +279,9 @@ class Core::Impl {
   sync::Clock& clock_;
   const sync::TimeNs started_ns_;
   const std::shared_ptr<Loop> loop_;
+  // What is done with is freed by the thread of this loop, as freeing a large scene takes longer than any other thread may be
+  // busy. Without threads it is loop_.
+  const std::shared_ptr<Loop> retired_;
   SceneStore store_;
   SnapshotPtr published_;
 

@@ -40,8 +40,8 @@ absl::StatusOr<std::shared_ptr<Genlock>> Core::Impl::JoinGenlock(const display::
   if (absl::Status status = CheckGenlock(name, display, info); !status.ok()) return status;
   std::shared_ptr<Genlock>& genlock = genlocks_[name];
   if (genlock == nullptr) {
-    genlock = std::make_shared<Genlock>(clock_, [loop = loop_](std::shared_ptr<const void> what) {
-      loop->Post([what = std::move(what)] {});
+    genlock = std::make_shared<Genlock>(clock_, [retired = retired_](std::shared_ptr<const void> what) {
+      retired->Post([what = std::move(what)] {});
     });
   }
   return genlock;
@@ -78,8 +78,8 @@ absl::Status Core::Impl::AddDisplay(std::unique_ptr<display::Display> display,
   options.tell = [this, loop = loop_](const Rider& rider, const CommitOutcome& outcome) {
     loop->Post([this, rider, outcome] { DeliverOutcome(rider, outcome); });
   };
-  options.retire = [loop = loop_](std::shared_ptr<const void> what) {
-    loop->Post([what = std::move(what)] {});
+  options.retire = [retired = retired_](std::shared_ptr<const void> what) {
+    retired->Post([what = std::move(what)] {});
   };
   if (options_.engine_event) {
     options.tell_engine = [loop = loop_, tell = options_.engine_event,

@@ -329,7 +329,7 @@ sync::TimeNs Core::Impl::RunDue() {
 
 void Core::Impl::Publish() {
   if (published_ == store_.snapshot()) return;
-  published_ = store_.snapshot();
+  Retire(std::exchange(published_, store_.snapshot()));
   OfferState(false);
   scene_watch_.Publish(published_);
   budget_->Set(Budget::Use::kScene, published_->total.bytes);

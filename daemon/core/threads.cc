@@ -13,6 +13,7 @@ Core::Impl::Impl(CoreOptions options, sync::Clock& clock)
       clock_(clock),
       started_ns_(clock.Now()),
       loop_(std::make_shared<Loop>(clock)),
+      retired_(options_.threads ? std::make_shared<Loop>(clock) : loop_),
       store_(options_.limits),
       published_(store_.snapshot()),
       budget_(std::make_shared<Budget>(options_.limits.max_memory_bytes)),
@@ -48,6 +49,10 @@ std::set<std::string> Core::Impl::AwaitEnd(const std::set<std::string>& names,
 sync::TimeNs Core::Impl::CoreTurn() {
   loop_->RunPosted();
   return RunDue();
+}
+
+void Core::Impl::Retire(std::shared_ptr<const void> what) {
+  retired_->Post([what = std::move(what)] {});
 }
 
 void Core::Impl::RunCore() {
@@ -121,6 +126,13 @@ absl::Status Core::Impl::Start(std::shared_ptr<Impl> self) {
   UpdateViews();
   phase_ = Phase::kRunning;
   if (options_.threads) {
+    Launch("retired", [retired = retired_] {
+      while (!retired->closed()) {
+        retired->RunPosted();
+        retired->Wait(sync::kNever);
+      }
+      retired->RunPosted();
+    });
     Launch("core", [self = std::move(self)] { self->RunCore(); });
     for (const auto& slot : displays_) {
       Launch(absl::StrCat("display \"", slot->info.name, "\""),
@@ -153,13 +165,14 @@ absl::Status Core::Impl::Stop(sync::TimeNs limit) {
   const sync::TimeNs now = clock_.Now();
   std::set<std::string> displays;
   for (const NamedThread& t : threads_) {
-    if (t.name != "core") displays.insert(t.name);
+    if (t.name != "core" && t.name != "retired") displays.insert(t.name);
   }
   if (!AwaitEnd(displays, now + limit / 4).empty()) *abandoned_ = true;
   std::set<std::string> left = AwaitEnd(displays, now + limit / 4 * 3);
   store_.Abandon();
   loop_->Close();
-  left.merge(AwaitEnd({"core"}, now + limit));
+  retired_->Close();
+  left.merge(AwaitEnd({"core", "retired"}, now + limit));
   for (NamedThread& t : threads_) {
     if (left.contains(t.name)) {
       t.thread.detach();

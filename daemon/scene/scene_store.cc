@@ -132,6 +132,7 @@ CommitResult SceneStore::Finish(std::unique_ptr<PendingCommit> pending) {
   applier.End();
 
   CommitResult result;
+  result.spent = std::move(pending->operations_);
   result.issues = applier.refusals().issues;
   result.first_refusal = applier.refusals().first;
   result.more_issues = applier.refusals().more + applier.refusals().more_applied;

@@ -29,6 +29,8 @@ struct CommitResult {
   std::optional<Issue> first_refusal;  // though it may not be among them
   uint64_t more_issues = 0;            // that there would have been beyond them
   bool hidden = false;                 // see CommitApplier::hidden
+  // The operations, of which the scene has taken what it keeps. Freeing many takes long.
+  std::vector<Operation> spent;
 };
 
 class SceneStore {

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <functional>
 #include <map>
 #include <set>
 #include <thread>
@@ -45,9 +47,20 @@ class WaitingSink final : public SessionSink {
   }
   // Until there are so many receipts. False if that takes too long.
   bool Await(size_t count) {
+    return AwaitThat([count](const std::vector<Receipt>& all) { return all.size() >= count; });
+  }
+  // Until so many commits were accepted.
+  bool AwaitAccepted(int64_t count) {
+    return AwaitThat([count](const std::vector<Receipt>& all) {
+      return std::count_if(all.begin(), all.end(), [](const Receipt& receipt) {
+               return std::holds_alternative<Accepted>(receipt.what);
+             }) >= count;
+    });
+  }
+  bool AwaitThat(const std::function<bool(const std::vector<Receipt>&)>& holds) {
     sync::MutexLock lock(mutex_);
     const sync::TimeNs deadline = TheClock().Now() + kGenerous;
-    while (receipts_.size() < count) {
+    while (!holds(receipts_)) {
       if (TheClock().Now() >= deadline) return false;
       TheClock().WaitUntil(mutex_, changed_, deadline);
     }
@@ -203,6 +216,65 @@ TEST(CoreThreads, WhatACommitPutsUpComesOutOfTheDisplay) {
   Answer<EntityPage> list;
   running.core->ListEntities({}, list.reply());
   EXPECT_EQ(list.Await()->layers.size(), 0u);
+  EXPECT_TRUE(running.core->Stop(kGenerous).ok());
+}
+
+// Whoever frees a geometry waits until the gate is open.
+class Gate {
+ public:
+  GeometryPtr Guard(const GeometryPtr& geometry) {
+    return {new GeometryData(*geometry), [state = state_](const GeometryData* data) {
+              sync::MutexLock lock(state->mutex);
+              state->reached = true;
+              state->changed.NotifyAll();
+              while (!state->open) state->changed.Wait(state->mutex);
+              delete data;
+            }};
+  }
+  bool AwaitReached() {
+    sync::MutexLock lock(state_->mutex);
+    const sync::TimeNs deadline = TheClock().Now() + kGenerous;
+    while (!state_->reached && TheClock().Now() < deadline) {
+      TheClock().WaitUntil(state_->mutex, state_->changed, deadline);
+    }
+    return state_->reached;
+  }
+  void Open() {
+    sync::MutexLock lock(state_->mutex);
+    state_->open = true;
+    state_->changed.NotifyAll();
+  }
+
+ private:
+  struct State {
+    sync::Mutex mutex;
+    sync::CondVar changed;
+    bool reached VOXELD_GUARDED_BY(mutex) = false, open VOXELD_GUARDED_BY(mutex) = false;
+  };
+  const std::shared_ptr<State> state_ = std::make_shared<State>();
+};
+
+TEST(CoreThreads, WhatTakesLongToFreeHoldsUpNoCommit) {
+  Gate gate;
+  RunningCore running;
+  auto sink = std::make_shared<WaitingSink>();
+  const SessionInfo session = running.Open(sink);
+  uint64_t sequence = 0;
+  const auto commit = [&](EntityData data, uint64_t frame) {
+    std::vector<Operation> all =
+        testing::Sequence(sequence, Put("a", "dots", std::move(data)), testing::EndCommit(frame));
+    sequence += all.size();
+    session.intake->Take({std::move(all), {}, 100});
+  };
+  commit(Entity1(gate.Guard(Dots(0, 0xFFFFFF, 20))), 1);
+  EXPECT_TRUE(sink->Await(2)) << "accepted and shown";
+  commit(Entity1(Dots(0, 0xFF0000, 20)), 2);
+  EXPECT_TRUE(gate.AwaitReached());
+  for (uint64_t frame = 3; frame <= 5; ++frame) {
+    commit(Entity1(Dots(0, 0x00FF00, 20)), frame);
+    EXPECT_TRUE(sink->AwaitAccepted(static_cast<int64_t>(frame)));
+  }
+  gate.Open();
   EXPECT_TRUE(running.core->Stop(kGenerous).ok());
 }
 

@@ -20,9 +20,19 @@ constexpr int kEntitiesAMessage = 10'000;
 constexpr int kLineVariants = 4;  // of the line
 constexpr sync::TimeNs kQuietLimit = 120 * sync::kSecond;
 
+// The large scene is dim and the line is in front of it: otherwise the line would change nothing where the scene has light.
+v1::StreamRequest LayerOf(const std::string& name, int order, uint32_t opacity) {
+  v1::StreamRequest request;
+  v1::LayerState* state = request.mutable_layer_state();
+  state->set_layer(name);
+  state->set_order(order);
+  state->set_opacity(opacity);
+  return request;
+}
+
 // One frame: every entity is a line of its own, and all are committed at once.
 Frames LargeFrame(int entities) {
-  std::vector<Message> messages;
+  std::vector<Message> messages = {Message(LayerOf("large", 0, 100))};
   for (int first = 0; first < entities; first += kEntitiesAMessage) {
     std::vector<Put> puts;
     for (int i = first; i < std::min(first + kEntitiesAMessage, entities); ++i) {
@@ -38,8 +48,10 @@ Frames LargeFrame(int entities) {
 Frames OneLine() {
   Frames frames;
   for (int variant = 1; variant <= kLineVariants; ++variant) {
-    frames.push_back({Message(UpsertOf(
-        "small", "line", EntityOf({.form = LineForm::k24Bytes, .seed = uint64_t(variant)})))});
+    frames.push_back(
+        {Message(LayerOf("small", 1, 255)),
+         Message(UpsertOf("small", "line",
+                          EntityOf({.form = LineForm::k24Bytes, .seed = uint64_t(variant)})))});
   }
   return frames;
 }
@@ -79,7 +91,8 @@ absl::StatusOr<nlohmann::json> RunBeside(const BesideOptions& options, const Sur
        .displays = {absl::StrCat("sim=simulated,rate=", options.volumes_per_second, ",",
                                  options.display)},
        // A million entities are more than a commit may bring by default.
-       .config = "[limits]\nmax_uncommitted_bytes = 1_073_741_824\n"});
+       .config = "[limits]\nmax_uncommitted_bytes = 1_073_741_824\nmax_operations_per_commit = "
+                 "1_000_100\n"});
   if (!daemon.ok()) return daemon.status();
   Loop loop(with.interrupted);
   Party small(loop, (*daemon)->unix_target(), OneLine());
