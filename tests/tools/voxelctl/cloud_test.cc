@@ -84,6 +84,41 @@ TEST_F(Clouds, TextByNames) {
               ElementsAre(Point3{13.4, 52.5, 34}));
 }
 
+TEST_F(Clouds, TextWithDecimalCommasAndQuotes) {
+  const auto two = ElementsAre(Point3{0.5, 1.5, -2}, Point3{3, 4.25, 5});
+  EXPECT_THAT(Points("a.csv", "x;y;z\n0,5;1,5;-2\n3;4,25;5\n").positions, two);
+  EXPECT_THAT(Points("a.txt", "0,5\t1,5\t-2\n3\t4,25\t5\n").positions, two);
+  EXPECT_THAT(Points("a.xyz", "0,5 1,5 -2\n3 4,25 5\n").positions, two);
+  EXPECT_THAT(
+      Points("a.csv", "\"x\",\"y\",\"z\"\n\"0.5\", \"1.5\",-2\n3,\"4.25\",\"5\"\n").positions, two);
+  EXPECT_THAT(
+      Points("a.csv", "name,x,y,z\n\"a, b\",\"0,5\",\"1,5\",-2\nc,3,\"4,25\",5\n").positions, two);
+  EXPECT_THAT(Error("a.csv", "x;y;z\n0,5;1;2\n0.5;1;2\n"),
+              HasSubstr("line 3 has \"0.5\" in column 1, but the file has both decimal points"));
+  EXPECT_THAT(Error("a.csv", "x;y;z\n1.234,5;1;2\n"), HasSubstr("line 2 has \"1.234,5\""));
+}
+
+TEST_F(Clouds, TextWhoseCommentNamesTheColumns) {
+  const Part part =
+      Points("a.txt", "//X Y Z Nx Ny Nz R G B\n0 0 0 0 0 1 255 0 0\n9 0 0 0 0 1 0 255 0\n");
+  EXPECT_THAT(part.colors, ElementsAre(Rgb{255, 0, 0}, Rgb{0, 255, 0}));
+  EXPECT_EQ(part.normals.at(0), (Point3{0, 0, 1}));
+  EXPECT_THAT(Points("a.csv", "# made by hand\n# b,g,r,z,y,x\n1,2,3,6,5,4\n").positions,
+              ElementsAre(Point3{4, 5, 6}));
+  // A comment that names something else, or not every column, says nothing.
+  EXPECT_THAT(Points("a.txt", "# x y and z\n0 0 0 10 20 30\n").colors,
+              ElementsAre(Rgb{10, 20, 30}));
+  EXPECT_THAT(Points("a.txt", "# x y z\n0 0 0 10 20 30\n").colors, ElementsAre(Rgb{10, 20, 30}));
+}
+
+TEST_F(Clouds, MoleculesInXyzFilesAreToldApart) {
+  for (const char* comment : {"water", "", "1 2 3"}) {
+    EXPECT_THAT(Error("a.xyz", absl::StrCat("2\n", comment, "\nO 0 0 0.1\r\nH 0 0.7 -0.4\n")),
+                HasSubstr("is a molecule in chemistry's XYZ format"))
+        << comment;
+  }
+}
+
 TEST_F(Clouds, TextThatIsWrong) {
   EXPECT_THAT(Error("a.xyz", "1 2\n"), HasSubstr("line 1 is text that begins with \"1 2\""));
   EXPECT_THAT(Error("a.xyz", "1 2 3\n4 five 6\n"),
@@ -140,6 +175,53 @@ TEST_F(Clouds, PcdInItsThreeWays) {
                                               Bytes(uint32_t{40}) + squeezed);
   EXPECT_EQ(compressed.positions, positions);
   EXPECT_EQ(compressed.colors, colors);
+}
+
+std::string AsciiPcd(const std::string& fields, const std::string& types, size_t count,
+                     const std::string& points) {
+  std::string sizes, counts;
+  for (size_t i = 0; i < count; ++i) {
+    sizes += " 4";
+    counts += " 1";
+  }
+  return absl::StrCat("VERSION 0.7\nFIELDS ", fields, "\nSIZE", sizes, "\nTYPE ", types, "\nCOUNT",
+                      counts, "\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA ascii\n", points);
+}
+
+TEST_F(Clouds, PcdPackedColoursWhateverTheirTypeSays) {
+  const auto two = ElementsAre(Rgb{255, 0, 0}, Rgb{0, 128, 255});
+  EXPECT_THAT(
+      Points("a.pcd", AsciiPcd("x y z rgb", "F F F I", 4, "0 0 0 -65536\n1 0 0 -16744193\n"))
+          .colors,
+      two);
+  EXPECT_THAT(
+      Points("a.pcd", AsciiPcd("x y z rgba", "F F F U", 4, "0 0 0 4294901760\n1 0 0 4278223103\n"))
+          .colors,
+      two);
+  EXPECT_THAT(
+      Points("a.pcd", AsciiPcd("x y z rgb", "F F F U", 4, "0 0 0 16711680\n1 0 0 33023\n")).colors,
+      two);
+  EXPECT_THAT(
+      Points("a.pcd", AsciiPcd("x y z rgb", "F F F F", 4, "0 0 0 nan\n1 0 0 2.3418052e-38\n"))
+          .colors,
+      ElementsAre(Rgb{255, 255, 255}, Rgb{255, 0, 0}))
+      << "\"nan\" does not say which";
+}
+
+TEST_F(Clouds, PcdColoursByTheirGreatestValue) {
+  EXPECT_THAT(
+      Points("a.pcd", AsciiPcd("x y z r g b", "F F F F F F", 6, "0 0 0 255 128 0\n1 0 0 0 64 1\n"))
+          .colors,
+      ElementsAre(Rgb{255, 128, 0}, Rgb{0, 64, 1}));
+  EXPECT_THAT(
+      Points("a.pcd", AsciiPcd("x y z r g b", "F F F F F F", 6, "0 0 0 1 0.5 0\n1 0 0 0 0.25 1\n"))
+          .colors,
+      ElementsAre(Rgb{255, 128, 0}, Rgb{0, 64, 255}));
+  EXPECT_THAT(
+      Points("a.pcd", AsciiPcd("x y z r g b", "F F F U U U", 6, "0 0 0 1 0 0\n1 0 0 0 1 1\n"))
+          .colors,
+      ElementsAre(Rgb{1, 0, 0}, Rgb{0, 1, 1}))
+      << "whole numbers count to 255";
 }
 
 TEST_F(Clouds, PcdPointsThatAreNowhereAreLeftOut) {

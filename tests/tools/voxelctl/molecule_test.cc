@@ -94,6 +94,27 @@ TEST_F(Molecules, OneModelAndOneLocation) {
   EXPECT_THAT(model->note, HasSubstr("the first of its models"));
 }
 
+TEST_F(Molecules, FramesThatEndDivides) {
+  for (const char* end : {"END\n", "END   \n", "ENDMDL\n"}) {
+    const auto model = Import(
+        absl::StrCat(Atom(1, " C  ", 0, 0, 0, "C"), end, Atom(1, " C  ", 5, 0, 0, "C"), end));
+    ASSERT_THAT(model, IsOk());
+    EXPECT_EQ(model->parts.at(0).positions.size(), 1u) << end;
+    EXPECT_THAT(model->note, HasSubstr("the first of its models is shown"));
+  }
+}
+
+TEST_F(Molecules, AResidueHasOneLocationWhateverItsLetter) {
+  const auto model = Import(Atom(1, " N  ", 0, 0, 0, "N") + Atom(2, " CA ", 9, 0, 0, "C", 'B') +
+                            Atom(3, " CA ", 9, 1, 0, "C", 'C') + Atom(4, " C  ", 20, 0, 0, "C"));
+  ASSERT_THAT(model, IsOk());
+  size_t atoms = 0;
+  for (const Part& part : model->parts)
+    atoms += part.kind == Kind::kPoints ? part.positions.size() : 0;
+  EXPECT_EQ(atoms, 3u);
+  EXPECT_THAT(model->note, HasSubstr("atoms at alternate locations, not shown: 1"));
+}
+
 TEST_F(Molecules, RealProteins) {
   const auto model = ReadHere("/usr/share/pymol/data/tut/1hpv.pdb", {});
   ASSERT_THAT(model, IsOk()) << "tools/setup --import installs pymol-data";

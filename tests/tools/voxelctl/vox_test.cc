@@ -160,6 +160,46 @@ TEST_F(VoxFiles, GroupsHaveManyAndHiddenOnesAreNotShown) {
   EXPECT_EQ(Read(model + Transform(0, 1, {}) + shown).positions.size(), 48u);
 }
 
+TEST_F(VoxFiles, OfKeyFramesTheFirstIsShown) {
+  const std::string models =
+      Model3(1, 1, 1, {{0, 0, 0, 1}}) + Model3(2, 1, 1, {{0, 0, 0, 1}, {1, 0, 0, 1}});
+  const auto shape = [](int first, int second) {
+    return Chunk("nSHP", Int(1) + Dictionary({}) + Int(2) + Int(0) +
+                             Dictionary({{"_f", absl::StrCat(first)}}) + Int(1) +
+                             Dictionary({{"_f", absl::StrCat(second)}}));
+  };
+  EXPECT_EQ(Read(models + Transform(0, 1, {}) + shape(0, 5)).positions.size(), 6u * 4);
+  EXPECT_EQ(Read(models + Transform(0, 1, {}) + shape(7, 2)).positions.size(), 10u * 4)
+      << "in another order";
+  // Where a node is, likewise.
+  const std::string moving = Chunk("nTRN", Int(0) + Dictionary({}) + Int(1) + Int(-1) + Int(0) +
+                                               Int(2) + Dictionary({{"_f", "3"}, {"_t", "9 0 0"}}) +
+                                               Dictionary({{"_f", "0"}, {"_t", "2 0 0"}}));
+  const auto model = Import(Vox(models + moving + Shape(1, 0)));
+  ASSERT_THAT(model, IsOk());
+  for (const Point3& p : model->parts.at(0).positions) EXPECT_LE(p.x, 3);
+  EXPECT_THAT(model->note, HasSubstr("not shown: key frames after the first: 1"));
+}
+
+TEST_F(VoxFiles, HiddenLayersAreNotShown) {
+  const std::string models =
+      Model3(1, 1, 1, {{0, 0, 0, 1}}) + Model3(2, 1, 1, {{0, 0, 0, 1}, {1, 0, 0, 1}});
+  const auto on_layer = [](int32_t id, int32_t child, int32_t layer) {
+    return Chunk("nTRN", Int(id) + Dictionary({}) + Int(child) + Int(-1) + Int(layer) + Int(1) +
+                             Dictionary({}));
+  };
+  const std::string nodes = Transform(0, 1, {}) + Group(1, {2, 4}) + on_layer(2, 3, 0) +
+                            Shape(3, 0) + on_layer(4, 5, 1) + Shape(5, 1);
+  const auto layer = [](int32_t id, const std::string& hidden) {
+    return Chunk("LAYR", Int(id) + Dictionary({{"_hidden", hidden}}) + Int(-1));
+  };
+  const auto model = Import(Vox(models + nodes + layer(0, "0") + layer(1, "1")));
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(model->parts.at(0).positions.size(), 6u * 4);
+  EXPECT_THAT(model->note, HasSubstr("not shown: hidden nodes: 1"));
+  EXPECT_EQ(Read(models + nodes + layer(0, "0") + layer(1, "0")).positions.size(), 16u * 4);
+}
+
 TEST_F(VoxFiles, WhatIsWrongIsSaid) {
   EXPECT_THAT(Error("hello, world, this is no file of voxels"),
               HasSubstr("a MagicaVoxel file is expected"));
@@ -194,13 +234,11 @@ TEST_F(VoxFiles, ModelsThatMultiplyEnd) {
 
 // A million times the largest model, with one voxel and with none.
 TEST_F(VoxFiles, LargeModelsShownOftenEnd) {
-  std::string often = Int(0) + Dictionary({}) + Int(1'200'000);
-  for (int i = 0; i < 1'200'000; ++i) often += Int(0) + Int(0);
+  const std::string often = Group(0, std::vector<int32_t>(1'200'000, 1)) + Shape(1, 0);
   for (const bool filled : {true, false}) {
     const std::string model =
         Model3(256, 256, 256, filled ? std::vector<V>{{1, 1, 1, 1}} : std::vector<V>());
-    EXPECT_THAT(Error(Vox(model + Chunk("nSHP", often))),
-                HasSubstr("shows more than 1000000 models"));
+    EXPECT_THAT(Error(Vox(model + often)), HasSubstr("shows more than 1000000 models"));
   }
 }
 

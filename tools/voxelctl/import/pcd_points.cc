@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "absl/strings/ascii.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
@@ -199,9 +200,13 @@ bool TakeWord(const Field& field, absl::string_view word, PointRow* row) {
     if (read.ec != std::errc() || read.ptr != word.data() + word.size()) return false;
   }
   if (IsPacked(field)) {
-    SetPacked(field.type == 'F' ? std::bit_cast<uint32_t>(static_cast<float>(value))
-              : value >= 0 && value <= UINT32_MAX ? static_cast<uint32_t>(value)
-                                                  : 0,
+    // With its alpha the word of most colours is negative as a signed number, and not a number as a float: then the text does not
+    // say which colour it is.
+    const bool unknown = std::isnan(value) || value < INT32_MIN || value > UINT32_MAX;
+    SetPacked(field.type == 'F' && !std::isnan(value)
+                  ? std::bit_cast<uint32_t>(static_cast<float>(value))
+              : unknown ? 0xFFFFFF
+                        : static_cast<uint32_t>(static_cast<int64_t>(value)),
               row);
   } else if (const auto column = PointColumnOf(field.name)) {
     (*row)[static_cast<size_t>(*column)] = value;
@@ -213,8 +218,9 @@ bool IsThere(const PointRow& row) {
   return std::isfinite(row[0]) && std::isfinite(row[1]) && std::isfinite(row[2]);
 }
 
-absl::Status ReadAscii(const SourceFile& file, const PcdHeader& header, PointTable* table,
-                       uint64_t* nowhere) {
+using TakeRow = absl::FunctionRef<absl::Status(const PointRow&, uint64_t number)>;
+
+absl::Status ReadAscii(const SourceFile& file, const PcdHeader& header, TakeRow take) {
   absl::string_view rest = absl::string_view(file.bytes).substr(header.body);
   for (uint64_t i = 0; i < header.points; ++i) {
     PointRow row = {};
@@ -236,19 +242,14 @@ absl::Status ReadAscii(const SourceFile& file, const PcdHeader& header, PointTab
         }
       }
     }
-    if (!IsThere(row)) {
-      ++*nowhere;
-    } else if (absl::Status status = table->Add(file, row, absl::StrCat("point ", i));
-               !status.ok()) {
-      return status;
-    }
+    if (absl::Status status = take(row, i); !status.ok()) return status;
   }
   return absl::OkStatus();
 }
 
 // Points one after another, or field after field (`by_field`), as the compressed data have them.
 absl::Status ReadBinary(const SourceFile& file, const PcdHeader& header, absl::string_view bytes,
-                        bool by_field, PointTable* table, uint64_t* nowhere) {
+                        bool by_field, TakeRow take) {
   if (bytes.size() < header.points * header.point_bytes) {
     return FileError(file,
                      absl::StrCat("has ", bytes.size(), " bytes of data for ", header.points,
@@ -265,12 +266,7 @@ absl::Status ReadBinary(const SourceFile& file, const PcdHeader& header, absl::s
       if (field.count > 0) Take(field, bytes.data() + at, &row);
       before += bytes_of_field;
     }
-    if (!IsThere(row)) {
-      ++*nowhere;
-    } else if (absl::Status status = table->Add(file, row, absl::StrCat("point ", i));
-               !status.ok()) {
-      return status;
-    }
+    if (absl::Status status = take(row, i); !status.ok()) return status;
   }
   return absl::OkStatus();
 }
@@ -304,7 +300,7 @@ absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file) {
   const absl::StatusOr<PcdHeader> header = ReadPcdHeader(file);
   if (!header.ok()) return header.status();
   std::array<bool, kPointColumns> has = {};
-  double full_scale = 255;
+  bool floats = false;  // colours of which only the data say how bright they can be
   for (const Field& field : header->fields) {
     if (IsPacked(field)) {
       for (const PointColumn c : {PointColumn::kRed, PointColumn::kGreen, PointColumn::kBlue}) {
@@ -312,23 +308,40 @@ absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file) {
       }
     } else if (const auto column = PointColumnOf(field.name)) {
       has[static_cast<size_t>(*column)] = true;
-      if (*column == PointColumn::kRed && field.type == 'F') full_scale = 1;
+      if (IsColor(*column) && field.type == 'F') floats = true;
     }
   }
-  absl::StatusOr<PointTable> table = PointTable::Make(file, has, full_scale);
+  std::string decompressed;
+  if (header->data == Data::kCompressed) {
+    absl::StatusOr<std::string> bytes = Decompress(file, *header);
+    if (!bytes.ok()) return bytes.status();
+    decompressed = *std::move(bytes);
+  }
+  const auto read = [&](TakeRow take) {
+    if (header->data == Data::kAscii) return ReadAscii(file, *header, take);
+    const bool by_field = header->data == Data::kCompressed;
+    return ReadBinary(file, *header,
+                      by_field ? decompressed : absl::string_view(file.bytes).substr(header->body),
+                      by_field, take);
+  };
+  double greatest = floats ? 0 : 255;
+  if (floats) {
+    const absl::Status looked = read([&](const PointRow& row, uint64_t) {
+      for (const PointColumn c : {PointColumn::kRed, PointColumn::kGreen, PointColumn::kBlue}) {
+        greatest = std::max(greatest, row[static_cast<size_t>(c)]);
+      }
+      return absl::OkStatus();
+    });
+    if (!looked.ok()) return looked;
+  }
+  absl::StatusOr<PointTable> table = PointTable::Make(file, has, FullScaleOf(greatest));
   if (!table.ok()) return table.status();
   uint64_t nowhere = 0;
-  absl::Status status;
-  if (header->data == Data::kAscii) {
-    status = ReadAscii(file, *header, &*table, &nowhere);
-  } else if (header->data == Data::kBinary) {
-    status = ReadBinary(file, *header, absl::string_view(file.bytes).substr(header->body), false,
-                        &*table, &nowhere);
-  } else {
-    const absl::StatusOr<std::string> bytes = Decompress(file, *header);
-    if (!bytes.ok()) return bytes.status();
-    status = ReadBinary(file, *header, *bytes, true, &*table, &nowhere);
-  }
+  const absl::Status status = read([&](const PointRow& row, uint64_t number) {
+    if (IsThere(row)) return table->Add(file, row, absl::StrCat("point ", number));
+    ++nowhere;
+    return absl::OkStatus();
+  });
   if (!status.ok()) return status;
   if (table->size() == 0) {
     return FileError(file, "has no point that is anywhere", "at least one is expected");

@@ -15,6 +15,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "absl/strings/string_view.h"
 #include "common/text/printable.h"
 #include "tools/voxelctl/import/elements.h"
@@ -83,7 +84,12 @@ class PdbReader {
     model.format = "PDB molecule";
     model.up = Up::kZ;
     model.lit_already = true;
-    if (more_models_) model.note = absl::StrCat(file_.path, ": the first of its models is shown");
+    std::vector<std::string> notes;
+    if (more_models_) notes.push_back("the first of its models is shown");
+    if (other_locations_ > 0) {
+      notes.push_back(absl::StrCat("atoms at alternate locations, not shown: ", other_locations_));
+    }
+    if (!notes.empty()) model.note = absl::StrCat(file_.path, ": ", absl::StrJoin(notes, "; "));
     if (style_ == MoleculeStyle::kBalls) {
       if (absl::Status status = FindBonds(); !status.ok()) return status;
       AddRods(&model);
@@ -107,7 +113,7 @@ class PdbReader {
       if (absl::EndsWith(line, "\r")) line.remove_suffix(1);
       ++line_;
       const absl::string_view record = ColumnsOf(line, 1, 6);
-      if (absl::StartsWith(record, "ENDMDL")) {
+      if (absl::StartsWith(record, "ENDMDL") || absl::StripAsciiWhitespace(record) == "END") {
         ended = !atoms_.empty();
       } else if (absl::StartsWith(record, "CONECT")) {
         ReadConnections(line);
@@ -121,9 +127,16 @@ class PdbReader {
   }
 
   absl::Status ReadAtom(absl::string_view line) {
+    // Of alternate locations each residue has those of one letter, the first.
     const absl::string_view location = ColumnsOf(line, 17, 17);
-    if (location != " " && location != "A" && location != "1" && !location.empty())
-      return absl::OkStatus();
+    if (!location.empty() && location != " ") {
+      const auto chosen =
+          locations_.emplace(std::string(ColumnsOf(line, 22, 27)), location[0]).first->second;
+      if (chosen != location[0]) {
+        ++other_locations_;
+        return absl::OkStatus();
+      }
+    }
     if (atoms_.size() >= kMaxModelVertices / 5) {
       return FileError(file_, absl::StrCat("has more than ", kMaxModelVertices / 5, " atoms"),
                        "so large a molecule is not read");
@@ -240,6 +253,8 @@ class PdbReader {
   const MoleculeStyle style_;
   uint64_t line_ = 0;
   bool more_models_ = false;
+  std::unordered_map<std::string, char> locations_;  // by residue
+  uint64_t other_locations_ = 0;
   std::vector<Atom> atoms_;
   std::unordered_map<std::string, size_t> serials_;
   std::set<std::pair<size_t, size_t>> bonds_;

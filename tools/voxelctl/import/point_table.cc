@@ -64,6 +64,13 @@ std::optional<PointColumn> PointColumnOf(absl::string_view name) {
   return found->column;
 }
 
+double FullScaleOf(double greatest) { return greatest <= 1 ? 1 : greatest <= 255 ? 255 : 65535; }
+
+bool IsColor(PointColumn column) {
+  return column == PointColumn::kRed || column == PointColumn::kGreen ||
+         column == PointColumn::kBlue;
+}
+
 absl::StatusOr<PointTable> PointTable::Make(const SourceFile& file,
                                             const std::array<bool, kPointColumns>& has,
                                             double full_scale) {

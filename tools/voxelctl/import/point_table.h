@@ -36,6 +36,10 @@ using PointRow = std::array<double, kPointColumns>;
 // "i", "intensity", … Nothing: another column.
 std::optional<PointColumn> PointColumnOf(absl::string_view name);
 
+// The value of a colour's channel that is as bright as can be, by the greatest in the file: 1, 255 or 65,535.
+double FullScaleOf(double greatest);
+bool IsColor(PointColumn column);
+
 // Rows become points: intensities become greys where there are no colours, stretched from the least to
 // the greatest.
 class PointTable {

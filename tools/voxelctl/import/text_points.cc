@@ -3,13 +3,17 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cstdint>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
 #include "absl/strings/string_view.h"
 #include "common/text/printable.h"
 #include "tools/voxelctl/import/point_table.h"
@@ -20,7 +24,7 @@ namespace {
 using Columns = std::vector<std::optional<PointColumn>>;
 constexpr size_t kMostColumns = 256;
 
-// Lines without their ends, comments and blanks around.
+// Lines without their ends, comments and blanks around. A comment begins with "#" or "//".
 class Lines {
  public:
   explicit Lines(absl::string_view text) : rest_(text) {
@@ -33,51 +37,111 @@ class Lines {
     while (!rest_.empty()) {
       ++number_;
       const size_t end = std::min(rest_.find('\n'), rest_.size());
-      absl::string_view all = rest_.substr(0, end);
+      const absl::string_view all = absl::StripAsciiWhitespace(rest_.substr(0, end));
       rest_.remove_prefix(std::min(end + 1, rest_.size()));
-      all = all.substr(0, all.find('#'));
-      all = all.substr(0, all.find("//"));
-      *line = absl::StripAsciiWhitespace(all);
+      const size_t begin = std::min(all.find('#'), all.find("//"));
+      *line = absl::StripAsciiWhitespace(all.substr(0, begin));
       if (!line->empty()) return true;
+      if (begin == 0) {
+        comment_ = absl::StripAsciiWhitespace(
+            all.substr(std::min(all.find_first_not_of("#/"), all.size())));
+      }
     }
     return false;
   }
   size_t number() const { return number_; }
+  // The last line that was nothing but a comment.
+  absl::string_view comment() const { return comment_; }
 
  private:
-  absl::string_view rest_;
+  absl::string_view rest_, comment_;
   size_t number_ = 0;
 };
 
-// Blanks part words, and so does one comma, semicolon or tab, between which there may be nothing.
-std::vector<absl::string_view> Split(absl::string_view line) {
-  const bool marked = line.find_first_of(",;") != absl::string_view::npos;
-  const absl::string_view marks = marked ? ",;" : " \t";
-  std::vector<absl::string_view> words;
-  while (words.size() < kMostColumns) {
-    if (!marked) {
-      line = absl::StripLeadingAsciiWhitespace(line);
-      if (line.empty()) break;
-    }
-    const size_t end = line.find_first_of(marks);
-    words.push_back(absl::StripAsciiWhitespace(line.substr(0, end)));
-    if (end == absl::string_view::npos) break;
-    line.remove_prefix(end + 1);
-  }
-  return words;
-}
+using Words = std::vector<absl::string_view>;
 
+// With a decimal point or a decimal comma.
 std::optional<double> Number(absl::string_view word) {
   if (absl::StartsWith(word, "+")) word.remove_prefix(1);
+  std::string with_point;
+  if (const size_t comma = word.find(','); comma != absl::string_view::npos) {
+    if (word.find('.') != absl::string_view::npos) return std::nullopt;
+    with_point = std::string(word);
+    with_point[comma] = '.';
+    word = with_point;
+  }
   double value = 0;
   const auto result = std::from_chars(word.data(), word.data() + word.size(), value);
   if (result.ec != std::errc() || result.ptr != word.data() + word.size()) return std::nullopt;
   return value;
 }
 
-bool IsNames(const std::vector<absl::string_view>& words) {
+// Parts words at a mark, between two of which there may be nothing, or at blanks (' '). A word in quotation marks may contain the mark.
+Words SplitAt(absl::string_view line, char mark) {
+  Words words;
+  const absl::string_view marks =
+      mark == ' ' ? absl::string_view(" \t") : absl::string_view(&mark, 1);
+  while (words.size() < kMostColumns) {
+    const absl::string_view blanks = mark == '\t' ? " " : " \t";
+    line.remove_prefix(std::min(line.find_first_not_of(blanks), line.size()));
+    if (mark == ' ' && line.empty()) break;
+    size_t from = 0;
+    absl::string_view word;
+    const bool quoted =
+        absl::StartsWith(line, "\"") && line.find('"', 1) != absl::string_view::npos;
+    if (quoted) {
+      const size_t close = line.find('"', 1);
+      word = line.substr(1, close - 1);
+      from = close + 1;
+    }
+    const size_t end = line.find_first_of(marks, from);
+    if (!quoted) word = line.substr(0, end);
+    words.push_back(absl::StripAsciiWhitespace(word));
+    if (end == absl::string_view::npos) break;
+    line.remove_prefix(end + 1);
+  }
+  return words;
+}
+
+bool IsPoint(const Words& words) {
+  return std::ranges::count_if(words, [](absl::string_view w) { return Number(w).has_value(); }) >=
+         3;
+}
+
+bool IsNames(const Words& words) {
   return std::ranges::none_of(words,
                               [](absl::string_view word) { return Number(word).has_value(); });
+}
+
+// What parts the words of a file: the first of these at which its first line of three numbers or more falls into numbers, so
+// that a comma may also be a decimal one. If there is no such line, the first that is in the first line.
+char MarkOf(absl::string_view text) {
+  Lines lines(text);
+  absl::string_view line;
+  while (lines.Next(&line)) {
+    for (const char mark : {';', '\t', ',', ' '}) {
+      if (mark != ' ' && line.find(mark) == absl::string_view::npos) continue;
+      const Words words = SplitAt(line, mark);
+      const bool all_words = std::ranges::all_of(words, [](absl::string_view word) {
+        return word.empty() || Number(word).has_value() ||
+               word.find_first_of(",; ") == absl::string_view::npos;
+      });
+      if (all_words && IsPoint(words)) return mark;
+    }
+  }
+  Lines first(text);
+  if (first.Next(&line)) {
+    for (const char mark : {';', '\t', ','}) {
+      if (line.find(mark) != absl::string_view::npos) return mark;
+    }
+  }
+  return ' ';
+}
+
+// The words of a line with points. A line with too few at the file's mark is parted at its own.
+Words WordsOf(absl::string_view line, char mark, size_t columns) {
+  Words words = SplitAt(line, mark);
+  return words.size() < columns ? SplitAt(line, MarkOf(line)) : words;
 }
 
 // The greatest and least of the columns from the fourth on, over the whole file.
@@ -85,12 +149,12 @@ struct Ranges {
   double least[6] = {}, greatest[6] = {};
 };
 
-Ranges RangesOf(absl::string_view text, size_t columns) {
+Ranges RangesOf(absl::string_view text, char mark, size_t columns) {
   Ranges out;
   Lines lines(text);
   absl::string_view line;
   while (lines.Next(&line)) {
-    const auto words = Split(line);
+    const auto words = WordsOf(line, mark, columns);
     for (size_t c = 3; c < std::min({words.size(), columns, size_t{9}}); ++c) {
       const double value = Number(words[c]).value_or(0);
       out.least[c - 3] = std::min(out.least[c - 3], value);
@@ -127,41 +191,76 @@ Columns ByCount(size_t count, const Ranges& ranges) {
   }
 }
 
-double FullScale(absl::string_view text, const Columns& columns) {
+double FullScale(absl::string_view text, char mark, const Columns& columns) {
   double greatest = 0;
   Lines lines(text);
   absl::string_view line;
   while (lines.Next(&line)) {
-    const auto words = Split(line);
+    const auto words = WordsOf(line, mark, columns.size());
     for (size_t c = 0; c < std::min(words.size(), columns.size()); ++c) {
-      const bool color = columns[c] == PointColumn::kRed || columns[c] == PointColumn::kGreen ||
-                         columns[c] == PointColumn::kBlue;
+      const bool color = columns[c].has_value() && IsColor(*columns[c]);
       if (color) greatest = std::max(greatest, Number(words[c]).value_or(0));
     }
   }
-  return greatest <= 1 ? 1 : greatest <= 255 ? 255 : 65535;
+  return FullScaleOf(greatest);
+}
+
+Columns ByNames(const Words& words) {
+  Columns columns;
+  for (const absl::string_view word : words) {
+    const auto column = PointColumnOf(word);
+    const bool twice = column.has_value() && std::ranges::find(columns, column) != columns.end();
+    columns.push_back(twice ? std::nullopt : column);
+  }
+  return columns;
+}
+
+// The columns that a comment before the points names, as CloudCompare writes it. Empty: it names no x, y and z, or another number
+// of columns.
+Columns ByComment(absl::string_view comment, char mark, size_t count) {
+  for (const char at : {mark, ' '}) {
+    Columns columns = ByNames(SplitAt(comment, at));
+    const auto names = [&columns](PointColumn column) {
+      return std::ranges::find(columns, column) != columns.end();
+    };
+    if (columns.size() == count && names(PointColumn::kX) && names(PointColumn::kY) &&
+        names(PointColumn::kZ)) {
+      return columns;
+    }
+  }
+  return {};
+}
+
+// The other format that has the name .xyz: the number of atoms, a comment that may be empty, and an element and its place a line.
+bool IsMolecule(absl::string_view text) {
+  const std::vector<absl::string_view> lines = absl::StrSplit(text, absl::MaxSplits('\n', 3));
+  if (lines.size() < 3) return false;
+  uint64_t count = 0;
+  if (!absl::SimpleAtoi(absl::StripAsciiWhitespace(lines[0]), &count)) return false;
+  const Words atom = SplitAt(absl::StripAsciiWhitespace(lines[2]), ' ');
+  return atom.size() >= 4 && atom[0].size() <= 2 &&
+         std::ranges::all_of(
+             atom[0], [](char c) { return absl::ascii_isalpha(static_cast<unsigned char>(c)); }) &&
+         Number(atom[1]) && Number(atom[2]) && Number(atom[3]);
 }
 
 // What the columns are, having read the lines that are no points yet; the first point's line is in `first`.
-absl::StatusOr<Columns> ReadHead(const SourceFile& file, Lines* lines, absl::string_view* first) {
-  Columns columns;
+absl::StatusOr<Columns> ReadHead(const SourceFile& file, char mark, Lines* lines,
+                                 absl::string_view* first) {
+  if (IsMolecule(file.bytes)) {
+    return FileError(file, "is a molecule in chemistry's XYZ format, of elements and their places",
+                     "a .xyz file of points is expected, or the molecule as .pdb");
+  }
   if (!lines->Next(first))
     return FileError(file, "holds no line of numbers", "x y z a line is expected");
-  auto words = Split(*first);
+  Words words = SplitAt(*first, mark);
   if (words.size() == 1 && Number(words[0]).has_value()) {  // a count
     if (!lines->Next(first))
       return FileError(file, "ends after a count", "x y z a line is expected");
-    words = Split(*first);
+    words = SplitAt(*first, mark);
   }
   if (IsNames(words)) {
-    for (const absl::string_view word : words) {
-      absl::string_view name = word;
-      if (name.size() > 1 && name.front() == '"' && name.back() == '"')
-        name = name.substr(1, name.size() - 2);
-      const auto column = PointColumnOf(name);
-      const bool twice = column.has_value() && std::ranges::find(columns, column) != columns.end();
-      columns.push_back(twice ? std::nullopt : column);
-    }
+    Columns columns = ByNames(words);
     if (!lines->Next(first))
       return FileError(file, "ends after its names", "x y z a line is expected");
     return columns;
@@ -170,24 +269,29 @@ absl::StatusOr<Columns> ReadHead(const SourceFile& file, Lines* lines, absl::str
     return FileError(file, absl::StrCat("line ", lines->number(), " is ", DescribeContents(*first)),
                      "three numbers or more a line are expected, or names of columns first");
   }
-  return ByCount(words.size(), RangesOf(file.bytes, words.size()));
+  Columns named = ByComment(lines->comment(), mark, words.size());
+  if (!named.empty()) return named;
+  return ByCount(words.size(), RangesOf(file.bytes, mark, words.size()));
 }
 
 }  // namespace
 
 absl::StatusOr<Model> ReadTextPoints(const SourceFile& file) {
+  const char mark = MarkOf(file.bytes);
   Lines lines(file.bytes);
   absl::string_view line;
-  const absl::StatusOr<Columns> columns = ReadHead(file, &lines, &line);
+  const absl::StatusOr<Columns> columns = ReadHead(file, mark, &lines, &line);
   if (!columns.ok()) return columns.status();
   std::array<bool, kPointColumns> has = {};
   for (const auto& column : *columns) {
     if (column.has_value()) has[static_cast<size_t>(*column)] = true;
   }
-  absl::StatusOr<PointTable> table = PointTable::Make(file, has, FullScale(file.bytes, *columns));
+  absl::StatusOr<PointTable> table =
+      PointTable::Make(file, has, FullScale(file.bytes, mark, *columns));
   if (!table.ok()) return table.status();
+  bool points = false, commas = false;  // decimal ones that were seen
   do {
-    const auto words = Split(line);
+    const auto words = WordsOf(line, mark, columns->size());
     PointRow row = {};
     for (size_t c = 0; c < columns->size(); ++c) {
       if (!(*columns)[c].has_value()) continue;
@@ -201,6 +305,15 @@ absl::StatusOr<Model> ReadTextPoints(const SourceFile& file) {
                              : "nothing",
                          " in column ", c + 1),
             "a number is expected");
+      }
+      points |= words[c].find('.') != absl::string_view::npos;
+      commas |= words[c].find(',') != absl::string_view::npos;
+      if (points && commas) {
+        return FileError(file,
+                         absl::StrCat("line ", lines.number(), " has \"",
+                                      EscapeForTerminal(words[c].substr(0, 24)), "\" in column ",
+                                      c + 1, ", but the file has both decimal points and commas"),
+                         "one of the two is expected");
       }
       row[static_cast<size_t>(*(*columns)[c])] = *value;
     }

@@ -98,6 +98,18 @@ bool ReadMove(const std::string& text, std::array<int32_t, 3>* out) {
   return true;
 }
 
+// The frame that a key is for: 0 where none is given.
+int32_t FrameOf(const std::map<std::string, std::string>& attributes) {
+  int32_t frame = 0;
+  const auto at = attributes.find("_f");
+  return at != attributes.end() && absl::SimpleAtoi(at->second, &frame) ? frame : 0;
+}
+
+bool IsHidden(const std::map<std::string, std::string>& attributes) {
+  const auto hidden = attributes.find("_hidden");
+  return hidden != attributes.end() && hidden->second == "1";
+}
+
 class VoxReader {
  public:
   explicit VoxReader(const SourceFile& file) : file_(file) { scene_.palette = DefaultPalette(); }
@@ -154,6 +166,9 @@ class VoxReader {
       }
     } else if (id == "nTRN" || id == "nGRP" || id == "nSHP") {
       status = TakeNode(id, &bytes);
+    } else if (id == "LAYR") {
+      const int32_t layer = bytes.Int();
+      if (IsHidden(bytes.Dictionary())) scene_.hidden_layers.insert(layer);
     }
     if (status.ok() && !bytes.ok()) return CutOff(Named(id));
     return status;
@@ -202,14 +217,20 @@ class VoxReader {
     const int32_t number = bytes->Int();
     const auto attributes = bytes->Dictionary();
     VoxNode node;
-    const auto hidden = attributes.find("_hidden");
-    node.hidden = hidden != attributes.end() && hidden->second == "1";
+    node.hidden = IsHidden(attributes);
     if (id == "nTRN") {
       node.kind = VoxNode::Kind::kTransform;
       node.children = {bytes->Int()};
-      (void)bytes->Take(8);  // reserved, the layer
-      if (bytes->Int() > 0) {
-        const auto frame = bytes->Dictionary();
+      (void)bytes->Int();  // reserved
+      node.layer = bytes->Int();
+      const auto frames = static_cast<uint32_t>(bytes->Int());
+      std::map<std::string, std::string> frame;
+      for (uint32_t i = 0; i < frames && bytes->ok(); ++i) {
+        auto key = bytes->Dictionary();
+        if (i == 0 || FrameOf(key) < FrameOf(frame)) frame = std::move(key);
+      }
+      if (frames > 0) {
+        scene_.later_frames += frames - 1;
         const auto move = frame.find("_t"), turn = frame.find("_r");
         if (move != frame.end() && !ReadMove(move->second, &node.move)) {
           return FileError(file_, "has a node that is moved by no three numbers",
@@ -228,9 +249,19 @@ class VoxReader {
     } else {
       node.kind = id == "nGRP" ? VoxNode::Kind::kGroup : VoxNode::Kind::kShape;
       const auto count = static_cast<uint32_t>(bytes->Int());
+      int32_t first = 0;
       for (uint32_t i = 0; i < count && bytes->ok(); ++i) {
-        node.children.push_back(bytes->Int());
-        if (node.kind == VoxNode::Kind::kShape) (void)bytes->Dictionary();
+        const int32_t child = bytes->Int();
+        if (node.kind == VoxNode::Kind::kGroup) {
+          node.children.push_back(child);
+          continue;
+        }
+        // A shape has several models only where it is animated: one for each key frame.
+        const int32_t frame = FrameOf(bytes->Dictionary());
+        if (i > 0) ++scene_.later_frames;
+        if (i > 0 && frame >= first) continue;
+        node.children = {child};
+        first = frame;
       }
     }
     if (!bytes->ok()) return absl::OkStatus();

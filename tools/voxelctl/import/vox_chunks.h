@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -32,7 +33,8 @@ struct VoxNode {
   enum class Kind : uint8_t { kTransform, kGroup, kShape };
   Kind kind = Kind::kGroup;
   bool hidden = false;
-  std::vector<int32_t> children;  // of a shape its grids
+  std::vector<int32_t> children;  // of a shape its grid
+  int32_t layer = -1;             // of a transform; -1: none
   std::array<int32_t, 3> move = {};
   VoxTurn turn;
 };
@@ -41,6 +43,9 @@ struct VoxScene {
   std::vector<VoxGrid> grids;
   std::array<Rgb, 256> palette = {};  // by a voxel's colour; 0 is none
   std::map<int32_t, VoxNode> nodes;   // 0 is the root; empty: there are none
+  std::set<int32_t> hidden_layers;
+  uint64_t later_frames =
+      0;  // models and places of key frames after the first, which are not in `nodes`
 };
 
 absl::StatusOr<VoxScene> ReadVoxChunks(const SourceFile& file);

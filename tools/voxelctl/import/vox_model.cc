@@ -1,11 +1,13 @@
 #include "tools/voxelctl/import/vox_model.h"
 
 #include <array>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/container/flat_hash_set.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "tools/voxelctl/import/vox_chunks.h"
 
 namespace voxeld::voxelctl {
@@ -65,6 +67,14 @@ class Builder {
     model.up = Up::kZ;
     model.lit_already = true;
     model.parts.push_back(std::move(part_));
+    std::vector<std::string> notes;
+    if (scene_.later_frames > 0) {
+      notes.push_back(absl::StrCat("key frames after the first: ", scene_.later_frames));
+    }
+    if (hidden_ > 0) notes.push_back(absl::StrCat("hidden nodes: ", hidden_));
+    if (!notes.empty()) {
+      model.note = absl::StrCat(file_.path, ": not shown: ", absl::StrJoin(notes, "; "));
+    }
     return model;
   }
 
@@ -79,7 +89,10 @@ class Builder {
                        absl::StrCat("at most ", kMostGroupDepth, " deep are read"));
     }
     const VoxNode& node = at->second;
-    if (node.hidden) return absl::OkStatus();
+    if (node.hidden || scene_.hidden_layers.contains(node.layer)) {
+      ++hidden_;
+      return absl::OkStatus();
+    }
     const Place here = node.kind == VoxNode::Kind::kTransform ? place * node : place;
     for (const int32_t child : node.children) {
       const absl::Status status =
@@ -160,7 +173,7 @@ class Builder {
 
   const SourceFile& file_;
   const VoxScene& scene_;
-  uint64_t visits_ = 0;
+  uint64_t visits_ = 0, hidden_ = 0;
   Part part_;
 };
 
