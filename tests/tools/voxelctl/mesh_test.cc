@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstring>
 #include <functional>
+#include <optional>
 #include <string>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "tests/tools/voxelctl/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
@@ -251,6 +253,46 @@ std::string Gltf(const std::string& accessors, const std::string& nodes = R"([{"
          R"(,"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,)" +
          std::string(48, 'A') + R"("}],"bufferViews":[{"buffer":0,"byteLength":36}],"accessors":)" +
          accessors + extra + "}";
+}
+
+// A triangle with a material, as given, and white vertices if so wished.
+std::string ColoredGltf(const std::string& material, bool white_vertices) {
+  std::string bytes;
+  for (const float value : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f}) {
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof(value));
+  }
+  for (int i = 0; i < 9; ++i) bytes.append("\0\0\x80\x3f", 4);
+  return absl::StrCat(
+      R"({"asset":{"version":"2.0"},"extensionsUsed":["KHR_materials_pbrSpecularGlossiness"],)",
+      R"("scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)",
+      R"("meshes":[{"primitives":[{"attributes":{"POSITION":0)",
+      white_vertices ? R"(,"COLOR_0":1)" : "", "}", material.empty() ? "" : R"(,"material":0)",
+      R"(}]}],"buffers":[{"byteLength":72,"uri":"data:application/octet-stream;base64,)",
+      absl::Base64Escape(bytes),
+      R"("}],"bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":36}],)",
+      R"("accessors":[{"bufferView":0,"componentType":5126,"type":"VEC3","count":3,"min":[0,0,0],"max":[1,1,0]},)",
+      R"({"bufferView":1,"componentType":5126,"type":"VEC3","count":3}])",
+      material.empty() ? "" : absl::StrCat(R"(,"materials":[)", material, "]"), "}");
+}
+
+TEST(MeshColours, OfGltfAreMultiplied) {
+  TempFolder folder;
+  const auto color = [&](const std::string& material, bool white_vertices) -> std::optional<Rgb> {
+    const auto model = ReadHere(folder.Write("a.gltf", ColoredGltf(material, white_vertices)), {});
+    EXPECT_TRUE(model.ok()) << model.status();
+    if (!model.ok() || model->parts.at(0).colors.empty()) return std::nullopt;
+    return model->parts[0].colors[0];
+  };
+  const std::string red = R"("pbrMetallicRoughness":{"baseColorFactor":[1,0,0,1]}})";
+  EXPECT_EQ(color("{" + red, true), (Rgb{255, 0, 0}));
+  EXPECT_EQ(color("{" + red, false), (Rgb{255, 0, 0}));
+  EXPECT_EQ(color(R"({"name":"DefaultMaterial",)" + red, false), (Rgb{255, 0, 0}));
+  EXPECT_EQ(color("", true), (Rgb{255, 255, 255}));
+  EXPECT_EQ(color("", false), (Rgb{255, 255, 255})) << "the format's default";
+  const std::string green =
+      R"({"extensions":{"KHR_materials_pbrSpecularGlossiness":{"diffuseFactor":[0,1,0,1]}}})";
+  EXPECT_EQ(color(green, false), (Rgb{0, 255, 0}));
+  EXPECT_EQ(color(green, true), (Rgb{0, 255, 0}));
 }
 
 std::string Positions(const std::string& count) {

@@ -24,6 +24,27 @@ TEST_F(Volumes, NrrdInItsWays) {
               ElementsAre(1, 2, 3, 4));
   EXPECT_THAT(Read("b.nrrd", head + "encoding: gzip\n\n" + Gzip("\x01\x02\x03\x04")).samples,
               ElementsAre(1, 2, 3, 4));
+  EXPECT_THAT(
+      Read("bs.nrrd", head + "encoding: gzip\nbyte skip: 3\n\n" + Gzip("xyz\x01\x02\x03\x04"))
+          .samples,
+      ElementsAre(1, 2, 3, 4))
+      << "bytes are skipped after decompression";
+  EXPECT_THAT(
+      Read("bl.nrrd", head + "encoding: gzip\nline skip: 1\n\njunk\n" + Gzip("\x01\x02\x03\x04"))
+          .samples,
+      ElementsAre(1, 2, 3, 4))
+      << "lines are skipped before";
+  for (const char* type :
+       {"long long", "long long int", "signed long long", "signed long long int", "longlong",
+        "int64", "unsigned long long", "unsigned long long int", "uint64_t"}) {
+    EXPECT_THAT(Read("t.nrrd", absl::StrCat("NRRD0001\ntype: ", type,
+                                            "\ndimension: 3\nsizes: 1 1 1\nendian: little\n"
+                                            "encoding: raw\n\n") +
+                                   std::string("\x07\0\0\0\0\0\0\0", 8))
+                    .samples,
+                ElementsAre(7))
+        << type;
+  }
   EXPECT_THAT(Read("c.nrrd", head + "encoding: ascii\n\n1 2\n3  4\n").samples,
               ElementsAre(1, 2, 3, 4));
   folder_.Write("d.raw", "junk\nxx\x05\x06\x07\x08");

@@ -81,22 +81,30 @@ Rgb ToRgb(const aiColor4D& c, bool linear) {
 
 // The base colour that a material states itself; none for a texture's place-holder or the
 // importer's own default.
-std::optional<Rgb> BaseColor(const aiMaterial& material, bool linear) {
-  aiString name;
-  material.Get(AI_MATKEY_NAME, name);
-  if (absl::string_view(name.C_Str()) == AI_DEFAULT_MATERIAL_NAME) return std::nullopt;
+std::optional<aiColor4D> BaseColor(const aiMaterial& material, bool linear) {
+  // Of glTF's materials of specular and glossy light only the diffuse colour is the file's; the library makes up the other.
+  float glossiness = 0;
+  const bool glossy = material.Get(AI_MATKEY_GLOSSINESS_FACTOR, glossiness) == aiReturn_SUCCESS;
   aiColor4D color;
-  if (material.Get(AI_MATKEY_BASE_COLOR, color) != aiReturn_SUCCESS &&
+  if ((glossy || material.Get(AI_MATKEY_BASE_COLOR, color) != aiReturn_SUCCESS) &&
       material.Get(AI_MATKEY_COLOR_DIFFUSE, color) != aiReturn_SUCCESS) {
     return std::nullopt;
   }
+  const auto is_grey = [&color](float grey) {
+    return color.r == grey && color.g == grey && color.b == grey;
+  };
   // What the OBJ reader gives to a material that it was told nothing about.
-  if (!linear && color.r == 0.6f && color.g == 0.6f && color.b == 0.6f) return std::nullopt;
-  const Rgb rgb = ToRgb(color, linear);
+  if (!linear && is_grey(0.6f)) return std::nullopt;
+  // The library's own material for meshes without one. A file's may have the same name, but has another colour.
+  aiString name;
+  material.Get(AI_MATKEY_NAME, name);
+  if (is_grey(1) && absl::string_view(name.C_Str()) == AI_DEFAULT_MATERIAL_NAME) {
+    return std::nullopt;
+  }
   const bool textured = material.GetTextureCount(aiTextureType_DIFFUSE) > 0 ||
                         material.GetTextureCount(aiTextureType_BASE_COLOR) > 0;
-  if (textured && rgb == Rgb{255, 255, 255}) return std::nullopt;
-  return rgb;
+  if (textured && is_grey(1)) return std::nullopt;
+  return color;
 }
 
 struct Context {
@@ -227,14 +235,18 @@ absl::Status AddMesh(const aiMesh& mesh, const std::string& node, const NodeMatr
       part.normals.push_back(
           Unit(Map(skin.empty() ? normal_matrix : NormalMatrix(skin[v]), shaped.Normal(v))));
   }
+  std::optional<aiColor4D> base;
+  if (context->has_materials && mesh.mMaterialIndex < context->scene.mNumMaterials) {
+    base = BaseColor(*context->scene.mMaterials[mesh.mMaterialIndex], context->linear);
+  }
   if (mesh.HasVertexColors(0)) {
+    // glTF multiplies them by the material's; in other formats they replace it.
+    const aiColor4D by = context->linear && base ? *base : aiColor4D(1, 1, 1, 1);
     part.colors.reserve(mesh.mNumVertices);
     for (unsigned v = 0; v < mesh.mNumVertices; ++v)
-      part.colors.push_back(ToRgb(mesh.mColors[0][v], context->linear));
-  } else if (context->has_materials && mesh.mMaterialIndex < context->scene.mNumMaterials) {
-    const std::optional<Rgb> color =
-        BaseColor(*context->scene.mMaterials[mesh.mMaterialIndex], context->linear);
-    if (color) part.colors.assign(mesh.mNumVertices, *color);
+      part.colors.push_back(ToRgb(mesh.mColors[0][v] * by, context->linear));
+  } else if (base) {
+    part.colors.assign(mesh.mNumVertices, ToRgb(*base, context->linear));
   }
   if (corners > 1) {
     part.indices.reserve(size_t{corners} * mesh.mNumFaces);

@@ -39,6 +39,8 @@ std::string Plain(absl::string_view text) {
   return plain;
 }
 
+constexpr int64_t kMostSkipped = 1 << 30;  // bytes
+
 std::optional<SampleType> NrrdTypeOf(absl::string_view name) {
   static constexpr std::pair<absl::string_view, SampleType> kNames[] = {
       {"signedchar", SampleType::kI8},
@@ -68,10 +70,14 @@ std::optional<SampleType> NrrdTypeOf(absl::string_view name) {
       {"uint32", SampleType::kU32},
       {"uint32_t", SampleType::kU32},
       {"longlong", SampleType::kI64},
+      {"longlongint", SampleType::kI64},
+      {"signedlonglong", SampleType::kI64},
+      {"signedlonglongint", SampleType::kI64},
       {"int64", SampleType::kI64},
       {"int64_t", SampleType::kI64},
       {"ulonglong", SampleType::kU64},
       {"unsignedlonglong", SampleType::kU64},
+      {"unsignedlonglongint", SampleType::kU64},
       {"uint64", SampleType::kU64},
       {"uint64_t", SampleType::kU64},
       {"float", SampleType::kF32},
@@ -243,24 +249,55 @@ class NrrdReader {
     return WrongField("datafile", read.status().message());
   }
 
-  absl::Status Skip(absl::string_view* data, uint64_t wanted) const {
-    int64_t lines = 0, bytes = 0;
+  absl::Status SkipLines(absl::string_view* data) const {
+    int64_t lines = 0;
     if (!Field("lineskip").empty() && (!absl::SimpleAtoi(Field("lineskip"), &lines) || lines < 0)) {
       return WrongField("lineskip", "a number of lines is expected");
     }
+    for (; lines > 0 && !data->empty(); --lines)
+      data->remove_prefix(std::min(data->find('\n'), data->size() - 1) + 1);
+    return absl::OkStatus();
+  }
+
+  // Returns: the bytes before the samples; -1: all before the last samples.
+  absl::StatusOr<int64_t> ByteSkip() const {
+    int64_t bytes = 0;
     if (!Field("byteskip").empty() &&
         (!absl::SimpleAtoi(Field("byteskip"), &bytes) || bytes < -1)) {
       return WrongField("byteskip", "a number of bytes, or -1, is expected");
     }
-    for (; lines > 0 && !data->empty(); --lines)
-      data->remove_prefix(std::min(data->find('\n'), data->size() - 1) + 1);
-    const uint64_t skipped = bytes >= 0               ? static_cast<uint64_t>(bytes)
+    return bytes;
+  }
+
+  absl::Status Skip(absl::string_view* data, uint64_t wanted) const {
+    const absl::StatusOr<int64_t> bytes = ByteSkip();
+    if (!bytes.ok()) return bytes.status();
+    if (absl::Status status = SkipLines(data); !status.ok()) return status;
+    const uint64_t skipped = *bytes >= 0              ? static_cast<uint64_t>(*bytes)
                              : data->size() >= wanted ? data->size() - wanted
                                                       : 0;
     if (skipped > data->size())
       return WrongField("byteskip", absl::StrCat(data->size(), " are there"));
     data->remove_prefix(skipped);
     return absl::OkStatus();
+  }
+
+  // Lines are skipped before the data are decompressed, bytes after.
+  absl::Status ReadCompressed(absl::string_view data, uint64_t wanted,
+                              SampledVolume* volume) const {
+    const absl::StatusOr<int64_t> bytes = ByteSkip();
+    if (!bytes.ok()) return bytes.status();
+    if (*bytes < 0 || *bytes > kMostSkipped) {
+      return WrongField("byteskip",
+                        absl::StrCat("0 to ", kMostSkipped, " are read where data are compressed"));
+    }
+    if (absl::Status status = SkipLines(&data); !status.ok()) return status;
+    const auto skipped = static_cast<uint64_t>(*bytes);
+    const absl::StatusOr<std::string> all = Inflate(file_, data, skipped + wanted);
+    if (!all.ok()) return all.status();
+    if (skipped > all->size())
+      return WrongField("byteskip", absl::StrCat(all->size(), " are there"));
+    return Take(absl::string_view(*all).substr(skipped), wanted, volume);
   }
 
   // Bytes of three or four, red, green and blue, whatever the axis is called, if it says something of colours.
@@ -276,11 +313,7 @@ class NrrdReader {
     // Of the first volume.
     const uint64_t samples = size_[0] * size_[1] * size_[2] * each_;
     const uint64_t wanted = samples * SampleBytes(code_.type);
-    if (encoding_ == "gzip") {
-      const absl::StatusOr<std::string> all = Inflate(file_, data, wanted);
-      if (!all.ok()) return all.status();
-      return Take(*all, wanted, volume);
-    }
+    if (encoding_ == "gzip") return ReadCompressed(data, wanted, volume);
     if (absl::Status status = Skip(&data, wanted * volumes_); !status.ok()) return status;
     if (encoding_ == "raw") return Take(data, wanted, volume);
     while (out->size() < samples) {
