@@ -67,6 +67,30 @@ std::string Dicom(const std::string& series, double z, uint16_t fill, const std:
          Element(0x7FE0, 0x10, "OW", data);
 }
 
+TEST_F(Volumes, BitsAboveTheStoredOnesAreNoPartOfTheNumbers) {
+  // 2 to 7 below, with bits above: 12 are stored.
+  const std::string shorts = Element(0x28, 0x101, "US", Short(16)) +
+                             Element(0x28, 0x102, "US", Short(15)) +
+                             Element(0x28, 0x103, "US", Short(0));
+  const auto stored = [&](uint16_t fill, uint16_t is_signed) {
+    std::string file = Dicom("1.2", 0, fill);
+    const std::string twelve = Element(0x28, 0x101, "US", Short(12)) +
+                               Element(0x28, 0x102, "US", Short(11)) +
+                               Element(0x28, 0x103, "US", Short(is_signed));
+    file.replace(file.find(shorts), shorts.size(), twelve);
+    return file;
+  };
+  // The numbers are doubled, and 1,000 less.
+  EXPECT_THAT(Read("overlay.dcm", stored(0x8002, 0)).samples,
+              ElementsAre(-996, -994, -992, -990, -988, -986));
+  EXPECT_THAT(Read("signed.dcm", stored(0x0FFC, 1)).samples,
+              ElementsAre(-1008, -1006, -1004, -1002, -1000, -998))
+      << "-4 to 1, without bits above the sign";
+  EXPECT_THAT(Read("extended.dcm", stored(0xFFFC, 1)).samples,
+              ElementsAre(-1008, -1006, -1004, -1002, -1000, -998))
+      << "the same with them";
+}
+
 TEST_F(Volumes, ARealSlice) {
   // Images of Debian without documentation lack it.
   ASSERT_TRUE(std::filesystem::exists(kSlice)) << "libgdcm3.0's example is not installed";
