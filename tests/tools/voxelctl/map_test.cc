@@ -53,6 +53,34 @@ TEST(GeoJson, FlatMap) {
   EXPECT_THAT(model->parts[1].positions, ElementsAre(Point3{-90, 0, 0}, Point3{0, 90, 0}));
 }
 
+TEST(GeoJson, GeometriesWithoutCoordinatesAreCounted) {
+  std::string features = R"({"type":"Feature","geometry":null})";
+  for (const char* type :
+       {"Point", "MultiPoint", "LineString", "MultiLineString", "Polygon", "MultiPolygon"}) {
+    features += std::string(R"(,{"type":"Feature","geometry":{"type":")") + type +
+                R"(","coordinates":[]}})";
+  }
+  const absl::StatusOr<Model> model =
+      ImportText(R"({"type":"FeatureCollection","features":[)" + features +
+                     R"(,{"type":"Feature","geometry":)" + Line("[[0,0],[10,0]]") + "}]}",
+                 false);
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(Segments(model->parts[0]).size(), 1u);
+  EXPECT_NE(model->note.find("not shown, as they have no coordinates: 7"), std::string::npos)
+      << model->note;
+}
+
+TEST(TopoJson, AnArcOfOnePositionIsNotShown) {
+  const absl::StatusOr<Model> model = ImportText(
+      R"({"type":"Topology","objects":{"a":{"type":"MultiLineString","arcs":[[0],[1]]}},)"
+      R"("arcs":[[[0,0],[10,0],[10,10]],[[5,5]]]})",
+      false, "map.topojson");
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(Segments(model->parts[0]).size(), 2u);
+  EXPECT_NE(model->note.find("arcs of one position, which are not shown: 1"), std::string::npos)
+      << model->note;
+}
+
 TEST(GeoJson, ARingThatIsNotClosedIsClosed) {
   const absl::StatusOr<Model> model =
       ImportText(R"({"type":"Polygon","coordinates":[[[0,0],[4,0],[0,4]]]})", false);

@@ -20,7 +20,13 @@ class GeoJsonReader {
   GeoJsonReader(const SourceFile& file, bool globe) : file_(file), lines_(file, globe) {}
 
   absl::Status ReadObject(const json& object, const std::string& where);
-  absl::Status Finish(Model* model) && { return std::move(lines_).Finish("GeoJSON", model); }
+  absl::Status Finish(Model* model) && {
+    if (nowhere_ > 0) {
+      model->note =
+          absl::StrCat(file_.path, ": not shown, as they have no coordinates: ", nowhere_);
+    }
+    return std::move(lines_).Finish("GeoJSON", model);
+  }
 
  private:
   absl::Status Wrong(const std::string& where, absl::string_view expected) const {
@@ -34,6 +40,7 @@ class GeoJsonReader {
 
   const SourceFile& file_;
   MapLines lines_;
+  uint64_t nowhere_ = 0;  // geometries that are null or empty
 };
 
 absl::Status GeoJsonReader::ReadPosition(const json& position, const std::string& where,
@@ -106,14 +113,20 @@ absl::Status GeoJsonReader::ReadObject(const json& object, const std::string& wh
     const auto geometry = object.find("geometry");
     if (geometry == object.end())
       return Wrong(absl::StrCat(where, ".geometry"), "a geometry or null");
-    return geometry->is_null() ? absl::OkStatus()
-                               : ReadObject(*geometry, absl::StrCat(where, ".geometry"));
+    if (!geometry->is_null()) return ReadObject(*geometry, absl::StrCat(where, ".geometry"));
+    ++nowhere_;
+    return absl::OkStatus();
   }
   for (const Shape& shape : kShapes) {
     if (type != shape.type) continue;
     const auto coordinates = object.find("coordinates");
     const std::string at = absl::StrCat(where, ".coordinates");
     if (coordinates == object.end()) return Wrong(at, "an array");
+    // RFC 7946, 3.1: empty coordinates are a null object.
+    if (coordinates->is_array() && coordinates->empty()) {
+      ++nowhere_;
+      return absl::OkStatus();
+    }
     return ReadCoordinates(*coordinates, at, shape.depth, shape.closed, shape.points);
   }
   return FileError(

@@ -39,6 +39,7 @@ class TopoJsonReader {
 
   const SourceFile& file_;
   MapLines lines_;
+  uint64_t collapsed_ = 0;  // arcs of one position
   bool quantized_ = false;  // has a transform, so arcs are deltas
   std::array<double, 2> scale_ = {1, 1}, translate_ = {0, 0};
   std::vector<bool> used_;  // arcs that some object refers to
@@ -139,7 +140,8 @@ absl::Status TopoJsonReader::ReadGeometry(const json& geometry, const std::strin
 }
 
 absl::Status TopoJsonReader::DrawArc(const json& arc, const std::string& where) {
-  if (!arc.is_array() || arc.size() < 2) return Wrong(where, "an array of two or more positions");
+  if (!arc.is_array() || arc.empty()) return Wrong(where, "an array of positions");
+  if (arc.size() == 1) ++collapsed_;  // by simplification; there is nothing to draw
   std::vector<LonLat> line(arc.size());
   std::array<double, 2> at{};
   for (size_t i = 0; i < line.size(); ++i) {
@@ -170,6 +172,10 @@ absl::StatusOr<Model> TopoJsonReader::Read(const json& document) {
     if (!status.ok()) return status;
   }
   Model model;
+  if (collapsed_ > 0) {
+    model.note =
+        absl::StrCat(file_.path, ": arcs of one position, which are not shown: ", collapsed_);
+  }
   status = std::move(lines_).Finish("TopoJSON", &model);
   if (!status.ok()) return status;
   return model;
