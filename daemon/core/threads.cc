@@ -171,10 +171,12 @@ absl::Status Core::Impl::Stop(sync::TimeNs limit) {
   std::set<std::string> left = AwaitEnd(displays, now + limit / 4 * 3);
   store_.Abandon();
   loop_->Close();
+  left.merge(AwaitEnd({"core"}, now + limit));
+  // A large scene that is still being freed is no reason to call the end untimely.
   retired_->Close();
-  left.merge(AwaitEnd({"core", "retired"}, now + limit));
+  const std::set<std::string> freeing = AwaitEnd({"retired"}, now + limit);
   for (NamedThread& t : threads_) {
-    if (left.contains(t.name)) {
+    if (left.contains(t.name) || freeing.contains(t.name)) {
       t.thread.detach();
     } else {
       t.thread.join();
