@@ -40,9 +40,10 @@ absl::StatusOr<std::shared_ptr<Genlock>> Core::Impl::JoinGenlock(const display::
   if (absl::Status status = CheckGenlock(name, display, info); !status.ok()) return status;
   std::shared_ptr<Genlock>& genlock = genlocks_[name];
   if (genlock == nullptr) {
-    genlock = std::make_shared<Genlock>(clock_, [retired = retired_](std::shared_ptr<const void> what) {
-      retired->Post([what = std::move(what)] {});
-    });
+    genlock =
+        std::make_shared<Genlock>(clock_, [retired = retired_](std::shared_ptr<const void> what) {
+          retired->Post([what = std::move(what)] {});
+        });
   }
   return genlock;
 }
