@@ -54,6 +54,15 @@ TEST_F(Volumes, NiftiOfEveryKind) {
   EXPECT_TRUE(std::isnan(two.samples[1])) << "the wire has no infinity";
 }
 
+TEST_F(Volumes, NiftiWithoutAPlaceHasItsSamplesBehindTheHeader) {
+  std::string one = Nifti({3, 2, 2, 1}, 2, "\x01\x02\x03\xff");
+  Put<float>(&one, 108, 0);
+  EXPECT_THAT(Read("a.nii", one).samples, ElementsAre(1, 2, 3, 255));
+  Put<float>(&one, 108, 340);
+  EXPECT_THAT(Error("a.nii", one), HasSubstr("from byte 340 on (vox_offset)"))
+      << "within the header";
+}
+
 // As the standard numbers them: dim at 16, datatype at 12, pixdim at 104, vox_offset at 168.
 std::string Nifti2(const std::vector<int64_t>& dim, int16_t type, const std::string& samples) {
   std::string out(544, '\0');

@@ -26,6 +26,11 @@ absl::StatusOr<nlohmann::json> ParseJson(const SourceFile& file, absl::string_vi
                        absl::StrCat("the JSON ends after ", text.size(), " bytes, unfinished"),
                        "the file is probably truncated");
     }
+    if (error.byte > 0 && nlohmann::json::accept(text.substr(0, error.byte - 1))) {
+      return FileError(file, absl::StrCat("has more after its JSON, from byte ", error.byte, " on"),
+                       "one document is expected; files with a feature a line can be made a "
+                       "FeatureCollection, by ogr2ogr for example");
+    }
     return FileError(file, absl::StrCat("the JSON is malformed at byte ", error.byte),
                      "well-formed JSON is expected");
   } catch (const nlohmann::json::exception& error) {
