@@ -33,6 +33,7 @@ class Core::Impl {
   // ---- any thread
   const CoreOptions& options() const { return options_; }
   Loop& loop() { return *loop_; }
+  // Drops a reference on the thread of retired_.
   void Retire(std::shared_ptr<const void> what);
   SceneWatch& scene_watch() { return scene_watch_; }
   const std::shared_ptr<Budget>& budget() const { return budget_; }
@@ -279,8 +280,8 @@ class Core::Impl {
   sync::Clock& clock_;
   const sync::TimeNs started_ns_;
   const std::shared_ptr<Loop> loop_;
-  // What is done with is freed by the thread of this loop, as freeing a large scene takes longer than any other thread may be
-  // busy. Without threads it is loop_.
+  // The thread of this loop frees replaced scenes and spent operations. For a large scene that takes up to a second, which no other
+  // thread can spare. Without threads it is loop_.
   const std::shared_ptr<Loop> retired_;
   SceneStore store_;
   SnapshotPtr published_;

@@ -172,7 +172,7 @@ absl::Status Core::Impl::Stop(sync::TimeNs limit) {
   store_.Abandon();
   loop_->Close();
   left.merge(AwaitEnd({"core"}, now + limit));
-  // A large scene that is still being freed is no reason to call the end untimely.
+  // Stop succeeds even if a large scene is still being freed.
   retired_->Close();
   const std::set<std::string> freeing = AwaitEnd({"retired"}, now + limit);
   for (NamedThread& t : threads_) {

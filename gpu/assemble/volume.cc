@@ -29,7 +29,7 @@ constexpr size_t kKeptEntries = 4096;    // of a list of drawables whose entries
 constexpr size_t kKeptInTile = 64;       // the same, of the list of a tile
 constexpr size_t kMovedRun = 16;  // tiles that a worker draws one behind the other where more are
 
-// Of a list that was long once and is short now.
+// Releases the unused capacity of a list that has become much shorter.
 template <typename T>
 void GiveBack(std::vector<T>& list, size_t kept) {
   if (list.capacity() > kept && list.size() < list.capacity() / 8) list.shrink_to_fit();

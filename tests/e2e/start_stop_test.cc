@@ -395,7 +395,7 @@ TEST_P(StopUnderLoad, EndsInTimeAndWell) {
       });
     }
     for (uint64_t k = 0; k < streams; ++k) load.emplace_back(commit_on);
-    // A stream that the signal overtakes while it opens is not what is tested here.
+    // The signal must not come while a stream is being opened.
     while (opened < streams) std::this_thread::yield();
     // At another moment of the load each time.
     while (!load.empty() && work < 20 + 37 * static_cast<uint64_t>(i)) std::this_thread::yield();

@@ -76,15 +76,19 @@ class Daemon:
         found = re.search(rf"{what}:\s+(\d+)", status)
         return int(found[1]) / 1024 if found else 0.0
 
+    def left_mib(self) -> float:
+        """Returns: resident memory LEFT_FOR seconds after the owners have left. The time is part of what is measured."""
+        time.sleep(LEFT_FOR)
+        return self.memory_mib()
+
     def idle_mib(self) -> float:
-        """After an owner with a small moving scene has left: by then the display's own buffers exist, which are nobody's scene."""
+        """Returns: resident memory after an owner with a small moving scene has left. Then the display has its own buffers."""
         with self.connect("first") as v:
             for step in range(100):
                 v.box("all", size=2 - 0.01 * step)
                 commit = v.commit()
             commit.wait_shown(PATIENCE)
-        time.sleep(LEFT_FOR)
-        return self.memory_mib()
+        return self.left_mib()
 
     def connect(self, name: str, issues: list[str] | None = None) -> voxel.Connection:
         seen: list[str] = [] if issues is None else issues
@@ -151,9 +155,8 @@ def ports(repetitions: int, limit: int) -> dict[str, list[float]]:
 
 
 def after(daemon: Daemon, idle: float) -> dict[str, list[float]]:
-    time.sleep(LEFT_FOR)  # the time is what is measured: how much is held when it is over
     return {"resident at its peak, MiB": [daemon.memory_mib("VmHWM")], "idle before, MiB": [idle],
-            f"resident {LEFT_FOR:.0f} s after the owner left, MiB": [daemon.memory_mib()]}
+            f"resident {LEFT_FOR:.0f} s after the owner left, MiB": [daemon.left_mib()]}
 
 
 def instances(_: int, limit: int) -> dict[str, list[float]]:

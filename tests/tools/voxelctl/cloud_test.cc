@@ -114,7 +114,7 @@ TEST_F(Clouds, TextWhoseCommentNamesTheColumns) {
 TEST_F(Clouds, MoleculesInXyzFilesAreToldApart) {
   for (const char* comment : {"water", "", "1 2 3"}) {
     EXPECT_THAT(Error("a.xyz", absl::StrCat("2\n", comment, "\nO 0 0 0.1\r\nH 0 0.7 -0.4\n")),
-                HasSubstr("is a molecule in chemistry's XYZ format"))
+                HasSubstr("is a molecule (chemistry's XYZ format)"))
         << comment;
   }
 }
@@ -177,10 +177,11 @@ TEST_F(Clouds, PcdInItsThreeWays) {
   EXPECT_EQ(compressed.colors, colors);
 }
 
-std::string AsciiPcd(const std::string& fields, const std::string& types, size_t count,
+// Two points whose fields have 4 bytes each.
+std::string AsciiPcd(const std::string& fields, const std::string& types,
                      const std::string& points) {
   std::string sizes, counts;
-  for (size_t i = 0; i < count; ++i) {
+  for (size_t i = 0; i < types.size(); i += 2) {
     sizes += " 4";
     counts += " 1";
   }
@@ -189,38 +190,31 @@ std::string AsciiPcd(const std::string& fields, const std::string& types, size_t
 }
 
 TEST_F(Clouds, PcdPackedColoursWhateverTheirTypeSays) {
+  const auto colors = [&](const std::string& type, const std::string& first,
+                          const std::string& second) {
+    return Points("a.pcd", AsciiPcd("x y z rgba", "F F F " + type,
+                                    absl::StrCat("0 0 0 ", first, "\n1 0 0 ", second, "\n")))
+        .colors;
+  };
   const auto two = ElementsAre(Rgb{255, 0, 0}, Rgb{0, 128, 255});
-  EXPECT_THAT(
-      Points("a.pcd", AsciiPcd("x y z rgb", "F F F I", 4, "0 0 0 -65536\n1 0 0 -16744193\n"))
-          .colors,
-      two);
-  EXPECT_THAT(
-      Points("a.pcd", AsciiPcd("x y z rgba", "F F F U", 4, "0 0 0 4294901760\n1 0 0 4278223103\n"))
-          .colors,
-      two);
-  EXPECT_THAT(
-      Points("a.pcd", AsciiPcd("x y z rgb", "F F F U", 4, "0 0 0 16711680\n1 0 0 33023\n")).colors,
-      two);
-  EXPECT_THAT(
-      Points("a.pcd", AsciiPcd("x y z rgb", "F F F F", 4, "0 0 0 nan\n1 0 0 2.3418052e-38\n"))
-          .colors,
-      ElementsAre(Rgb{255, 255, 255}, Rgb{255, 0, 0}))
+  EXPECT_THAT(colors("I", "-65536", "-16744193"), two);
+  EXPECT_THAT(colors("U", "4294901760", "4278223103"), two);
+  EXPECT_THAT(colors("U", "16711680", "33023"), two);
+  EXPECT_THAT(colors("F", "nan", "2.3418052e-38"), ElementsAre(Rgb{255, 255, 255}, Rgb{255, 0, 0}))
       << "\"nan\" does not say which";
 }
 
 TEST_F(Clouds, PcdColoursByTheirGreatestValue) {
-  EXPECT_THAT(
-      Points("a.pcd", AsciiPcd("x y z r g b", "F F F F F F", 6, "0 0 0 255 128 0\n1 0 0 0 64 1\n"))
-          .colors,
-      ElementsAre(Rgb{255, 128, 0}, Rgb{0, 64, 1}));
-  EXPECT_THAT(
-      Points("a.pcd", AsciiPcd("x y z r g b", "F F F F F F", 6, "0 0 0 1 0.5 0\n1 0 0 0 0.25 1\n"))
-          .colors,
-      ElementsAre(Rgb{255, 128, 0}, Rgb{0, 64, 255}));
-  EXPECT_THAT(
-      Points("a.pcd", AsciiPcd("x y z r g b", "F F F U U U", 6, "0 0 0 1 0 0\n1 0 0 0 1 1\n"))
-          .colors,
-      ElementsAre(Rgb{1, 0, 0}, Rgb{0, 1, 1}))
+  const auto colors = [&](const std::string& types, const std::string& first,
+                          const std::string& second) {
+    return Points("a.pcd", AsciiPcd("x y z r g b", "F F F " + types,
+                                    absl::StrCat("0 0 0 ", first, "\n1 0 0 ", second, "\n")))
+        .colors;
+  };
+  EXPECT_THAT(colors("F F F", "255 128 0", "0 64 1"), ElementsAre(Rgb{255, 128, 0}, Rgb{0, 64, 1}));
+  EXPECT_THAT(colors("F F F", "1 0.5 0", "0 0.25 1"),
+              ElementsAre(Rgb{255, 128, 0}, Rgb{0, 64, 255}));
+  EXPECT_THAT(colors("U U U", "1 0 0", "0 1 1"), ElementsAre(Rgb{1, 0, 0}, Rgb{0, 1, 1}))
       << "whole numbers count to 255";
 }
 

@@ -66,7 +66,7 @@ TEST(GeoJson, GeometriesWithoutCoordinatesAreCounted) {
                  false);
   ASSERT_THAT(model, IsOk());
   EXPECT_EQ(Segments(model->parts[0]).size(), 1u);
-  EXPECT_NE(model->note.find("not shown, as they have no coordinates: 7"), std::string::npos)
+  EXPECT_NE(model->note.find("geometries without coordinates, not shown: 7"), std::string::npos)
       << model->note;
 }
 
@@ -77,7 +77,7 @@ TEST(TopoJson, AnArcOfOnePositionIsNotShown) {
       false, "map.topojson");
   ASSERT_THAT(model, IsOk());
   EXPECT_EQ(Segments(model->parts[0]).size(), 2u);
-  EXPECT_NE(model->note.find("arcs of one position, which are not shown: 1"), std::string::npos)
+  EXPECT_NE(model->note.find("arcs of one position, not shown: 1"), std::string::npos)
       << model->note;
 }
 
@@ -230,7 +230,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadMap{"two_documents",
                "{\"type\":\"Point\",\"coordinates\":[0,0]}\n{\"type\":\"Point\",\"coordinates\":[1,"
                "0]}\n",
-               {"more after its JSON, from byte 38", "FeatureCollection"}},
+               {"has a second JSON document at byte 38", "FeatureCollection"}},
         BadMap{"malformed", R"({"type":"Point" "coordinates":[0,0]})", {"malformed at byte"}},
         BadMap{"deep",
                std::string(100000, '[') + std::string(100000, ']'),

@@ -255,7 +255,7 @@ std::string Gltf(const std::string& accessors, const std::string& nodes = R"([{"
          accessors + extra + "}";
 }
 
-// A triangle with a material, as given, and white vertices if so wished.
+// A triangle with a material (empty: none), and with white vertex colours or none.
 std::string ColoredGltf(const std::string& material, bool white_vertices) {
   std::string bytes;
   for (const float value : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f}) {
@@ -287,6 +287,7 @@ TEST(MeshColours, OfGltfAreMultiplied) {
   EXPECT_EQ(color("{" + red, true), (Rgb{255, 0, 0}));
   EXPECT_EQ(color("{" + red, false), (Rgb{255, 0, 0}));
   EXPECT_EQ(color(R"({"name":"DefaultMaterial",)" + red, false), (Rgb{255, 0, 0}));
+  EXPECT_EQ(color(R"({"name":"DefaultMaterial"})", false), (Rgb{255, 255, 255}));
   EXPECT_EQ(color("", true), (Rgb{255, 255, 255}));
   EXPECT_EQ(color("", false), (Rgb{255, 255, 255})) << "the format's default";
   const std::string green =

@@ -197,6 +197,7 @@ TEST_F(VoxFiles, HiddenLayersAreNotShown) {
   ASSERT_THAT(model, IsOk());
   EXPECT_EQ(model->parts.at(0).positions.size(), 6u * 4);
   EXPECT_THAT(model->note, HasSubstr("not shown: hidden nodes: 1"));
+  EXPECT_EQ(Read(models + nodes + layer(-1, "1")).positions.size(), 16u * 4) << "no layer";
   EXPECT_EQ(Read(models + nodes + layer(0, "0") + layer(1, "0")).positions.size(), 16u * 4);
 }
 

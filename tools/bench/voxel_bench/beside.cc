@@ -20,7 +20,7 @@ constexpr int kEntitiesAMessage = 10'000;
 constexpr int kLineVariants = 4;  // of the line
 constexpr sync::TimeNs kQuietLimit = 120 * sync::kSecond;
 
-// The large scene is dim and the line is in front of it: otherwise the line would change nothing where the scene has light.
+// The large scene is dim and the line is in front of it, so that the line always changes the volume.
 v1::StreamRequest LayerOf(const std::string& name, int order, uint32_t opacity) {
   v1::StreamRequest request;
   v1::LayerState* state = request.mutable_layer_state();

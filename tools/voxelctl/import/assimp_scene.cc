@@ -82,9 +82,10 @@ Rgb ToRgb(const aiColor4D& c, bool linear) {
 // The base colour that a material states itself; none for a texture's place-holder or the
 // importer's own default.
 std::optional<aiColor4D> BaseColor(const aiMaterial& material, bool linear) {
-  // Of glTF's materials of specular and glossy light only the diffuse colour is the file's; the library makes up the other.
+  // A glTF material with KHR_materials_pbrSpecularGlossiness has a diffuse colour; its base colour is the library's default.
   float glossiness = 0;
-  const bool glossy = material.Get(AI_MATKEY_GLOSSINESS_FACTOR, glossiness) == aiReturn_SUCCESS;
+  const bool glossy =
+      linear && material.Get(AI_MATKEY_GLOSSINESS_FACTOR, glossiness) == aiReturn_SUCCESS;
   aiColor4D color;
   if ((glossy || material.Get(AI_MATKEY_BASE_COLOR, color) != aiReturn_SUCCESS) &&
       material.Get(AI_MATKEY_COLOR_DIFFUSE, color) != aiReturn_SUCCESS) {
@@ -95,10 +96,11 @@ std::optional<aiColor4D> BaseColor(const aiMaterial& material, bool linear) {
   };
   // What the OBJ reader gives to a material that it was told nothing about.
   if (!linear && is_grey(0.6f)) return std::nullopt;
-  // The library's own material for meshes without one. A file's may have the same name, but has another colour.
+  // The library's own material for meshes without one. A material of the file may have its name but not its colour. In glTF both
+  // are white.
   aiString name;
   material.Get(AI_MATKEY_NAME, name);
-  if (is_grey(1) && absl::string_view(name.C_Str()) == AI_DEFAULT_MATERIAL_NAME) {
+  if (!linear && is_grey(1) && absl::string_view(name.C_Str()) == AI_DEFAULT_MATERIAL_NAME) {
     return std::nullopt;
   }
   const bool textured = material.GetTextureCount(aiTextureType_DIFFUSE) > 0 ||
@@ -240,7 +242,7 @@ absl::Status AddMesh(const aiMesh& mesh, const std::string& node, const NodeMatr
     base = BaseColor(*context->scene.mMaterials[mesh.mMaterialIndex], context->linear);
   }
   if (mesh.HasVertexColors(0)) {
-    // glTF multiplies them by the material's; in other formats they replace it.
+    // In glTF the material's colour is a factor of them; in other formats they replace it.
     const aiColor4D by = context->linear && base ? *base : aiColor4D(1, 1, 1, 1);
     part.colors.reserve(mesh.mNumVertices);
     for (unsigned v = 0; v < mesh.mNumVertices; ++v)

@@ -166,24 +166,6 @@ absl::StatusOr<std::string> Decompress(const SourceFile& file, const DicomFacts&
        .big_endian = false});
 }
 
-// The numbers without the bits above the stored ones, which may hold anything, such as an overlay; the highest stored bit of
-// signed numbers is their sign.
-std::string StoredBits(absl::string_view bytes, const DicomFacts& facts, bool big_endian) {
-  const size_t each = facts.bits_allocated / 8u;
-  const uint32_t mask = (uint32_t{1} << facts.bits_stored) - 1,
-                 sign = facts.is_signed ? uint32_t{1} << (facts.bits_stored - 1) : 0;
-  std::string out(bytes);
-  for (size_t at = 0; at + each <= out.size(); at += each) {
-    const auto byte = [&](size_t i) -> char& { return out[at + (big_endian ? each - 1 - i : i)]; };
-    uint32_t value = 0;
-    for (size_t i = 0; i < each; ++i) value |= uint32_t{static_cast<uint8_t>(byte(i))} << 8 * i;
-    value &= mask;
-    if ((value & sign) != 0) value |= ~mask;
-    for (size_t i = 0; i < each; ++i) byte(i) = static_cast<char>(value >> 8 * i);
-  }
-  return out;
-}
-
 // Three bytes a pixel of places in a palette.
 std::string FromPalette(const SourceFile& file, const DicomFacts& facts,
                         const std::vector<float>& places) {
@@ -227,7 +209,9 @@ absl::Status Decode(const SourceFile& file, const DicomFacts& facts, SampledVolu
     DecodeBits(whole.substr(facts.pixels[0].first), pixels, &volume->samples);
     return absl::OkStatus();
   }
-  SampleCode code{.type = TypeOf(facts), .big_endian = facts.big_endian && !facts.compressed};
+  SampleCode code{.type = TypeOf(facts),
+                  .big_endian = facts.big_endian && !facts.compressed,
+                  .spare_bits = facts.bits_allocated - facts.bits_stored};
   std::string decoded;
   absl::string_view bytes = whole.substr(facts.compressed ? 0 : facts.pixels[0].first);
   if (facts.compressed) {
@@ -249,10 +233,6 @@ absl::Status Decode(const SourceFile& file, const DicomFacts& facts, SampledVolu
     return absl::OkStatus();
   }
   bytes = bytes.substr(0, pixels * SampleBytes(code.type));
-  if (facts.bits_stored < facts.bits_allocated) {
-    decoded = StoredBits(bytes, facts, code.big_endian);
-    bytes = decoded;
-  }
   if (!IsGrey(facts)) {
     std::vector<float> places;
     DecodeSamples(bytes, code, &places);

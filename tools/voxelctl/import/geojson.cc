@@ -23,7 +23,7 @@ class GeoJsonReader {
   absl::Status Finish(Model* model) && {
     if (nowhere_ > 0) {
       model->note =
-          absl::StrCat(file_.path, ": not shown, as they have no coordinates: ", nowhere_);
+          absl::StrCat(file_.path, ": geometries without coordinates, not shown: ", nowhere_);
     }
     return std::move(lines_).Finish("GeoJSON", model);
   }
@@ -122,7 +122,7 @@ absl::Status GeoJsonReader::ReadObject(const json& object, const std::string& wh
     const auto coordinates = object.find("coordinates");
     const std::string at = absl::StrCat(where, ".coordinates");
     if (coordinates == object.end()) return Wrong(at, "an array");
-    // RFC 7946, 3.1: empty coordinates are a null object.
+    // RFC 7946, 3.1: an empty array means the same as null.
     if (coordinates->is_array() && coordinates->empty()) {
       ++nowhere_;
       return absl::OkStatus();

@@ -27,9 +27,9 @@ absl::StatusOr<nlohmann::json> ParseJson(const SourceFile& file, absl::string_vi
                        "the file is probably truncated");
     }
     if (error.byte > 0 && nlohmann::json::accept(text.substr(0, error.byte - 1))) {
-      return FileError(file, absl::StrCat("has more after its JSON, from byte ", error.byte, " on"),
-                       "one document is expected; files with a feature a line can be made a "
-                       "FeatureCollection, by ogr2ogr for example");
+      return FileError(file, absl::StrCat("has a second JSON document at byte ", error.byte),
+                       "one document is expected; ogr2ogr converts files with one feature on each "
+                       "line to a FeatureCollection");
     }
     return FileError(file, absl::StrCat("the JSON is malformed at byte ", error.byte),
                      "well-formed JSON is expected");

@@ -250,7 +250,7 @@ class NiftiReader {
       code_.intercept = head_.intercept;
     }
     const double least = head_.apart ? 0 : static_cast<double>(is_second_ ? kHeader2 : kHeader1);
-    // Some programs write 0 for the place right behind the header and its four bytes for extensions.
+    // Some programs write 0 if the samples follow the header and its four bytes for extensions.
     if (head_.vox_offset == 0 && !head_.apart) {
       from_ = static_cast<uint64_t>(least) + 4;
       return absl::OkStatus();

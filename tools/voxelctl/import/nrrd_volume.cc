@@ -259,7 +259,7 @@ class NrrdReader {
     return absl::OkStatus();
   }
 
-  // Returns: the bytes before the samples; -1: all before the last samples.
+  // Returns: how many bytes precede the samples; -1: the samples are at the end.
   absl::StatusOr<int64_t> ByteSkip() const {
     int64_t bytes = 0;
     if (!Field("byteskip").empty() &&

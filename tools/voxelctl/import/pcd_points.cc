@@ -300,7 +300,7 @@ absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file) {
   const absl::StatusOr<PcdHeader> header = ReadPcdHeader(file);
   if (!header.ok()) return header.status();
   std::array<bool, kPointColumns> has = {};
-  bool floats = false;  // colours of which only the data say how bright they can be
+  bool floats = false;  // colours whose scale depends on their greatest value
   for (const Field& field : header->fields) {
     if (IsPacked(field)) {
       for (const PointColumn c : {PointColumn::kRed, PointColumn::kGreen, PointColumn::kBlue}) {

@@ -127,7 +127,7 @@ class PdbReader {
   }
 
   absl::Status ReadAtom(absl::string_view line) {
-    // Of alternate locations each residue has those of one letter, the first.
+    // All atoms of a residue are taken from its first alternate location.
     const absl::string_view location = ColumnsOf(line, 17, 17);
     if (!location.empty() && location != " ") {
       const auto chosen =

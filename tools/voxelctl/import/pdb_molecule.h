@@ -10,7 +10,7 @@ namespace voxeld::voxelctl {
 // Small balls with bonds between them, or balls as large as atoms are.
 enum class MoleculeStyle : uint8_t { kBalls, kSpace };
 
-// The atoms of the first model, of alternate locations the first, in the colours of their elements, as thick points; bonds, which
+// The atoms of the first model, of each residue the first alternate location, in the colours of their elements, as thick points; bonds, which
 // CONECT names or which are as long as two covalent radii, as thick segments, each half in its atom's colour. InvalidArgument with
 // the line's number.
 absl::StatusOr<Model> ReadPdbMolecule(const SourceFile& file, MoleculeStyle style);

@@ -36,7 +36,7 @@ using PointRow = std::array<double, kPointColumns>;
 // "i", "intensity", … Nothing: another column.
 std::optional<PointColumn> PointColumnOf(absl::string_view name);
 
-// The value of a colour's channel that is as bright as can be, by the greatest in the file: 1, 255 or 65,535.
+// Returns: the channel value of full brightness (1, 255 or 65,535), given the greatest in the file.
 double FullScaleOf(double greatest);
 bool IsColor(PointColumn column);
 

@@ -215,8 +215,8 @@ Columns ByNames(const Words& words) {
   return columns;
 }
 
-// The columns that a comment before the points names, as CloudCompare writes it. Empty: it names no x, y and z, or another number
-// of columns.
+// Returns: the columns that a comment names, as CloudCompare writes it. Empty if it does not name x, y, z and as many columns as the
+// points have.
 Columns ByComment(absl::string_view comment, char mark, size_t count) {
   for (const char at : {mark, ' '}) {
     Columns columns = ByNames(SplitAt(comment, at));
@@ -231,7 +231,7 @@ Columns ByComment(absl::string_view comment, char mark, size_t count) {
   return {};
 }
 
-// The other format that has the name .xyz: the number of atoms, a comment that may be empty, and an element and its place a line.
+// Returns true for chemistry's XYZ format: the number of atoms, a comment, then an element and its coordinates on each line.
 bool IsMolecule(absl::string_view text) {
   const std::vector<absl::string_view> lines = absl::StrSplit(text, absl::MaxSplits('\n', 3));
   if (lines.size() < 3) return false;
@@ -248,8 +248,8 @@ bool IsMolecule(absl::string_view text) {
 absl::StatusOr<Columns> ReadHead(const SourceFile& file, char mark, Lines* lines,
                                  absl::string_view* first) {
   if (IsMolecule(file.bytes)) {
-    return FileError(file, "is a molecule in chemistry's XYZ format, of elements and their places",
-                     "a .xyz file of points is expected, or the molecule as .pdb");
+    return FileError(file, "is a molecule (chemistry's XYZ format)",
+                     "a .xyz file of points, or a molecule as .pdb, is expected");
   }
   if (!lines->Next(first))
     return FileError(file, "holds no line of numbers", "x y z a line is expected");
@@ -289,7 +289,7 @@ absl::StatusOr<Model> ReadTextPoints(const SourceFile& file) {
   absl::StatusOr<PointTable> table =
       PointTable::Make(file, has, FullScale(file.bytes, mark, *columns));
   if (!table.ok()) return table.status();
-  bool points = false, commas = false;  // decimal ones that were seen
+  bool has_points = false, has_commas = false;  // decimal points and decimal commas
   do {
     const auto words = WordsOf(line, mark, columns->size());
     PointRow row = {};
@@ -306,9 +306,9 @@ absl::StatusOr<Model> ReadTextPoints(const SourceFile& file) {
                          " in column ", c + 1),
             "a number is expected");
       }
-      points |= words[c].find('.') != absl::string_view::npos;
-      commas |= words[c].find(',') != absl::string_view::npos;
-      if (points && commas) {
+      has_points |= words[c].find('.') != absl::string_view::npos;
+      has_commas |= words[c].find(',') != absl::string_view::npos;
+      if (has_points && has_commas) {
         return FileError(file,
                          absl::StrCat("line ", lines.number(), " has \"",
                                       EscapeForTerminal(words[c].substr(0, 24)), "\" in column ",

@@ -141,7 +141,7 @@ absl::Status TopoJsonReader::ReadGeometry(const json& geometry, const std::strin
 
 absl::Status TopoJsonReader::DrawArc(const json& arc, const std::string& where) {
   if (!arc.is_array() || arc.empty()) return Wrong(where, "an array of positions");
-  if (arc.size() == 1) ++collapsed_;  // by simplification; there is nothing to draw
+  if (arc.size() == 1) ++collapsed_;  // Simplification leaves such arcs.
   std::vector<LonLat> line(arc.size());
   std::array<double, 2> at{};
   for (size_t i = 0; i < line.size(); ++i) {
@@ -173,8 +173,7 @@ absl::StatusOr<Model> TopoJsonReader::Read(const json& document) {
   }
   Model model;
   if (collapsed_ > 0) {
-    model.note =
-        absl::StrCat(file_.path, ": arcs of one position, which are not shown: ", collapsed_);
+    model.note = absl::StrCat(file_.path, ": arcs of one position, not shown: ", collapsed_);
   }
   status = std::move(lines_).Finish("TopoJSON", &model);
   if (!status.ok()) return status;

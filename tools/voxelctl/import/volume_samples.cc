@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <type_traits>
 
 #include "absl/strings/str_cat.h"
 
@@ -26,6 +27,12 @@ void Decode(absl::string_view bytes, const SampleCode& code, std::vector<float>*
     if (code.big_endian) std::reverse(raw, raw + sizeof(T));
     T value;
     std::memcpy(&value, raw, sizeof(T));
+    if constexpr (std::is_integral_v<T>) {
+      // Shifting right copies the sign bit if T is signed.
+      value = static_cast<T>(
+          static_cast<T>(static_cast<std::make_unsigned_t<T>>(value) << code.spare_bits) >>
+          code.spare_bits);
+    }
     const auto number =
         static_cast<float>(static_cast<double>(value) * code.slope + code.intercept);
     out->push_back(std::isfinite(number) ? number : std::numeric_limits<float>::quiet_NaN());

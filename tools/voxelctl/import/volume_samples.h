@@ -25,6 +25,8 @@ absl::Status CheckVolumeSize(const SourceFile& file, const std::array<uint64_t, 
 struct SampleCode {
   SampleType type = SampleType::kU8;
   bool big_endian = false;
+  // High bits of an integer that are no part of the number, such as a DICOM overlay. Less than all of its bits.
+  int spare_bits = 0;
   double slope = 1, intercept = 0;  // a number is `intercept` and `slope` times what is stored
 };
 

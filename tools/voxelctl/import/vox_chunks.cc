@@ -98,7 +98,7 @@ bool ReadMove(const std::string& text, std::array<int32_t, 3>* out) {
   return true;
 }
 
-// The frame that a key is for: 0 where none is given.
+// Returns: the frame of a key frame; 0 if it names none.
 int32_t FrameOf(const std::map<std::string, std::string>& attributes) {
   int32_t frame = 0;
   const auto at = attributes.find("_f");
@@ -168,7 +168,7 @@ class VoxReader {
       status = TakeNode(id, &bytes);
     } else if (id == "LAYR") {
       const int32_t layer = bytes.Int();
-      if (IsHidden(bytes.Dictionary())) scene_.hidden_layers.insert(layer);
+      if (IsHidden(bytes.Dictionary()) && layer >= 0) scene_.hidden_layers.insert(layer);
     }
     if (status.ok() && !bytes.ok()) return CutOff(Named(id));
     return status;
@@ -256,7 +256,7 @@ class VoxReader {
           node.children.push_back(child);
           continue;
         }
-        // A shape has several models only where it is animated: one for each key frame.
+        // An animated shape has a model for each key frame.
         const int32_t frame = FrameOf(bytes->Dictionary());
         if (i > 0) ++scene_.later_frames;
         if (i > 0 && frame >= first) continue;

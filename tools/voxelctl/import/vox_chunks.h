@@ -44,8 +44,7 @@ struct VoxScene {
   std::array<Rgb, 256> palette = {};  // by a voxel's colour; 0 is none
   std::map<int32_t, VoxNode> nodes;   // 0 is the root; empty: there are none
   std::set<int32_t> hidden_layers;
-  uint64_t later_frames =
-      0;  // models and places of key frames after the first, which are not in `nodes`
+  uint64_t later_frames = 0;  // key frames after the first of each node, which are left out
 };
 
 absl::StatusOr<VoxScene> ReadVoxChunks(const SourceFile& file);
