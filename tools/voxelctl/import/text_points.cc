@@ -60,30 +60,32 @@ class Lines {
 
 using Words = std::vector<absl::string_view>;
 
-// With a decimal point or a decimal comma.
-std::optional<double> Number(absl::string_view word) {
-  if (absl::StartsWith(word, "+")) word.remove_prefix(1);
-  std::string with_point;
-  if (const size_t comma = word.find(','); comma != absl::string_view::npos) {
-    if (word.find('.') != absl::string_view::npos) return std::nullopt;
-    with_point = std::string(word);
-    with_point[comma] = '.';
-    word = with_point;
-  }
+std::optional<double> PlainNumber(absl::string_view word) {
   double value = 0;
   const auto result = std::from_chars(word.data(), word.data() + word.size(), value);
   if (result.ec != std::errc() || result.ptr != word.data() + word.size()) return std::nullopt;
   return value;
 }
 
+// With a decimal point or a decimal comma.
+std::optional<double> Number(absl::string_view word) {
+  if (absl::StartsWith(word, "+")) word.remove_prefix(1);
+  const std::optional<double> plain = PlainNumber(word);
+  const size_t comma = word.find(',');
+  if (plain || comma == absl::string_view::npos || absl::StrContains(word, '.')) return plain;
+  std::string with_point(word);
+  with_point[comma] = '.';
+  return PlainNumber(with_point);
+}
+
 // Parts words at a mark, between two of which there may be nothing, or at blanks (' '). A word in quotation marks may contain the mark.
 Words SplitAt(absl::string_view line, char mark) {
   Words words;
-  const absl::string_view marks =
-      mark == ' ' ? absl::string_view(" \t") : absl::string_view(&mark, 1);
+  words.reserve(9);
   while (words.size() < kMostColumns) {
-    const absl::string_view blanks = mark == '\t' ? " " : " \t";
-    line.remove_prefix(std::min(line.find_first_not_of(blanks), line.size()));
+    while (!line.empty() && (line[0] == ' ' || (line[0] == '\t' && mark != '\t'))) {
+      line.remove_prefix(1);
+    }
     if (mark == ' ' && line.empty()) break;
     size_t from = 0;
     absl::string_view word;
@@ -94,7 +96,7 @@ Words SplitAt(absl::string_view line, char mark) {
       word = line.substr(1, close - 1);
       from = close + 1;
     }
-    const size_t end = line.find_first_of(marks, from);
+    const size_t end = mark == ' ' ? line.find_first_of(" \t", from) : line.find(mark, from);
     if (!quoted) word = line.substr(0, end);
     words.push_back(absl::StripAsciiWhitespace(word));
     if (end == absl::string_view::npos) break;
