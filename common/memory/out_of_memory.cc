@@ -22,6 +22,9 @@ namespace {
   _exit(1);
 }
 
+// The constructors of global objects and of generated messages allocate too. 101 is the first priority that programs may use.
+[[gnu::constructor(101)]] void ExitFromTheStart() { ExitWhenOutOfMemory(); }
+
 }  // namespace
 
 void ExitWhenOutOfMemory() { std::set_new_handler(&Exit); }

@@ -11,6 +11,9 @@
 namespace voxeld {
 namespace {
 
+// Set when the handler was already installed while this program's global objects were constructed.
+const bool kInstalledAtStart = std::get_new_handler() != nullptr;
+
 constexpr char kLine[] = "^common_memory_test: out of memory, exiting; .*max_memory_bytes\n$";
 
 // Allocates until the limit of the address space is reached.
@@ -41,6 +44,8 @@ TEST(OutOfMemoryDeathTest, AlsoWhereAnExceptionWouldBeCaught) {
 TEST(OutOfMemoryDeathTest, AlsoInAnotherThread) {
   EXPECT_EXIT(std::thread(AllocateAll).join(), ::testing::ExitedWithCode(1), kLine);
 }
+
+TEST(OutOfMemory, IsInstalledBeforeGlobalObjectsAreConstructed) { EXPECT_TRUE(kInstalledAtStart); }
 
 }  // namespace
 }  // namespace voxeld
