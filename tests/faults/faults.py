@@ -174,7 +174,9 @@ class Memory(Fault):
 
     def run(self, cell: Cell) -> None:
         size = int(re.search(r"VmSize:\s+(\d+)", Path(f"/proc/{cell.daemon.pid}/status").read_text(encoding="ascii"))[1]) * 1024  # type: ignore[index]
-        subprocess.run(["prlimit", "--pid", str(cell.daemon.pid), f"--as={size + (8 << 20)}:unlimited"], check=True)
+        # Less than a segment of arrays (32 MiB), and enough for the stacks (8 MiB) of the threads that gRPC starts: gRPC does not notice
+        # that a thread was refused, and leaves that thread's work undone. Who is told of such a daemon is the service manager's watchdog.
+        subprocess.run(["prlimit", "--pid", str(cell.daemon.pid), f"--as={size + (28 << 20)}:unlimited"], check=True)
         with contextlib.suppress(voxel.VoxelError, TimeoutError):
             with voxel.connect(cell.server, name="large", timeout=5, on_issue=self.refuse) as v:
                 v.points("large", np.zeros((3_000_000, 3), np.float32))
