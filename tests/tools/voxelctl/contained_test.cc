@@ -46,7 +46,15 @@ TEST(Contained, ModelsComeBackAsTheyWere) {
                          .normals = {{0, 0, 1}, {0, 1, 0}},
                          .colors = {{1, 2, 3}, {4, 5, 6}},
                          .indices = {0, 1},
-                         .thickness = 0.5});
+                         .thickness = 0.5,
+                         .attributes = {{"height", {1, 2}}, {"none", {7, 8}}}});
+  model.parts.push_back({.kind = Kind::kTriangles,
+                         .positions = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}},
+                         .indices = {0, 1, 2},
+                         .texture_coordinates = {{0, 0}, {1, 0}, {0, 1}},
+                         .picture = 1});
+  model.pictures = {"first", "second"};
+  model.left_out = {{"cameras", 2}, {"lights", 1}};
   model.path = "p";
   model.lit_already = true;
   SampledVolume& numbers = model.volumes.emplace_back();
@@ -64,7 +72,15 @@ TEST(Contained, ModelsComeBackAsTheyWere) {
   EXPECT_EQ(back->format, "kind");
   EXPECT_EQ(back->note, "a note");
   EXPECT_EQ(back->up, Up::kX);
-  ASSERT_EQ(back->parts.size(), 1u);
+  EXPECT_EQ(back->left_out, model.left_out);
+  EXPECT_EQ(NoteOf(*back), "p: a note; left out: cameras (2), lights (1)");
+  EXPECT_EQ(back->pictures, model.pictures);
+  ASSERT_EQ(back->parts.size(), 2u);
+  EXPECT_EQ(back->parts[1].picture, 1u);
+  EXPECT_EQ(back->parts[1].texture_coordinates, model.parts[1].texture_coordinates);
+  ASSERT_EQ(back->parts[0].attributes.size(), 2u);
+  EXPECT_EQ(back->parts[0].attributes[1].name, "none");
+  EXPECT_EQ(back->parts[0].attributes[1].values, (std::vector<float>{7, 8}));
   EXPECT_EQ(back->parts[0].kind, Kind::kSegments);
   EXPECT_EQ(back->parts[0].positions, model.parts[0].positions);
   EXPECT_EQ(back->parts[0].normals, model.parts[0].normals);
@@ -117,6 +133,22 @@ TEST(Contained, ModelsThatAreNotSoundAreRefused) {
   EXPECT_TRUE(refused([](Model& m) { m.parts[0].indices.pop_back(); }));
   EXPECT_TRUE(refused([](Model& m) { m.parts[0].indices[1] = 3; }));
   EXPECT_TRUE(refused([](Model& m) { m.parts[0].kind = Kind::kPoints; }));
+  const auto with_picture = [](const std::function<void(Model&)>& spoil) {
+    return [spoil](Model& m) {
+      m.pictures = {"a picture"};
+      m.parts[0].picture = 0;
+      m.parts[0].texture_coordinates = {{0, 0}, {1, 0}, {0, 1}};
+      m.parts[0].attributes = {{"a", {1, 2, std::nanf("")}}};
+      spoil(m);
+    };
+  };
+  EXPECT_FALSE(refused(with_picture([](Model&) {})));
+  EXPECT_TRUE(refused(with_picture([](Model& m) { m.pictures.clear(); })));
+  EXPECT_TRUE(refused(with_picture([](Model& m) { m.parts[0].picture = kNoPicture; })));
+  EXPECT_TRUE(refused(with_picture([](Model& m) { m.parts[0].texture_coordinates.pop_back(); })));
+  EXPECT_TRUE(
+      refused(with_picture([](Model& m) { m.parts[0].texture_coordinates[2][1] = INFINITY; })));
+  EXPECT_TRUE(refused(with_picture([](Model& m) { m.parts[0].attributes[0].values.pop_back(); })));
   EXPECT_TRUE(refused([](Model& m) { m.parts[0].level = kMostLevel + 1; }));
   EXPECT_TRUE(refused([](Model& m) { m.parts[0].thickness = HUGE_VAL; }));
   EXPECT_TRUE(refused([](Model& m) { m.volumes[0].corners[3].y = HUGE_VAL; }));

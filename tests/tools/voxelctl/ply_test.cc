@@ -111,7 +111,7 @@ TEST(PlyPoints, PointsThatAreNotANumberAreLeftOutAndSaid) {
   ASSERT_THAT(model, IsOk());
   EXPECT_EQ(model->parts[0].positions, (std::vector<Point3>{{0, 0, 0}, {9, 9, 9}}));
   EXPECT_EQ(model->parts[0].colors, (std::vector<Rgb>{{1, 2, 3}, {7, 8, 9}}));
-  EXPECT_THAT(model->note, testing::HasSubstr("1 of 3 points are not a number (NaN)"));
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"points that are not a number", 1}}));
 }
 
 TEST(PlyPoints, FloatColorsGoTo255WhereOneIsGreaterThan1) {

@@ -178,7 +178,7 @@ TEST_F(VoxFiles, OfKeyFramesTheFirstIsShown) {
   const auto model = Import(Vox(models + moving + Shape(1, 0)));
   ASSERT_THAT(model, IsOk());
   for (const Point3& p : model->parts.at(0).positions) EXPECT_LE(p.x, 3);
-  EXPECT_THAT(model->note, HasSubstr("not shown: key frames after the first: 1"));
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"key frames after the first", 1}}));
 }
 
 TEST_F(VoxFiles, HiddenLayersAreNotShown) {
@@ -196,7 +196,7 @@ TEST_F(VoxFiles, HiddenLayersAreNotShown) {
   const auto model = Import(Vox(models + nodes + layer(0, "0") + layer(1, "1")));
   ASSERT_THAT(model, IsOk());
   EXPECT_EQ(model->parts.at(0).positions.size(), 6u * 4);
-  EXPECT_THAT(model->note, HasSubstr("not shown: hidden nodes: 1"));
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"hidden nodes", 1}}));
   EXPECT_EQ(Read(models + nodes + layer(-1, "1")).positions.size(), 16u * 4) << "no layer";
   EXPECT_EQ(Read(models + nodes + layer(0, "0") + layer(1, "0")).positions.size(), 16u * 4);
 }

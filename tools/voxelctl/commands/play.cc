@@ -229,15 +229,15 @@ class Player {
 
   void Describe(const Model& model, const PackedLevels& packed) {
     const PackedSizes& sizes = packed.sizes;
-    std::string note = model.note;
+    std::string note = NoteOf(model);
     if (!sizes.note.empty()) {
       const std::string more = absl::StrCat(model.path, ": ", sizes.note);
       console_.Say(EscapeForTerminal(more));
       note = note.empty() ? more : absl::StrCat(note, "; ", more);
     }
-    summary_.files.push_back({model.path, model.format, std::move(note), packed.levels.size(),
-                              sizes.vertices, sizes.indices, sizes.samples, sizes.objects,
-                              sizes.bytes});
+    summary_.files.push_back({model.path, model.format, std::move(note), model.left_out,
+                              packed.levels.size(), sizes.vertices, sizes.indices, sizes.samples,
+                              sizes.objects, sizes.bytes});
   }
 
   absl::Status ShowFrames(FrameAhead& ahead, const FramePlacement& placement, int64_t count) {

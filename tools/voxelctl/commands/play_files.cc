@@ -33,7 +33,8 @@ absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interru
                         EscapeForTerminal(options.files[i]));
     absl::StatusOr<Model> model = ImportFile(options.files[i], OptionsOf(options, &interrupt));
     if (model.ok()) {
-      if (!model->note.empty()) console.Say(EscapeForTerminal(model->note));
+      const std::string note = NoteOf(*model);
+      if (!note.empty()) console.Say(EscapeForTerminal(note));
       models.push_back(*std::move(model));
     } else {
       errors.emplace_back(model.status().message());

@@ -39,9 +39,13 @@ ordered_json Json(const PlaySummary& s, const Quantiles& latency) {
   ordered_json files = ordered_json::array(), displays = ordered_json::array(),
                issues = ordered_json::array();
   for (const PlayedFile& f : s.files) {
+    ordered_json left_out = ordered_json::array();
+    for (const LeftOut& one : f.left_out)
+      left_out.push_back({{"kind", one.kind}, {"count", one.count}});
     files.push_back({{"path", f.path},
                      {"format", f.format},
                      {"note", f.note},
+                     {"left_out", left_out},
                      {"vertices", f.vertices},
                      {"indices", f.indices},
                      {"samples", f.samples},

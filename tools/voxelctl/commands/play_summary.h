@@ -7,11 +7,13 @@
 
 #include "tools/voxelctl/commands/console.h"
 #include "tools/voxelctl/connection/scene_session.h"
+#include "tools/voxelctl/import/model.h"
 
 namespace voxeld::voxelctl {
 
 struct PlayedFile {
   std::string path, format, note;
+  std::vector<LeftOut> left_out;
   uint64_t entities = 1;
   uint64_t vertices = 0, indices = 0, samples = 0, objects = 0, bytes = 0;
 };

@@ -21,10 +21,7 @@ class GeoJsonReader {
 
   absl::Status ReadObject(const json& object, const std::string& where);
   absl::Status Finish(Model* model) && {
-    if (nowhere_ > 0) {
-      model->note =
-          absl::StrCat(file_.path, ": geometries without coordinates, not shown: ", nowhere_);
-    }
+    AddLeftOut("geometries without coordinates", nowhere_, model);
     return std::move(lines_).Finish("GeoJSON", model);
   }
 

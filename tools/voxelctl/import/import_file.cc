@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <iterator>
@@ -77,14 +78,25 @@ bool AllFinite(const Values& values) {
                      [](const auto& value) { return IsFiniteValue(value); });
 }
 
+bool HasSoundPicture(const Part& part, size_t pictures) {
+  if (part.picture == kNoPicture) return part.texture_coordinates.empty();
+  return part.kind == Kind::kTriangles && part.picture < pictures &&
+         part.texture_coordinates.size() == part.positions.size() &&
+         std::all_of(part.texture_coordinates.begin(), part.texture_coordinates.end(),
+                     [](const std::array<float, 2>& at) { return AllFinite(at); });
+}
+
 // Arrays have the lengths that all who read them rely on: the reader of a file may be in a stranger's hands.
-bool IsSound(const Part& part) {
+bool IsSound(const Part& part, size_t pictures) {
   const size_t count = part.positions.size();
   const size_t each = part.kind == Kind::kPoints ? 0 : part.kind == Kind::kSegments ? 2 : 3;
   return (part.normals.empty() || part.normals.size() == count) &&
          (part.colors.empty() || part.colors.size() == count) &&
          (each == 0 ? part.indices.empty() : part.indices.size() % each == 0) &&
-         part.level <= kMostLevel && std::isfinite(part.thickness) && AllFinite(part.normals);
+         part.level <= kMostLevel && std::isfinite(part.thickness) && AllFinite(part.normals) &&
+         HasSoundPicture(part, pictures) &&
+         std::all_of(part.attributes.begin(), part.attributes.end(),
+                     [&](const Attribute& one) { return one.values.size() == count; });
 }
 
 // 0 if there are none, or more than a model may hold.
@@ -105,7 +117,7 @@ absl::Status CheckModel(const SourceFile& file, const Model& model) {
   for (const Part& part : model.parts) {
     vertices += part.positions.size();
     indices += part.indices.size();
-    if (!IsSound(part))
+    if (!IsSound(part, model.pictures.size()))
       return FileError(file, "holds a part that is not sound", "damaged files are not read");
     for (const Point3& p : part.positions) {
       if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {

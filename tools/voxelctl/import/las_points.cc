@@ -135,10 +135,7 @@ absl::StatusOr<Model> ReadLasPoints(const SourceFile& file) {
     return FileError(file, "has withheld points alone", "at least one other is expected");
   }
   Model model = std::move(*table).Finish(file, "LAS points");
-  if (withheld > 0) {
-    model.note = absl::StrCat(file.path, ": ", withheld, " of ", header->count,
-                              " points are marked as withheld, and left out");
-  }
+  AddLeftOut("points marked as withheld", withheld, &model);
   return model;
 }
 

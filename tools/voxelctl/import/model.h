@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace voxeld::voxelctl {
@@ -20,7 +21,15 @@ struct Rgb {
   bool operator==(const Rgb&) const = default;
 };
 
+inline constexpr uint32_t kNoPicture = UINT32_MAX;
+
 enum class Kind : uint8_t { kPoints, kSegments, kTriangles };
+
+// A number of each vertex, such as a measured column, by which `play --color-by` colours.
+struct Attribute {
+  std::string name;           // as in the file
+  std::vector<float> values;  // as many as positions; not a number where the file has none
+};
 
 // Vertices of one kind. Arrays beside `positions` are empty or as long as it.
 struct Part {
@@ -34,6 +43,11 @@ struct Part {
   double thickness = 0;
   // Where parts of several levels cover one place the highest is seen; at most kMostLevel.
   uint8_t level = 0;
+  std::vector<Attribute> attributes;
+  // Of triangles: the place on a picture, (0, 0) its upper left corner and (1, 1) its lower right one; beyond them it repeats.
+  std::vector<std::array<float, 2>> texture_coordinates;
+  // The picture by which the colours are multiplied: an index of Model::pictures, or kNoPicture.
+  uint32_t picture = kNoPicture;
 };
 
 inline constexpr uint8_t kMostLevel = 126;
@@ -53,16 +67,32 @@ struct SampledVolume {
 // makes +z the front and keeps +x right; +x up keeps −y the front.
 enum class Up : uint8_t { kAuto, kX, kY, kZ };
 
+// What a file contains and its model does not show.
+struct LeftOut {
+  std::string kind;  // in the plural: "cameras", "atoms at alternate locations"
+  uint64_t count = 0;
+  bool operator==(const LeftOut&) const = default;
+};
+
 struct Model {
   std::string path;
-  std::string format;        // for people: "glTF binary", "PLY points"
-  std::string note;          // what people should know of how it was read; usually empty
-  Up up = Up::kZ;            // the format's own; never kAuto
-  bool globe = false;        // on the unit sphere about the origin, upright already
+  std::string format;  // for people: "glTF binary", "PLY points"
+  std::string
+      note;  // what people should know of how it was read, beside what is left out; usually empty
+  std::vector<LeftOut> left_out;  // one of each kind, none with a count of 0
+  Up up = Up::kZ;                 // the format's own; never kAuto
+  bool globe = false;             // on the unit sphere about the origin, upright already
   bool lit_already = false;  // its colours carry their light (scans): no shading is baked into them
   std::vector<Part> parts;
   std::vector<SampledVolume> volumes;
+  std::vector<std::string> pictures;  // PNG or JPEG files
 };
+
+// Counts `count` things of `kind` that are left out; 0 changes nothing.
+void AddLeftOut(std::string_view kind, uint64_t count, Model* model);
+
+// "PATH: NOTE; left out: cameras (2), lights (1)", without what there is not; empty if there is nothing to say.
+std::string NoteOf(const Model& model);
 
 // What one model may hold in all, so that no file makes the tool run out of memory.
 inline constexpr uint64_t kMaxModelVertices = 32'000'000;

@@ -105,6 +105,12 @@ bool WriteModel(const absl::StatusOr<Model>& model, int descriptor) {
   writer.All(model->path);
   writer.All(model->format);
   writer.All(model->note);
+  const uint64_t kinds = model->left_out.size();
+  writer.Bytes(&kinds, sizeof(kinds));
+  for (const LeftOut& one : model->left_out) {
+    writer.All(one.kind);
+    writer.Bytes(&one.count, sizeof(one.count));
+  }
   writer.Bytes(&model->up, sizeof(model->up));
   writer.Bytes(&model->globe, sizeof(model->globe));
   writer.Bytes(&model->lit_already, sizeof(model->lit_already));
@@ -117,9 +123,20 @@ bool WriteModel(const absl::StatusOr<Model>& model, int descriptor) {
     writer.All(part.normals);
     writer.All(part.colors);
     writer.All(part.indices);
+    writer.All(part.texture_coordinates);
+    writer.Bytes(&part.picture, sizeof(part.picture));
+    const uint64_t attributes = part.attributes.size();
+    writer.Bytes(&attributes, sizeof(attributes));
+    for (const Attribute& attribute : part.attributes) {
+      writer.All(attribute.name);
+      writer.All(attribute.values);
+    }
   }
   writer.Bytes(&volumes, sizeof(volumes));
   for (const SampledVolume& volume : model->volumes) WriteVolume(volume, writer);
+  const uint64_t pictures = model->pictures.size();
+  writer.Bytes(&pictures, sizeof(pictures));
+  for (const std::string& picture : model->pictures) writer.All(picture);
   return writer.ok();
 }
 
@@ -162,6 +179,14 @@ absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_
   reader.All(&model.path);
   reader.All(&model.format);
   reader.All(&model.note);
+  uint64_t kinds = 0;
+  reader.Bytes(&kinds, sizeof(kinds));
+  for (uint64_t i = 0; i < kinds && reader.ok(); ++i) {
+    LeftOut one;
+    reader.All(&one.kind);
+    reader.Bytes(&one.count, sizeof(one.count));
+    model.left_out.push_back(std::move(one));
+  }
   reader.Bytes(&up, 1);
   reader.Bytes(&globe, 1);
   reader.Bytes(&lit_already, 1);
@@ -182,10 +207,23 @@ absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_
     reader.All(&part.normals);
     reader.All(&part.colors);
     reader.All(&part.indices);
+    reader.All(&part.texture_coordinates);
+    reader.Bytes(&part.picture, sizeof(part.picture));
+    uint64_t attributes = 0;
+    reader.Bytes(&attributes, sizeof(attributes));
+    for (uint64_t a = 0; a < attributes && reader.ok(); ++a) {
+      Attribute attribute;
+      reader.All(&attribute.name);
+      reader.All(&attribute.values);
+      part.attributes.push_back(std::move(attribute));
+    }
     model.parts.push_back(std::move(part));
   }
   reader.Bytes(&volumes, sizeof(volumes));
   for (uint64_t i = 0; i < volumes && reader.ok(); ++i) model.volumes.push_back(ReadVolume(reader));
+  uint64_t pictures = 0;
+  reader.Bytes(&pictures, sizeof(pictures));
+  for (uint64_t i = 0; i < pictures && reader.ok(); ++i) reader.All(&model.pictures.emplace_back());
   if (!reader.ok()) return Spoilt(file, "gave up halfway");
   return model;
 }

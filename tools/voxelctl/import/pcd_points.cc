@@ -347,10 +347,7 @@ absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file) {
     return FileError(file, "has no point that is anywhere", "at least one is expected");
   }
   Model model = std::move(*table).Finish(file, "PCD points");
-  if (nowhere > 0) {
-    model.note = absl::StrCat(file.path, ": ", nowhere, " of ", header->points,
-                              " points are nowhere (not finite), and left out");
-  }
+  AddLeftOut("points that are not finite", nowhere, &model);
   return model;
 }
 

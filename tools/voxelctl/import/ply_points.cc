@@ -44,10 +44,7 @@ absl::StatusOr<Model> ReadPlyPoints(const SourceFile& file, const PlyHeader& hea
   if (!vertices->normals.empty()) vertices->normals.resize(kept);
   if (!vertices->colors.empty()) vertices->colors.resize(kept);
   Model model;
-  if (kept < count) {
-    model.note = absl::StrCat(file.path, ": ", count - kept, " of ", count,
-                              " points are not a number (NaN), and left out");
-  }
+  AddLeftOut("points that are not a number", count - kept, &model);
   part.positions = std::move(vertices->positions);
   part.normals = std::move(vertices->normals);
   part.colors = std::move(vertices->colors);

@@ -172,9 +172,7 @@ absl::StatusOr<Model> TopoJsonReader::Read(const json& document) {
     if (!status.ok()) return status;
   }
   Model model;
-  if (collapsed_ > 0) {
-    model.note = absl::StrCat(file_.path, ": arcs of one position, not shown: ", collapsed_);
-  }
+  AddLeftOut("arcs of one position", collapsed_, &model);
   status = std::move(lines_).Finish("TopoJSON", &model);
   if (!status.ok()) return status;
   return model;

@@ -67,14 +67,8 @@ class Builder {
     model.up = Up::kZ;
     model.lit_already = true;
     model.parts.push_back(std::move(part_));
-    std::vector<std::string> notes;
-    if (scene_.later_frames > 0) {
-      notes.push_back(absl::StrCat("key frames after the first: ", scene_.later_frames));
-    }
-    if (hidden_ > 0) notes.push_back(absl::StrCat("hidden nodes: ", hidden_));
-    if (!notes.empty()) {
-      model.note = absl::StrCat(file_.path, ": not shown: ", absl::StrJoin(notes, "; "));
-    }
+    AddLeftOut("key frames after the first", scene_.later_frames, &model);
+    AddLeftOut("hidden nodes", hidden_, &model);
     return model;
   }
 
