@@ -1,5 +1,5 @@
 # What `cmake --install` installs, and the Debian packages that are made of it (tools/package, or cpack --preset release): a package a
-# component. `service` is the package voxeld, `cuda` is voxeld-cuda, and `client` (client/cpp/CMakeLists.txt) is libvoxeld-dev. The paths
+# component. `service` is the package voxeld, `cuda` is voxeld-cuda, `import` is voxeld-import, and `client` (client/cpp/CMakeLists.txt) is libvoxeld-dev. The paths
 # in packaging/ are those of the prefix /usr.
 include(GNUInstallDirs)
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME service)
@@ -32,6 +32,11 @@ if(TARGET voxeld-engine-cuda)
   install(FILES ${packaging}/cuda/voxeld-engine.conf DESTINATION lib/systemd/system/voxeld-engine@.service.d RENAME 50-voxeld-cuda.conf
           COMPONENT cuda)
   install(FILES ${CMAKE_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/voxeld-cuda RENAME copyright COMPONENT cuda)
+endif()
+# Where voxelctl looks for it: tools/voxelctl/import/import_program.cc.
+if(TARGET voxeld-import)
+  voxeld_install_programs(libexec/voxeld import voxeld-import)
+  install(FILES ${CMAKE_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/voxeld-import RENAME copyright COMPONENT import)
 endif()
 install(FILES ${packaging}/voxeld.service ${packaging}/voxeld.socket ${packaging}/voxeld-playlist.service
               ${packaging}/voxeld-engine.socket ${packaging}/voxeld-engine@.service DESTINATION lib/systemd/system)
@@ -74,6 +79,11 @@ if(VOXELD_DPKG_QUERY AND CMAKE_GENERATOR STREQUAL "Ninja")
     set(cuda_program --program $<TARGET_FILE:voxeld-engine-cuda>)
     set(cuda_target voxeld-engine-cuda)
   endif()
+  set(import_program "")
+  if(TARGET voxeld-import)
+    set(import_program --program $<TARGET_FILE:voxeld-import>)
+    set(import_target voxeld-import)
+  endif()
   foreach(tool ${CMAKE_CXX_COMPILER} ${VOXELD_MOLD} ${CMAKE_COMMAND} ${CMAKE_MAKE_PROGRAM} ${VOXELD_NODE} ${VOXELD_GRPC_PYTHON_PLUGIN})
     list(APPEND arguments --tool ${tool})
   endforeach()
@@ -81,9 +91,9 @@ if(VOXELD_DPKG_QUERY AND CMAKE_GENERATOR STREQUAL "Ninja")
   add_custom_command(
     OUTPUT ${sbom}/voxeld.spdx.json ${sbom}/NOTICES
     COMMAND ${VOXELD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tools/sbom/sbom.py --build ${CMAKE_BINARY_DIR} --version ${PROJECT_VERSION}
-            --epoch ${VOXELD_EPOCH} --program $<TARGET_FILE:voxeld> --program $<TARGET_FILE:voxelctl> --program $<TARGET_FILE:voxeld-engine> ${cuda_program}
+            --epoch ${VOXELD_EPOCH} --program $<TARGET_FILE:voxeld> --program $<TARGET_FILE:voxelctl> --program $<TARGET_FILE:voxeld-engine> ${cuda_program} ${import_program}
             --notice ${packaging}/notices/colormaps.txt --out ${sbom}/voxeld.spdx.json --out-notices ${sbom}/NOTICES ${arguments}
-    DEPENDS voxeld voxelctl voxeld-engine ${cuda_target} ${scripts} ${packaging}/notices/colormaps.txt
+    DEPENDS voxeld voxelctl voxeld-engine ${cuda_target} ${import_target} ${scripts} ${packaging}/notices/colormaps.txt
     COMMENT "Listing what voxeld is made of"
     VERBATIM)
   add_custom_target(sbom ALL DEPENDS ${sbom}/voxeld.spdx.json ${sbom}/NOTICES)
@@ -96,7 +106,7 @@ endif()
 # Everything that tools/package packages: programs, manual, SBOM, client libraries; no tests. Also voxel-bench, to measure this build; it is
 # not published, because it compares with a loop that is compiled for the processor of the machine that builds it.
 add_custom_target(packaged DEPENDS voxeld voxelctl voxeld-engine voxeld-emulator voxeld_client_shared voxeld_manual python_client)
-foreach(part voxeld-engine-cuda voxel-bench sbom)
+foreach(part voxeld-engine-cuda voxeld-import voxel-bench sbom)
   if(TARGET ${part})
     add_dependencies(packaged ${part})
   endif()
@@ -123,9 +133,19 @@ set(CPACK_DEBIAN_SERVICE_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_SERVICE_DESCRIPTION
     "driver service for volumetric displays\nNetworked clients stream 3D primitives in over gRPC; voxeld assembles the voxel\nscene, slices it, and pushes whole volumes of light to the display. With the\nclient voxelctl, udev rules and a systemd service.")
 set(CPACK_DEBIAN_SERVICE_PACKAGE_DEPENDS "passwd, procps")  # for postinst and reload
-set(CPACK_DEBIAN_SERVICE_PACKAGE_RECOMMENDS "fonts-dejavu-core, hershey-fonts-data")  # text
+set(CPACK_DEBIAN_SERVICE_PACKAGE_RECOMMENDS "voxeld-import, fonts-dejavu-core, hershey-fonts-data")  # the fonts are for text
 set(CPACK_DEBIAN_SERVICE_PACKAGE_SUGGESTS "voxeld-cuda, ffmpeg")  # voxelctl render to MP4
 set(CPACK_DEBIAN_SERVICE_PACKAGE_CONTROL_EXTRA ${packaging}/deb/postinst ${packaging}/deb/prerm ${packaging}/deb/postrm)
+
+if(TARGET voxeld-import)
+  list(APPEND CPACK_COMPONENTS_ALL import)
+  set(CPACK_DEBIAN_IMPORT_PACKAGE_NAME voxeld-import)
+  set(CPACK_DEBIAN_IMPORT_PACKAGE_SECTION graphics)
+  set(CPACK_DEBIAN_IMPORT_DESCRIPTION
+      "more file formats for voxelctl\nMeshes with materials, volumes, molecules, maps and drawings, besides the formats that\nvoxelctl reads itself (STL, PLY, VOX, GeoJSON and point clouds as text).")
+  # Both programs speak one version of the protocol between them.
+  set(CPACK_DEBIAN_IMPORT_PACKAGE_DEPENDS "voxeld (= ${PROJECT_VERSION})")
+endif()
 
 if(TARGET voxeld-engine-cuda)
   list(APPEND CPACK_COMPONENTS_ALL cuda)

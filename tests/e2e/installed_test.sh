@@ -146,6 +146,10 @@ fi
 
 step "voxelctl"
 in_root env VOXELD_SERVER=unix:/run/voxeld/voxeld.sock voxelctl displays | sed 's/^/   /'
+if [ -n "$(ls "$packages"/voxeld-import_*.deb 2>/dev/null)" ]; then
+  printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' >"$root/tmp/triangle.obj"
+  in_root env VOXELD_SERVER=unix:/run/voxeld/voxeld.sock voxelctl play /tmp/triangle.obj 2>&1 | sed 's/^/   /' || fail "voxelctl does not play a file that voxeld-import reads"
+fi
 
 step "a C++ client against the development files"
 if [ -n "$(ls "$packages"/libvoxeld-dev_*.deb 2>/dev/null)" ]; then

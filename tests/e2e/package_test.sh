@@ -18,6 +18,7 @@ fail() {
 "$cpack" -G DEB -B "$work/made" --config "$build/CPackConfig.cmake" >"$work/said" || { cat "$work/said"; fail "no package"; }
 architecture=$(dpkg --print-architecture)
 packages=(voxeld libvoxeld-dev)
+[ ! -x "$build/bin/voxeld-import" ] || packages+=(voxeld-import)
 [ ! -x "$build/bin/voxeld-engine-cuda" ] || packages+=(voxeld-cuda)
 diff <(printf "%s_${version}_$architecture.deb\n" "${packages[@]}" | LC_ALL=C sort) <(cd "$work/made" && ls *.deb | LC_ALL=C sort) ||
   fail "other packages were made (>)"
@@ -31,7 +32,7 @@ cp -a "$work/voxeld" "$root"
 
 # ---- control fields, contents
 field() { dpkg-deb -f "$work/made/${1}_${version}_$architecture.deb" "$2"; }  # PACKAGE FIELD
-declare -A section=([voxeld]=graphics [voxeld-cuda]=graphics [libvoxeld-dev]=libdevel)
+declare -A section=([voxeld]=graphics [voxeld-cuda]=graphics [voxeld-import]=graphics [libvoxeld-dev]=libdevel)
 for package in "${packages[@]}"; do
   [ "$(field "$package" Package) $(field "$package" Version)" = "$package $version" ] || fail "control of $package: $(field "$package" Version)"
   [ "$(field "$package" Section)" = "${section[$package]}" ] || fail "section of $package: $(field "$package" Section)"
@@ -147,6 +148,12 @@ if [ -d "$work/voxeld-cuda" ]; then
 -rw-r--r-- root/root ./usr/share/doc/voxeld-cuda/copyright
 EOT
 fi
+if [ -d "$work/voxeld-import" ]; then
+  contents voxeld-import <<'EOT'
+-rwxr-xr-x root/root ./usr/libexec/voxeld/voxeld-import
+-rw-r--r-- root/root ./usr/share/doc/voxeld-import/copyright
+EOT
+fi
 both=$(for package in "${packages[@]}"; do (cd "$work/$package" && find . ! -type d); done | sort | uniq -d)
 [ -z "$both" ] || fail "in two packages: $both"
 for control in "$work"/*.control; do
@@ -163,6 +170,7 @@ done
 
 # ---- programs: the system's libraries, each from a package that is depended on
 programs=("$work"/voxeld/usr/{bin/voxeld,bin/voxelctl,libexec/voxeld/voxeld-engine} "$work/libvoxeld-dev/usr/lib/libvoxeld_client.so")
+[ ! -d "$work/voxeld-import" ] || programs+=("$work/voxeld-import/usr/libexec/voxeld/voxeld-import")
 [ ! -d "$work/voxeld-cuda" ] || programs+=("$work/voxeld-cuda/usr/libexec/voxeld/voxeld-engine-cuda")
 for program in "${programs[@]}"; do
   package=${program#"$work"/}
@@ -191,8 +199,11 @@ for package in "${packages[@]}"; do
   if grep -iE 'cuda|nvidia|nccl|^libros|^ros-' <<<"$depends"; then fail "$package depends on CUDA or ROS"; fi
 done
 grep -qx libabsl-dev <<<"$(field libvoxeld-dev Depends | tr ',' '\n' | awk '{ print $1 }')" || fail "libvoxeld-dev: $(field libvoxeld-dev Depends)"
-[ ! -d "$work/voxeld-cuda" ] || field voxeld-cuda Depends | tr ',' '\n' | sed 's/^ *//' | grep -qxF "voxeld (= $version)" ||
-  fail "voxeld-cuda does not depend on this version of voxeld: $(field voxeld-cuda Depends)"
+for package in voxeld-cuda voxeld-import; do
+  [ ! -d "$work/$package" ] || field $package Depends | tr ',' '\n' | sed 's/^ *//' | grep -qxF "voxeld (= $version)" ||
+    fail "$package does not depend on this version of voxeld: $(field $package Depends)"
+done
+if readelf -d "$work/voxeld/usr/bin/voxelctl" | grep -E 'NEEDED.*(assimp|gdcm|gdal|ITK|rsvg)'; then fail "voxelctl is linked with a library that reads files"; fi
 
 # ---- voxeld and its engine's program, from where they lie
 unset LD_LIBRARY_PATH VOXELD_SERVER XDG_CONFIG_HOME

@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "tests/fuzz/import/check_model.h"
-#include "tools/voxelctl/import/mesh_checks.h"
+#include "tools/import/mesh_checks.h"
 #include "tools/voxelctl/import/stl_mesh.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

@@ -6,8 +6,8 @@
 #include "tests/fuzz/import/check_model.h"
 #include "tools/voxelctl/import/geojson.h"
 #include "tools/voxelctl/import/json_text.h"
-#include "tools/voxelctl/import/pdb_molecule.h"
-#include "tools/voxelctl/import/svg_drawing.h"
+#include "tools/import/pdb_molecule.h"
+#include "tools/import/svg_drawing.h"
 #include "tools/voxelctl/import/text_points.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

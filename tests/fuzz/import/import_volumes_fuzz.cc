@@ -5,10 +5,10 @@
 #include <optional>
 
 #include "tests/fuzz/import/check_model.h"
-#include "tools/voxelctl/import/dicom_check.h"
-#include "tools/voxelctl/import/nifti_volume.h"
-#include "tools/voxelctl/import/nrrd_volume.h"
-#include "tools/voxelctl/import/raw_volume.h"
+#include "tools/import/dicom_check.h"
+#include "tools/import/nifti_volume.h"
+#include "tools/import/nrrd_volume.h"
+#include "tools/import/raw_volume.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace voxeld::voxelctl;  // NOLINT(google-build-using-namespace)

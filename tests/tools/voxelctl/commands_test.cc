@@ -10,7 +10,7 @@
 
 #include "tests/tools/voxelctl/commands_fixture.h"
 #include "tools/voxelctl/commands/not_showing.h"
-#include "tools/voxelctl/import/more_formats.h"
+#include "tools/voxelctl/import/import_program.h"
 
 namespace voxeld::voxelctl {
 namespace {

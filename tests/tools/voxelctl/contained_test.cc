@@ -29,12 +29,25 @@
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
 #include "tools/voxelctl/import/importer.h"
+#include "tools/voxelctl/import/reader_process.h"
 #include "tools/voxelctl/import/sandbox.h"
 
 namespace voxeld::voxelctl {
 namespace contained_test {
 
 using ::testing::HasSubstr;
+
+absl::StatusOr<Model> ReadApart(const SourceFile& file,
+                                const std::function<absl::StatusOr<Model>()>& read,
+                                Interrupt* interrupt = nullptr) {
+  return ReadContained(file, ReaderOf(file, read), interrupt);
+}
+
+absl::StatusOr<std::unique_ptr<FrameSource>> OpenApart(const SourceFile& file,
+                                                       const OpenFrames& open,
+                                                       Interrupt* interrupt = nullptr) {
+  return OpenContained(file, FramesOf(file, open), interrupt);
+}
 
 TEST(Contained, ModelsComeBackAsTheyWere) {
   Model model;
@@ -66,7 +79,7 @@ TEST(Contained, ModelsComeBackAsTheyWere) {
   colors.samples = {1};
   colors.colors = {{1, 2, 3}};
   colors.window = {5, 6};
-  const auto back = ReadContained({.path = "p"}, [&model] { return model; });
+  const auto back = ReadApart({.path = "p"}, [&model] { return model; });
   ASSERT_THAT(back, IsOk());
   EXPECT_EQ(back->path, "p");
   EXPECT_EQ(back->format, "kind");
@@ -99,7 +112,7 @@ TEST(Contained, ModelsComeBackAsTheyWere) {
 
 TEST(Contained, WhatGoesWrongIsSaid) {
   const auto error = [](const std::function<absl::StatusOr<Model>()>& read) {
-    return std::string(ReadContained({.path = "p"}, read).status().message());
+    return std::string(ReadApart({.path = "p"}, read).status().message());
   };
   EXPECT_EQ(error([] { return absl::InvalidArgumentError("p: so it is"); }), "p: so it is");
   EXPECT_THAT(error([]() -> absl::StatusOr<Model> {
@@ -158,7 +171,7 @@ TEST(Contained, ModelsThatAreNotSoundAreRefused) {
 
 // What `act` returns as a reader of `file`: 0, or the error of the call that failed.
 int ErrorOf(const SourceFile& file, const std::function<bool()>& act) {
-  const auto model = ReadContained(file, [&act]() -> absl::StatusOr<Model> {
+  const auto model = ReadApart(file, [&act]() -> absl::StatusOr<Model> {
     Model told;
     errno = 0;
     told.note = std::to_string(act() ? 0 : errno);
@@ -261,7 +274,7 @@ void WithoutLandlock() {
 TEST_F(SandboxTest, WithoutLandlockAStrangersFileIsRefusedWithTheReason) {
   const auto read = [this](OtherFiles others) {
     file_.other_files = others;
-    return ReadContained(file_, [] { return Model(); }).status();
+    return ReadApart(file_, [] { return Model(); }).status();
   };
   EXPECT_EXIT(
       {
@@ -277,7 +290,7 @@ TEST_F(SandboxTest, WithoutLandlockAStrangersFileIsRefusedWithTheReason) {
 TEST(Contained, EndsWhenItIsInterrupted) {
   Interrupt interrupt(Interrupt::Watch::kNothing);
   std::thread later([&interrupt] { interrupt.Request(); });
-  const absl::Status status = ReadContained(
+  const absl::Status status = ReadApart(
                                   {.path = "p"},
                                   []() -> absl::StatusOr<Model> {
                                     for (volatile bool always = true; always;) {
@@ -301,7 +314,7 @@ pid_t ChildOf(pid_t process) {
 TEST(Contained, EndsWithWhoAsked) {
   const pid_t asks = ::fork();
   if (asks == 0) {
-    (void)ReadContained({.path = "p"}, []() -> absl::StatusOr<Model> {
+    (void)ReadApart({.path = "p"}, []() -> absl::StatusOr<Model> {
       for (volatile bool always = true; always;) {
       }
       return Model();
@@ -340,7 +353,7 @@ class Points final : public FrameSource {
 
 absl::StatusOr<std::unique_ptr<FrameSource>> PointFrames(std::function<void(int64_t, Model&)> spoil,
                                                          Interrupt* interrupt = nullptr) {
-  return OpenContained(
+  return OpenApart(
       {.path = "p"},
       [spoil = std::move(spoil)](SourceFile) -> absl::StatusOr<std::unique_ptr<FrameSource>> {
         return std::make_unique<Points>(spoil);
@@ -363,7 +376,7 @@ TEST(ContainedFrames, AreReadInAnyOrderByAnotherProcess) {
 }
 
 TEST(ContainedFrames, ErrorFromOpenIsReturned) {
-  const auto frames = OpenContained({.path = "p"}, [](SourceFile) {
+  const auto frames = OpenApart({.path = "p"}, [](SourceFile) {
     return absl::StatusOr<std::unique_ptr<FrameSource>>(absl::InvalidArgumentError("p: no frames"));
   });
   EXPECT_EQ(frames.status(), absl::InvalidArgumentError("p: no frames"));
@@ -398,8 +411,8 @@ TEST(ContainedFrames, ReaderCannotOpenFilesOutsideOfTheFolder) {
   TempFolder other;
   const std::string outside = other.Write("outside", "x");
   if (!Sandbox::Get().CheckLandlock().ok()) GTEST_SKIP() << "this kernel has no Landlock";
-  const auto frames = OpenContained(
-      {.path = inside}, [&](SourceFile) -> absl::StatusOr<std::unique_ptr<FrameSource>> {
+  const auto frames =
+      OpenApart({.path = inside}, [&](SourceFile) -> absl::StatusOr<std::unique_ptr<FrameSource>> {
         return std::make_unique<Points>([&](int64_t, Model& model) {
           model.note = absl::StrCat(Opens(inside), Opens(outside));
         });
@@ -442,7 +455,7 @@ TEST(ContainedFrames, CountsAndFramesHaveLimits) {
     absl::StatusOr<Model> Read(int64_t) override { return Model(); }
   };
   const auto many =
-      OpenContained({.path = "p"}, [](SourceFile) -> absl::StatusOr<std::unique_ptr<FrameSource>> {
+      OpenApart({.path = "p"}, [](SourceFile) -> absl::StatusOr<std::unique_ptr<FrameSource>> {
         return std::make_unique<Many>();
       });
   EXPECT_THAT(std::string(many.status().message()), HasSubstr("counts 1099511627776 frames"));

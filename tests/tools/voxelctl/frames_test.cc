@@ -44,7 +44,7 @@ TEST(Sequences, AreNamedWithAPlaceForANumber) {
 
 TEST(Sequences, AreReadAhead) {
   TempFolder folder;
-  FileFrames frames({folder.Write("a.xyz", "1 2 3\n"), folder.Path("gone.xyz")}, {});
+  FileFrames frames({folder.Write("a.xyz", "1 2 3\n"), folder.Path("gone.xyz")}, {}, nullptr);
   FrameAhead ahead(frames);
   ahead.Ask(0);
   const auto first = ahead.Take();

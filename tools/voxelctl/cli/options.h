@@ -10,9 +10,8 @@
 #include <vector>
 
 #include "tools/lights/datagram.h"
+#include "tools/voxelctl/import/import_options.h"
 #include "tools/voxelctl/import/model.h"
-#include "tools/voxelctl/import/pdb_molecule.h"
-#include "tools/voxelctl/import/raw_volume.h"
 #include "tools/voxelctl/scene/look.h"
 #include "tools/voxelctl/scene/volume.h"
 #include "voxeld/credentials.h"

@@ -6,18 +6,17 @@
 
 #include "absl/strings/str_join.h"
 #include "common/text/printable.h"
-#include "tools/voxelctl/import/animation.h"
+#include "tools/voxelctl/import/import_program.h"
 #include "tools/voxelctl/import/importer.h"
 
 namespace voxeld::voxelctl {
 namespace {
 
-ImportOptions OptionsOf(const PlayOptions& options, Interrupt* interrupt) {
+ImportOptions OptionsOf(const PlayOptions& options) {
   return {.globe = options.globe,
           .raw = options.raw,
           .style = options.style,
-          .other_files = options.other_files,
-          .interrupt = interrupt};
+          .other_files = options.other_files};
 }
 
 }  // namespace
@@ -31,7 +30,7 @@ absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interru
     console.ProgressBar("reading",
                         static_cast<double>(i) / static_cast<double>(options.files.size()),
                         EscapeForTerminal(options.files[i]));
-    absl::StatusOr<Model> model = ImportFile(options.files[i], OptionsOf(options, &interrupt));
+    absl::StatusOr<Model> model = ImportFile(options.files[i], OptionsOf(options), &interrupt);
     if (model.ok()) {
       const std::string note = NoteOf(*model);
       if (!note.empty()) console.Say(EscapeForTerminal(note));
@@ -66,10 +65,15 @@ absl::StatusOr<std::unique_ptr<FrameSource>> OpenFrameSource(const PlayOptions& 
         "--loop is for sequences ('frame_####.obj', or several files with --sequence) and "
         "--animate");
   }
-  if (!one) return std::make_unique<FileFrames>(options.files, OptionsOf(options, &interrupt));
-  absl::StatusOr<std::vector<std::string>> files = FindSequence(options.files[0]);
+  absl::StatusOr<std::vector<std::string>> files =
+      one ? FindSequence(options.files[0])
+          : absl::StatusOr<std::vector<std::string>>(options.files);
   if (!files.ok()) return files.status();
-  return std::make_unique<FileFrames>(*std::move(files), OptionsOf(options, &interrupt));
+  const bool own = std::all_of(files->begin(), files->end(), [](const std::string& path) {
+    return IsOwnFormat(ExtensionOf(path));
+  });
+  if (!own) return OpenSequence(*files, OptionsOf(options), &interrupt);
+  return std::make_unique<FileFrames>(*std::move(files), OptionsOf(options), &interrupt);
 }
 
 }  // namespace voxeld::voxelctl

@@ -6,7 +6,7 @@
 #include "tools/voxelctl/demo/model_scenes.h"
 #include "tools/voxelctl/demo/scene.h"
 #include "tools/voxelctl/demo/scene_names.h"
-#include "tools/voxelctl/import/more_formats.h"
+#include "tools/voxelctl/import/import_program.h"
 
 namespace voxeld::voxelctl {
 namespace {

@@ -30,52 +30,14 @@
 #include "daemon/address/descriptor.h"
 #include "tools/voxelctl/import/importer.h"
 #include "tools/voxelctl/import/model_bytes.h"
+#include "tools/voxelctl/import/reader_process.h"
 #include "tools/voxelctl/import/sandbox.h"
-
-// Sanitizers reserve more address space than the limit.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define VOXELD_SHADOW_MEMORY
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define VOXELD_SHADOW_MEMORY
-#endif
-#endif
 
 namespace voxeld::voxelctl {
 namespace {
 
-[[maybe_unused]] constexpr rlim_t kMostMemory = rlim_t{4} << 30, kOfFile = 4;
-constexpr rlim_t kMostSeconds = 120, kMostDescriptors = 64;
-constexpr unsigned kMostWaiting = 600;  // s
-constexpr int kNoSandbox = 2;           // exit status
-// Limit of what the reader may write: more than the largest model (kMaxModelVertices and the others).
-constexpr rlim_t kMostModelBytes = rlim_t{5} << 30;
 // Of a frame of an animation, which this process copies.
 constexpr off_t kMostFrameBytes = off_t{1} << 30;
-
-// The folder below which the reader may open files: that of the file, or the one that is read.
-std::string Readable(const SourceFile& file) {
-  if (file.other_files == OtherFiles::kNone) return "";
-  if (file.other_files == OtherFiles::kAny) return "/";
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file.path, ignored)) return file.path;
-  const std::string folder = std::filesystem::path(file.path).parent_path().string();
-  return folder.empty() ? "." : folder;
-}
-
-void Limit(int resource, rlim_t most) {
-  const rlimit limit = {most, most};
-  ::setrlimit(static_cast<__rlimit_resource>(resource), &limit);
-}
-
-// Bytes of address space that this process uses. Builds with a sanitizer do not call it: they have no
-// limit on address space.
-[[maybe_unused]] rlim_t AddressSpace() {
-  const daemon::Descriptor file(::open("/proc/self/statm", O_RDONLY | O_CLOEXEC));
-  char text[64] = {};
-  if (::read(file.get(), text, sizeof(text) - 1) <= 0) return 0;
-  return std::strtoull(text, nullptr, 10) * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE));
-}
 
 absl::Status NoSandbox(const SourceFile& file, const absl::Status& why) {
   return absl::FailedPreconditionError(
@@ -83,11 +45,8 @@ absl::Status NoSandbox(const SourceFile& file, const absl::Status& why) {
                    "; Linux 5.13 or later with Landlock and seccomp is expected"));
 }
 
-constexpr int kFirstKept = 3;  // of the descriptors of a reader
-
-// Call it in the child. Closes all descriptors except the standard streams and `kept`, which are renumbered in order from kFirstKept on,
-// and drops what reading does not need. Returns: false if the process could not be confined and the file must not be read without that.
-bool BecomeReader(const SourceFile& file, std::span<const int> kept, pid_t parent) {
+// Call it in the child. Closes all descriptors except the standard streams and `kept`, which are renumbered in order from kModel on.
+void KeepOnly(std::span<const int> kept, pid_t parent) {
   // Ends with the thread that waits for it, which may have ended already.
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(1);
@@ -101,33 +60,11 @@ bool BecomeReader(const SourceFile& file, std::span<const int> kept, pid_t paren
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, stream);
   // Move all of them above the target numbers first, so that no dup2 closes one that is still needed.
   constexpr int kAside = 32;
-  int next = kFirstKept;
+  int next = kModelDescriptor;
   std::vector<int> aside;
   for (const int descriptor : kept) aside.push_back(::fcntl(descriptor, F_DUPFD, kAside));
   for (const int descriptor : aside) ::dup2(descriptor, next++);
   ::close_range(static_cast<unsigned>(next), ~0U, 0);
-  Limit(RLIMIT_CORE, 0);
-  Limit(RLIMIT_NOFILE, kMostDescriptors);
-  Limit(RLIMIT_FSIZE, kMostModelBytes);
-#if !defined(VOXELD_SHADOW_MEMORY)
-  Limit(RLIMIT_AS, AddressSpace() + kMostMemory + kOfFile * file.bytes.size());
-#endif
-  // For a file of the user's own the sandbox is a second line: without Landlock the first remains.
-  return Sandbox::Get().Enter(Readable(file)).ok() || file.other_files != OtherFiles::kNone;
-}
-
-[[noreturn]] void RunChild(const SourceFile& file,
-                           const std::function<absl::StatusOr<Model>()>& read, int descriptor,
-                           pid_t parent) {
-  ::alarm(kMostWaiting);
-  Limit(RLIMIT_CPU, kMostSeconds);
-  if (!BecomeReader(file, {{descriptor}}, parent)) ::_exit(kNoSandbox);
-  bool good = false;
-  try {
-    good = WriteModel(read(), kFirstKept);
-  } catch (const std::exception&) {
-  }
-  ::_exit(good ? 0 : 1);
 }
 
 // Waits for the end of `child`, which `interrupt` brings about.
@@ -152,7 +89,7 @@ absl::Status NoReader(const SourceFile& file) {
                    ": cannot run the process that reads it: ", std::strerror(errno)));
 }
 
-absl::Status TimedOut(const SourceFile& file, rlim_t seconds, absl::string_view of) {
+absl::Status TimedOut(const SourceFile& file, unsigned seconds, absl::string_view of) {
   return Spoilt(file, absl::StrCat("timed out after ", seconds, " s", of));
 }
 
@@ -161,15 +98,19 @@ absl::Status EndOf(const SourceFile& file, int state) {
   if (WIFSIGNALED(state)) {
     const int signal = WTERMSIG(state);
     if (signal == SIGINT || signal == SIGTERM) return absl::CancelledError("interrupted");
-    if (signal == SIGXCPU) return TimedOut(file, kMostSeconds, " of processor time");
-    if (signal == SIGALRM) return TimedOut(file, kMostWaiting, "");
+    if (signal == SIGXCPU) return TimedOut(file, kMostProcessorSeconds, " of processor time");
+    if (signal == SIGALRM) return TimedOut(file, kMostReadingSeconds, "");
     if (signal == SIGKILL)
       return Spoilt(file, "was killed, as the system does when memory is short");
     if (signal == SIGXFSZ) return Spoilt(file, "made more than a model may hold");
     return Spoilt(file, absl::StrCat("crashed (", ::strsignal(signal), ")"));
   }
-  if (WEXITSTATUS(state) == kNoSandbox) {
+  if (WEXITSTATUS(state) == kNotConfined) {
     return NoSandbox(file, absl::UnavailableError("its reader could not be confined"));
+  }
+  if (WEXITSTATUS(state) == kNotStarted) {
+    return absl::UnavailableError(absl::StrCat(EscapeForTerminal(file.path),
+                                               ": the program that reads it could not be started"));
   }
   if (WEXITSTATUS(state) != 0) return Spoilt(file, "wanted more than 4 GiB of memory, or gave up");
   return absl::OkStatus();
@@ -187,31 +128,6 @@ bool ReadAll(int descriptor, void* out, size_t size) {
   return true;
 }
 
-// A few bytes, of which a socket takes all or none.
-bool WriteNumber(int descriptor, int64_t number) {
-  return ::write(descriptor, &number, sizeof(number)) == sizeof(number);
-}
-
-// Runs in the child. Opens the source and answers with the number of its frames; on an error, writes that with WriteModel and answers -1.
-// Then, for each frame number that it receives, writes the frame and answers 0.
-[[noreturn]] void ServeFrames(SourceFile file, const OpenFrames& open, int model, int channel,
-                              pid_t parent) {
-  if (!BecomeReader(file, {{model, channel}}, parent)) ::_exit(kNoSandbox);
-  constexpr int kModel = kFirstKept, kChannel = kFirstKept + 1;
-  bool good = true;
-  try {
-    const absl::StatusOr<std::unique_ptr<FrameSource>> source = open(std::move(file));
-    if (!source.ok()) good = WriteModel(source.status(), kModel);
-    good = good && WriteNumber(kChannel, source.ok() ? (*source)->count() : -1);
-    for (int64_t frame = 0; good && source.ok() && ReadAll(kChannel, &frame, sizeof(frame));) {
-      good = WriteModel((*source)->Read(frame), kModel) && WriteNumber(kChannel, 0);
-    }
-  } catch (const std::exception&) {
-    good = false;
-  }
-  ::_exit(good ? 0 : 1);
-}
-
 class ContainedFrames final : public FrameSource {
  public:
   ContainedFrames(SourceFile file, Interrupt* interrupt)
@@ -222,7 +138,7 @@ class ContainedFrames final : public FrameSource {
     Await(child_, nullptr);
   }
 
-  absl::Status Start(const OpenFrames& open) {
+  absl::Status Start(const ReaderMain& reader) {
     model_ = daemon::Descriptor(::memfd_create("voxelctl-frame", MFD_CLOEXEC));
     int ends[2] = {-1, -1};
     if (!model_.ok() || ::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
@@ -233,7 +149,11 @@ class ContainedFrames final : public FrameSource {
     const pid_t parent = ::getpid();
     child_ = ::fork();
     if (child_ < 0) return NoReader(file_);
-    if (child_ == 0) ServeFrames(std::move(file_), open, model_.get(), other.get(), parent);
+    if (child_ == 0) {
+      KeepOnly({{model_.get(), other.get()}}, parent);
+      reader();
+      ::_exit(1);
+    }
     file_.bytes = std::string();  // the reader has them
     return absl::OkStatus();
   }
@@ -291,9 +211,9 @@ class ContainedFrames final : public FrameSource {
         if (got > 0 && !answered) over = Spoilt(file_, "gave up halfway");
         break;
       }
-      if (waited >= kMostWaiting) over = TimedOut(file_, kMostWaiting, "");
-      if (ProcessorSeconds() - used_ > static_cast<double>(kMostSeconds)) {
-        over = TimedOut(file_, kMostSeconds, " of processor time");
+      if (waited >= kMostReadingSeconds) over = TimedOut(file_, kMostReadingSeconds, "");
+      if (ProcessorSeconds() - used_ > static_cast<double>(kMostProcessorSeconds)) {
+        over = TimedOut(file_, kMostProcessorSeconds, " of processor time");
       }
     }
     // What the reader uses while it is not asked for a frame counts for the next one.
@@ -343,8 +263,7 @@ class ContainedFrames final : public FrameSource {
 
 }  // namespace
 
-absl::StatusOr<Model> ReadContained(const SourceFile& file,
-                                    const std::function<absl::StatusOr<Model>()>& read,
+absl::StatusOr<Model> ReadContained(const SourceFile& file, const ReaderMain& reader,
                                     Interrupt* interrupt) {
   const absl::Status landlock = Sandbox::Get().CheckLandlock();
   if (file.other_files == OtherFiles::kNone && !landlock.ok()) return NoSandbox(file, landlock);
@@ -353,7 +272,11 @@ absl::StatusOr<Model> ReadContained(const SourceFile& file,
   const pid_t parent = ::getpid();
   const pid_t child = ::fork();
   if (child < 0) return NoReader(file);
-  if (child == 0) RunChild(file, read, descriptor.get(), parent);
+  if (child == 0) {
+    KeepOnly({{descriptor.get()}}, parent);
+    reader();
+    ::_exit(1);
+  }
   const int state = Await(child, interrupt);
   if (interrupt != nullptr && interrupt->requested()) return absl::CancelledError("interrupted");
   if (absl::Status end = EndOf(file, state); !end.ok()) return end;
@@ -368,12 +291,13 @@ absl::StatusOr<Model> ReadContained(const SourceFile& file,
   return model;
 }
 
-absl::StatusOr<std::unique_ptr<FrameSource>> OpenContained(SourceFile file, const OpenFrames& open,
+absl::StatusOr<std::unique_ptr<FrameSource>> OpenContained(SourceFile file,
+                                                           const ReaderMain& reader,
                                                            Interrupt* interrupt) {
   const absl::Status landlock = Sandbox::Get().CheckLandlock();
   if (file.other_files == OtherFiles::kNone && !landlock.ok()) return NoSandbox(file, landlock);
   auto frames = std::make_unique<ContainedFrames>(std::move(file), interrupt);
-  if (absl::Status status = frames->Start(open); !status.ok()) return status;
+  if (absl::Status status = frames->Start(reader); !status.ok()) return status;
   if (absl::Status status = frames->Opened(); !status.ok()) return status;
   return frames;
 }

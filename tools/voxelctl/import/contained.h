@@ -12,21 +12,22 @@
 
 namespace voxeld::voxelctl {
 
-// Returns what `read` returns in a copy of this process that has limits and a sandbox (sandbox.h): 4 GiB of memory beside this
-// process's own and four times the file, 120 s of processor time, 10 minutes, 64 descriptors; of files it can open those that
-// file.other_files allows. The copy ends with this process.
-// Errors: those of `read`; InvalidArgument if it crashed or went beyond a limit; Cancelled if `interrupt` (may be null) was requested;
+// Runs in a child of this process, whose descriptors are the standard streams, which lead nowhere, and those of reader_process.h.
+using ReaderMain = std::function<void()>;
+
+// Returns the model that `reader` answers with (ReaderOf, ProgramOf). The reader has limits and a sandbox (sandbox.h): 4 GiB of memory beside
+// the program's own and four times the file, 120 s of processor time, 10 minutes, 64 descriptors; of files it can open those that
+// file.other_files allows. It ends with this process.
+// Errors: those of the reader; InvalidArgument if it crashed or went beyond a limit; Cancelled if `interrupt` (may be null) was requested;
 // FailedPrecondition if file.other_files is kNone, as for a stranger's file, and this system has no Landlock.
-absl::StatusOr<Model> ReadContained(const SourceFile& file,
-                                    const std::function<absl::StatusOr<Model>()>& read,
+absl::StatusOr<Model> ReadContained(const SourceFile& file, const ReaderMain& reader,
                                     Interrupt* interrupt = nullptr);
 
-using OpenFrames = std::function<absl::StatusOr<std::unique_ptr<FrameSource>>(SourceFile file)>;
-
-// Returns a source of frames that `open` opens, and reads, in such a copy of this process, which lives as long as the result. The limits of
+// Returns a source of the frames that `reader` serves (FramesOf, ProgramOf), which lives as long as the result. The limits of
 // time hold for opening, and for each frame. Call it on a thread that lives as long as the result.
-// Errors: those of `open`, and as above; also of each frame.
-absl::StatusOr<std::unique_ptr<FrameSource>> OpenContained(SourceFile file, const OpenFrames& open,
+// Errors: as above; also of each frame.
+absl::StatusOr<std::unique_ptr<FrameSource>> OpenContained(SourceFile file,
+                                                           const ReaderMain& reader,
                                                            Interrupt* interrupt = nullptr);
 
 }  // namespace voxeld::voxelctl

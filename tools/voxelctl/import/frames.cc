@@ -12,6 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
+#include "tools/voxelctl/import/importer.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -62,7 +63,7 @@ std::optional<uint64_t> NumberOf(const Pattern& pattern, absl::string_view name)
 }  // namespace
 
 absl::StatusOr<Model> FileFrames::Read(int64_t frame) {
-  return ImportFile(paths_[static_cast<size_t>(frame)], options_);
+  return ImportFile(paths_[static_cast<size_t>(frame)], options_, interrupt_);
 }
 
 bool IsSequence(const std::string& path) {

@@ -8,8 +8,9 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "tools/voxelctl/import/importer.h"
+#include "tools/voxelctl/import/import_options.h"
 #include "tools/voxelctl/import/model.h"
+#include "tools/voxelctl/process/interrupt.h"
 
 namespace voxeld::voxelctl {
 
@@ -23,17 +24,19 @@ class FrameSource {
   virtual absl::StatusOr<Model> Read(int64_t frame) = 0;
 };
 
-// A file for each.
+// A file of an own format for each (IsOwnFormat).
 class FileFrames final : public FrameSource {
  public:
-  FileFrames(std::vector<std::string> paths, const ImportOptions& options)
-      : paths_(std::move(paths)), options_(options) {}
+  // `interrupt`, which may be null, outlives it.
+  FileFrames(std::vector<std::string> paths, const ImportOptions& options, Interrupt* interrupt)
+      : paths_(std::move(paths)), options_(options), interrupt_(interrupt) {}
   int64_t count() const override { return static_cast<int64_t>(paths_.size()); }
   absl::StatusOr<Model> Read(int64_t frame) override;
 
  private:
   const std::vector<std::string> paths_;
   const ImportOptions options_;
+  Interrupt* const interrupt_;
 };
 
 // Whether the name of a file has a place for a number: "####" or "%04d". A file of just that name is none.

@@ -10,13 +10,14 @@
 #include "absl/strings/str_cat.h"
 #include "tools/voxelctl/import/contained.h"
 #include "tools/voxelctl/import/geojson.h"
+#include "tools/voxelctl/import/import_program.h"
 #include "tools/voxelctl/import/importer.h"
 #include "tools/voxelctl/import/json_text.h"
-#include "tools/voxelctl/import/more_formats.h"
 #include "tools/voxelctl/import/ply_header.h"
 #include "tools/voxelctl/import/ply_mesh.h"
 #include "tools/voxelctl/import/ply_points.h"
 #include "tools/voxelctl/import/ply_realign.h"
+#include "tools/voxelctl/import/reader_process.h"
 #include "tools/voxelctl/import/stl_mesh.h"
 #include "tools/voxelctl/import/text_points.h"
 #include "tools/voxelctl/import/vox_model.h"
@@ -51,20 +52,6 @@ absl::StatusOr<Model> ReadPly(const SourceFile& file) {
     return model;
   }
   return HasPlySurfaces(*header) ? ReadPlyMesh(file, *header) : ReadPlyPoints(file, *header);
-}
-
-absl::StatusOr<Model> Read(const SourceFile& file, const ImportOptions& options) {
-  const std::string& extension = file.extension;
-  if (extension == "ply") return ReadPly(file);
-  if (extension == "stl") return ReadStlMesh(file);
-  if (extension == "xyz" || extension == "txt" || extension == "asc" || extension == "pts" ||
-      extension == "csv") {
-    return ReadTextPoints(file);
-  }
-  if (extension == "vox") return ReadVoxModel(file);
-  if (extension == "json" || extension == "geojson" || extension == "topojson")
-    return ReadMap(file, options.globe);
-  return ReadMoreFormats(file, options);
 }
 
 bool IsFiniteValue(const Point3& p) {
@@ -165,24 +152,31 @@ absl::Status CheckModel(const SourceFile& file, const Model& model) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<Model> ReadSource(const SourceFile& file, const ImportOptions& options) {
-  absl::StatusOr<Model> model = Read(file, options);
-  if (!model.ok()) return model;
-  if (absl::Status status = CheckModel(file, *model); !status.ok()) return status;
-  return model;
+bool IsOwnFormat(absl::string_view extension) {
+  constexpr absl::string_view kOwn[] = {"asc", "csv", "geojson", "json",     "ply", "pts",
+                                        "stl", "txt", "vox",     "topojson", "xyz"};
+  return std::find(std::begin(kOwn), std::end(kOwn), extension) != std::end(kOwn);
 }
 
-absl::StatusOr<Model> ImportFile(const std::string& path, const ImportOptions& options) {
+absl::StatusOr<Model> ReadOwnFormat(const SourceFile& file, const ImportOptions& options) {
+  const std::string& extension = file.extension;
+  if (extension == "ply") return ReadPly(file);
+  if (extension == "stl") return ReadStlMesh(file);
+  if (extension == "vox") return ReadVoxModel(file);
+  if (extension == "json" || extension == "geojson" || extension == "topojson")
+    return ReadMap(file, options.globe);
+  return ReadTextPoints(file);
+}
+
+absl::StatusOr<Model> ImportFile(const std::string& path, const ImportOptions& options,
+                                 Interrupt* interrupt) {
   std::error_code ignored;
-  const bool folder = std::filesystem::is_directory(path, ignored);
-  const absl::StatusOr<SourceFile> file = folder ? SourceFile{.path = path,
-                                                              .extension = {},
-                                                              .bytes = {},
-                                                              .other_files = options.other_files}
-                                                 : ReadSourceFile(path, options.other_files);
+  if (!IsOwnFormat(ExtensionOf(path)) || std::filesystem::is_directory(path, ignored))
+    return ImportByProgram(path, options, interrupt);
+  const absl::StatusOr<SourceFile> file = ReadSourceFile(path, options.other_files);
   if (!file.ok()) return file.status();
   absl::StatusOr<Model> model = ReadContained(
-      *file, [&] { return folder ? ReadFolder(path) : Read(*file, options); }, options.interrupt);
+      *file, ReaderOf(*file, [&] { return ReadOwnFormat(*file, options); }), interrupt);
   if (!model.ok()) return model;
   const absl::Status status = CheckModel(*file, *model);
   if (!status.ok()) return status;

@@ -34,7 +34,17 @@ absl::Status NoLandlock(int error) {
       "this system cannot confine a process to files (Landlock: ", std::strerror(error), ")"));
 }
 
-absl::Status ConfineFiles(const std::string& readable) {
+// False, with errno, if files below `path` cannot be allowed.
+bool AllowReading(const daemon::Descriptor& rules, const std::string& path) {
+  const daemon::Descriptor folder(::open(path.c_str(), O_PATH | O_CLOEXEC));
+  landlock_path_beneath_attr below = {};
+  below.allowed_access = LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
+  below.parent_fd = folder.get();
+  return folder.ok() &&
+         ::syscall(SYS_landlock_add_rule, rules.get(), LANDLOCK_RULE_PATH_BENEATH, &below, 0) == 0;
+}
+
+absl::Status ConfineFiles(const std::string& readable, const std::vector<std::string>& more) {
   const long version = LandlockVersion();
   if (version < 1) return NoLandlock(errno);
   landlock_ruleset_attr rights = {};
@@ -43,15 +53,9 @@ absl::Status ConfineFiles(const std::string& readable) {
   const daemon::Descriptor rules(
       static_cast<int>(::syscall(SYS_landlock_create_ruleset, &rights, sizeof(rights), 0)));
   if (!rules.ok()) return NoLandlock(errno);
-  if (!readable.empty()) {
-    const daemon::Descriptor folder(::open(readable.c_str(), O_PATH | O_CLOEXEC));
-    landlock_path_beneath_attr below = {};
-    below.allowed_access = LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
-    below.parent_fd = folder.get();
-    if (!folder.ok() ||
-        ::syscall(SYS_landlock_add_rule, rules.get(), LANDLOCK_RULE_PATH_BENEATH, &below, 0) != 0) {
-      return NoLandlock(errno);
-    }
+  if (!readable.empty() && !AllowReading(rules, readable)) return NoLandlock(errno);
+  for (const std::string& folder : more) {
+    if (!AllowReading(rules, folder) && errno != ENOENT) return NoLandlock(errno);
   }
   if (::syscall(SYS_landlock_restrict_self, rules.get(), 0) != 0) return NoLandlock(errno);
   return absl::OkStatus();
@@ -126,9 +130,10 @@ absl::Status Sandbox::CheckLandlock() const {
   return LandlockVersion() < 1 ? NoLandlock(errno) : absl::OkStatus();
 }
 
-absl::Status Sandbox::Enter(const std::string& readable) const {
+absl::Status Sandbox::Enter(const std::string& readable,
+                            const std::vector<std::string>& more) const {
   ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-  absl::Status status = ConfineFiles(readable);
+  absl::Status status = ConfineFiles(readable, more);
   const sock_fprog program = {static_cast<unsigned short>(filter_.size()),
                               const_cast<sock_filter*>(filter_.data())};
   if (filter_.empty() || ::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program, 0, 0) != 0) {

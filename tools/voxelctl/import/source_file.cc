@@ -23,11 +23,6 @@
 namespace voxeld::voxelctl {
 namespace {
 
-std::string ExtensionOf(const std::string& path) {
-  const std::string extension = std::filesystem::path(path).extension().string();
-  return absl::AsciiStrToLower(extension.empty() ? extension : extension.substr(1));
-}
-
 // Opens a regular file relative to `folder`. With `beneath`, the kernel refuses "..", absolute paths and links that lead out of it.
 // First only looks the file up (O_PATH), because opening a device or a FIFO can have side effects.
 daemon::Descriptor OpenRegularFile(int folder, const std::string& name, bool beneath) {
@@ -62,6 +57,11 @@ bool ReadWhole(int descriptor, std::string* bytes) {
 }
 
 }  // namespace
+
+std::string ExtensionOf(const std::string& path) {
+  const std::string extension = std::filesystem::path(path).extension().string();
+  return absl::AsciiStrToLower(extension.empty() ? extension : extension.substr(1));
+}
 
 absl::StatusOr<SourceFile> ReadSourceFile(const std::string& path, OtherFiles other_files) {
   struct stat info {};

@@ -27,6 +27,9 @@ struct SourceFile {
   OtherFiles other_files = OtherFiles::kBelow;
 };
 
+// In lower case, without the dot; of a file without one empty.
+std::string ExtensionOf(const std::string& path);
+
 // NotFound, PermissionDenied or InvalidArgument (a directory, an empty file, more than
 // kMaxFileBytes); the message begins with the path.
 absl::StatusOr<SourceFile> ReadSourceFile(const std::string& path,

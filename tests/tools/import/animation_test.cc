@@ -1,0 +1,181 @@
+// What assimp reads beside the formats with checks of their own, in a process of its own, and what moves.
+#include "tools/voxelctl/import/import_program.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <csignal>
+#include <cstdlib>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "tests/tools/import/read_here.h"
+#include "tests/tools/voxelctl/status_matchers.h"
+#include "tests/tools/voxelctl/temp_folder.h"
+#include "tools/voxelctl/import/importer.h"
+
+namespace voxeld::voxelctl {
+namespace animation_test {
+
+using ::testing::HasSubstr;
+
+std::string ModelFile(const std::string& name) {
+  return std::string(VOXELD_MODELS_DIR) + "/" + name;
+}
+
+struct Real {
+  const char* path;
+  const char* format;
+  size_t indices;
+};
+
+class MoreMeshes : public testing::TestWithParam<Real> {};
+
+TEST_P(MoreMeshes, AreReadWhole) {
+  const auto model = ReadApart(ModelFile(GetParam().path));
+  ASSERT_THAT(model, IsOk()) << "tools/setup --import installs assimp-testmodels";
+  EXPECT_EQ(model->format, GetParam().format);
+  size_t indices = 0;
+  for (const Part& part : model->parts) indices += part.indices.size();
+  EXPECT_EQ(indices, GetParam().indices);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Table, MoreMeshes,
+    testing::Values(Real{"OFF/Wuson.off", "OFF", 11196}, Real{"FBX/spider.fbx", "FBX", 4104},
+                    Real{"3MF/box.3mf", "3MF", 36}, Real{"Collada/duck.dae", "COLLADA", 12636},
+                    Real{"BLEND/Suzanne_248.blend", "Blender", 11616},
+                    Real{"IFC/AC14-FZK-Haus.ifc", "IFC", 107718}, Real{"BVH/01_01.bvh", "BVH", 74},
+                    Real{"3DS/fels.3ds", "3ds", 2304}));
+
+TEST(MoreMeshes, ThatAreWrong) {
+  TempFolder folder;
+  const auto error = [&folder](const std::string& name, const std::string& bytes) {
+    return std::string(ReadApart(folder.Write(name, bytes)).status().message());
+  };
+  EXPECT_THAT(error("a.off", "hello"), HasSubstr("a file that begins with \"OFF\" is expected"));
+  EXPECT_THAT(error("a.fbx", "hello"), HasSubstr("binary or ASCII FBX is expected"));
+  EXPECT_THAT(error("a.3mf", "hello"), HasSubstr("a ZIP archive"));
+  EXPECT_THAT(error("a.dae", "<?xml version='1.0'?><html/>"),
+              HasSubstr("is XML text; XML of <COLLADA>"));
+  EXPECT_THAT(error("a.blend", "hello"), HasSubstr("a Blender file is expected"));
+  EXPECT_THAT(error("a.ifc", "hello"), HasSubstr("a STEP file"));
+  EXPECT_THAT(error("a.bvh", "hello"), HasSubstr("\"HIERARCHY\" is expected"));
+  EXPECT_THAT(error("a.off", "OFF\n99999999 99999999 0\n1 2 3\n"),
+              HasSubstr("declares 99999999 vertices and 99999999 faces but has only 30 bytes"));
+  // However the header is written: with comments, a dimension, glued to the count, larger than 64 bits, or with letters after the digits.
+  for (const char* text :
+       {"COFF # 1 2\n# 1 1\n 1\r\n18446744073709551615 0\n1 2 3\n", "nOFF\n3\n1 99999999 0\n",
+        "STCN4nOFF 3 99999999 1 0\n", "OFF99999999 1 1\n", "OFF\n18446744073809551615 1 0\n",
+        "OFF\n99999999x 1 1\n", "OFF\n1 99999999999999999999999999 0\n"}) {
+    EXPECT_THAT(error("b.off", text), HasSubstr(" faces but has only ")) << text;
+  }
+}
+
+// Sizes declared in a truncated file are not trusted.
+TEST(MoreMeshes, TruncatedFilesAreRejected) {
+  TempFolder folder;
+  const auto fbx = ReadAll(ModelFile("FBX/box.fbx"));
+  for (const size_t size : {size_t{30}, fbx.size() / 2, fbx.size() - 200})
+    EXPECT_FALSE(ReadApart(folder.Write("b.fbx", fbx.substr(0, size))).ok()) << size;
+}
+
+TEST(MoreMeshes, DamagedOnesEndWell) {
+  TempFolder folder;
+  std::mt19937 random(5);
+  for (const char* path : {"FBX/box.fbx", "3MF/box.3mf", "BLEND/BlenderDefault_248.blend",
+                           "Collada/cube_triangulate.dae", "OFF/Cube.off"}) {
+    const std::string good = ReadAll(ModelFile(path));
+    const std::string name =
+        absl::StrCat("a.", std::string(path).substr(std::string(path).rfind('.') + 1));
+    for (int i = 0; i < 30; ++i) {
+      std::string bytes = good;
+      for (int k = 0; k < 4; ++k) bytes[random() % bytes.size()] = static_cast<char>(random());
+      if (i % 4 == 0) bytes.resize(1 + random() % bytes.size());
+      const auto model = ReadApart(folder.Write(name, bytes));
+      if (!model.ok()) {
+        EXPECT_THAT(std::string(model.status().message()), HasSubstr(name));
+      }
+    }
+  }
+}
+
+// ----------------------------------------------------------------------------------- what moves
+
+TEST(Animations, OfASkeletonAlone) {
+  const auto frames = OpenAnimation(ModelFile("BVH/01_01.bvh"), 1, 20);
+  ASSERT_THAT(frames, IsOk());
+  EXPECT_GT((*frames)->count(), 100);
+  const auto first = (*frames)->Read(0), later = (*frames)->Read((*frames)->count() - 1);
+  ASSERT_THAT(first, IsOk());
+  ASSERT_THAT(later, IsOk());
+  const Part &a = first->parts.at(0), &b = later->parts.at(0);
+  EXPECT_EQ(a.kind, Kind::kSegments);
+  EXPECT_GT(a.thickness, 0);
+  EXPECT_EQ(a.thickness, b.thickness);
+  ASSERT_EQ(a.positions.size(), b.positions.size());
+  EXPECT_NE(a.positions, b.positions);
+  // Bones turn and do not stretch.
+  for (size_t i = 2; i + 1 < a.positions.size(); i += 2) {
+    const auto length = [i](const Part& part) {
+      const Point3 &p = part.positions[i], &q = part.positions[i + 1];
+      return std::hypot(p.x - q.x, p.y - q.y, p.z - q.z);
+    };
+    EXPECT_NEAR(length(a), length(b), 1e-3 + 1e-3 * length(a)) << i;
+  }
+}
+
+TEST(Animations, OfAMeshOnItsBones) {
+  const auto frames = OpenAnimation(ModelFile("FBX/animation_with_skeleton.fbx"), 1, 10);
+  ASSERT_THAT(frames, IsOk());
+  ASSERT_GT((*frames)->count(), 1);
+  const auto first = (*frames)->Read(0), later = (*frames)->Read((*frames)->count() / 2);
+  ASSERT_THAT(first, IsOk());
+  ASSERT_THAT(later, IsOk());
+  EXPECT_EQ(first->parts.at(0).kind, Kind::kTriangles);
+  EXPECT_EQ(first->parts[0].indices, later->parts[0].indices);
+  EXPECT_NE(first->parts[0].positions, later->parts[0].positions);
+}
+
+TEST(Animations, OfAMeshFromShapeToShape) {
+  const auto frames = OpenAnimation(
+      ModelFile("glTF2/glTF-Sample-Models/AnimatedMorphCube-glTF/AnimatedMorphCube.gltf"), 1, 10);
+  ASSERT_THAT(frames, IsOk());
+  ASSERT_GT((*frames)->count(), 2);
+  const auto first = (*frames)->Read(0), later = (*frames)->Read((*frames)->count() / 2);
+  ASSERT_THAT(first, IsOk());
+  ASSERT_THAT(later, IsOk());
+  EXPECT_NE(first->parts.at(0).positions, later->parts.at(0).positions);
+}
+
+TEST(Animations, OfASkinInGltf) {
+  const auto frames = OpenAnimation(ModelFile("glTF2/simple_skin/simple_skin.gltf"), 1, 10);
+  ASSERT_THAT(frames, IsOk());
+  const auto first = (*frames)->Read(0), later = (*frames)->Read((*frames)->count() / 4);
+  ASSERT_THAT(first, IsOk());
+  ASSERT_THAT(later, IsOk());
+  // Two bones, of which the upper one bends: the lower end of the strip stays.
+  ASSERT_EQ(first->parts.at(0).positions.size(), later->parts.at(0).positions.size());
+  size_t still = 0, moved = 0;
+  for (size_t i = 0; i < first->parts[0].positions.size(); ++i)
+    ++(first->parts[0].positions[i] == later->parts[0].positions[i] ? still : moved);
+  EXPECT_GT(still, 0u);
+  EXPECT_GT(moved, 0u);
+}
+
+TEST(Animations, ThatAreNotThere) {
+  EXPECT_THAT(std::string(OpenAnimation(ModelFile("BVH/01_01.bvh"), 2, 20).status().message()),
+              HasSubstr("has no animation 2; it has 1"));
+  EXPECT_THAT(std::string(OpenAnimation(ModelFile("OBJ/spider.obj"), 1, 20).status().message()),
+              HasSubstr("it has none at all"));
+  EXPECT_THAT(std::string(OpenAnimation("/nowhere.glb", 1, 20).status().message()),
+              HasSubstr("No such file"));
+}
+
+}  // namespace animation_test
+}  // namespace voxeld::voxelctl

@@ -1,0 +1,379 @@
+// Point clouds as text, PCD and LAS: every way to write them, and what is said of those that are broken.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <liblzf/lzf.h>
+
+#include <bit>
+#include <cstring>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "tests/tools/import/read_here.h"
+#include "tests/tools/voxelctl/status_matchers.h"
+#include "tests/tools/voxelctl/temp_folder.h"
+#include "tools/voxelctl/import/importer.h"
+
+namespace voxeld::voxelctl {
+namespace cloud_test {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class Clouds : public testing::Test {
+ protected:
+  absl::StatusOr<Model> Import(const std::string& name, const std::string& bytes) {
+    return ReadHere(folder_.Write(name, bytes), {});
+  }
+  Part Points(const std::string& name, const std::string& bytes) {
+    const auto model = Import(name, bytes);
+    EXPECT_TRUE(model.ok()) << model.status();
+    return model.ok() ? model->parts.at(0) : Part();
+  }
+  std::string Error(const std::string& name, const std::string& bytes) {
+    return std::string(Import(name, bytes).status().message());
+  }
+
+  TempFolder folder_;
+};
+
+template <typename T>
+void Put(std::string* out, size_t at, T value) {
+  if (out->size() < at + sizeof(value)) out->resize(at + sizeof(value), '\0');
+  std::memcpy(out->data() + at, &value, sizeof(value));
+}
+template <typename T>
+std::string Bytes(T value) {
+  std::string out;
+  Put(&out, 0, value);
+  return out;
+}
+
+TEST_F(Clouds, TextOfThreeNumbers) {
+  const Part part = Points("a.xyz", "# a comment\n3\n1 2 3\n\n -1e3\t+2.5 0 // here\r\n4,5,6\n");
+  EXPECT_THAT(part.positions, ElementsAre(Point3{1, 2, 3}, Point3{-1000, 2.5, 0}, Point3{4, 5, 6}));
+  EXPECT_THAT(part.colors, IsEmpty());
+  EXPECT_EQ(part.kind, Kind::kPoints);
+}
+
+TEST_F(Clouds, TextByTheNumberOfColumns) {
+  EXPECT_THAT(Points("a.xyz", "0 0 0 10\n1 0 0 20\n2 0 0 15\n").colors,
+              ElementsAre(Rgb{0, 0, 0}, Rgb{255, 255, 255}, Rgb{128, 128, 128}))
+      << "intensities, stretched";
+  EXPECT_THAT(Points("a.txt", "0 0 0 255 128 0\n").colors, ElementsAre(Rgb{255, 128, 0}));
+  EXPECT_THAT(Points("a.asc", "0 0 0 1 0.5 0\n").colors, ElementsAre(Rgb{255, 128, 0}));
+  const Part normals = Points("a.xyz", "0 0 0 0 0 -1\n1 1 1 0.6 0 0.8\n");
+  EXPECT_THAT(normals.normals, ElementsAre(Point3{0, 0, -1}, Point3{0.6, 0, 0.8}));
+  EXPECT_THAT(normals.colors, IsEmpty());
+  EXPECT_THAT(Points("a.pts", "2\n0 0 0 -5 1 2 3\n1 1 1 9 4 5 6\n").colors,
+              ElementsAre(Rgb{1, 2, 3}, Rgb{4, 5, 6}));
+  const Part all = Points("a.xyz", "0 0 0 9 8 7 0 2 0\n");
+  EXPECT_THAT(all.colors, ElementsAre(Rgb{9, 8, 7}));
+  EXPECT_THAT(all.normals, ElementsAre(Point3{0, 1, 0}));
+}
+
+TEST_F(Clouds, TextByNames) {
+  const Part part = Points("a.csv",
+                           "\xef\xbb\xbfid;\"Z\";Y;X;red;Green;BLUE;remark\n"
+                           "7;3;2;1;255;0;51;\n8;6;5;4;0;255;0;;\n");
+  EXPECT_THAT(part.positions, ElementsAre(Point3{1, 2, 3}, Point3{4, 5, 6}));
+  EXPECT_THAT(part.colors, ElementsAre(Rgb{255, 0, 51}, Rgb{0, 255, 0}));
+  EXPECT_THAT(Points("b.csv", "lon,lat,height\n13.4,52.5,34\n").positions,
+              ElementsAre(Point3{13.4, 52.5, 34}));
+}
+
+TEST_F(Clouds, TextWithDecimalCommasAndQuotes) {
+  const auto two = ElementsAre(Point3{0.5, 1.5, -2}, Point3{3, 4.25, 5});
+  EXPECT_THAT(Points("a.csv", "x;y;z\n0,5;1,5;-2\n3;4,25;5\n").positions, two);
+  EXPECT_THAT(Points("a.txt", "0,5\t1,5\t-2\n3\t4,25\t5\n").positions, two);
+  EXPECT_THAT(Points("a.xyz", "0,5 1,5 -2\n3 4,25 5\n").positions, two);
+  EXPECT_THAT(
+      Points("a.csv", "\"x\",\"y\",\"z\"\n\"0.5\", \"1.5\",-2\n3,\"4.25\",\"5\"\n").positions, two);
+  EXPECT_THAT(
+      Points("a.csv", "name,x,y,z\n\"a, b\",\"0,5\",\"1,5\",-2\nc,3,\"4,25\",5\n").positions, two);
+  EXPECT_THAT(Error("a.csv", "x;y;z\n0,5;1;2\n0.5;1;2\n"),
+              HasSubstr("line 3 has \"0.5\" in column 1, but the file has both decimal points"));
+  EXPECT_THAT(Error("a.csv", "x;y;z\n1.234,5;1;2\n"), HasSubstr("line 2 has \"1.234,5\""));
+}
+
+TEST_F(Clouds, TextWhoseCommentNamesTheColumns) {
+  const Part part =
+      Points("a.txt", "//X Y Z Nx Ny Nz R G B\n0 0 0 0 0 1 255 0 0\n9 0 0 0 0 1 0 255 0\n");
+  EXPECT_THAT(part.colors, ElementsAre(Rgb{255, 0, 0}, Rgb{0, 255, 0}));
+  EXPECT_EQ(part.normals.at(0), (Point3{0, 0, 1}));
+  EXPECT_THAT(Points("a.csv", "# made by hand\n# b,g,r,z,y,x\n1,2,3,6,5,4\n").positions,
+              ElementsAre(Point3{4, 5, 6}));
+  // A comment that names something else, or not every column, says nothing.
+  EXPECT_THAT(Points("a.txt", "# x y and z\n0 0 0 10 20 30\n").colors,
+              ElementsAre(Rgb{10, 20, 30}));
+  EXPECT_THAT(Points("a.txt", "# x y z\n0 0 0 10 20 30\n").colors, ElementsAre(Rgb{10, 20, 30}));
+}
+
+TEST_F(Clouds, MoleculesInXyzFilesAreToldApart) {
+  for (const char* comment : {"water", "", "1 2 3"}) {
+    EXPECT_THAT(Error("a.xyz", absl::StrCat("2\n", comment, "\nO 0 0 0.1\r\nH 0 0.7 -0.4\n")),
+                HasSubstr("is a molecule (chemistry's XYZ format)"))
+        << comment;
+  }
+}
+
+TEST_F(Clouds, TextThatIsWrong) {
+  EXPECT_THAT(Error("a.xyz", "1 2\n"), HasSubstr("line 1 is text that begins with \"1 2\""));
+  EXPECT_THAT(Error("a.xyz", "1 2 3\n4 five 6\n"),
+              HasSubstr("line 2 has \"five\" in column 2; a number is expected"));
+  EXPECT_THAT(Error("a.xyz", "1 2 3\n\n4 5\n"), HasSubstr("line 3 has nothing in column 3"));
+  EXPECT_THAT(Error("a.xyz", "1 2 3\n1 2 inf\n"), HasSubstr("line 2 is (1, 2, inf)"));
+  EXPECT_THAT(Error("a.csv", "x,y\n1,2\n"), HasSubstr("has no column z"));
+  EXPECT_THAT(Error("a.csv", "x,y,z\n"), HasSubstr("ends after its names"));
+  EXPECT_THAT(Error("a.xyz", "# nothing\n"), HasSubstr("holds no line of numbers"));
+  EXPECT_THAT(Error("a.xyz", "\x1b[31m 2 3\n1 2 3"), testing::Not(HasSubstr("\x1b")));
+}
+
+std::string PcdHeader(const std::string& points, const std::string& data) {
+  return absl::StrCat(
+      "# .PCD v.7\nVERSION 0.7\nFIELDS x y z rgb intensity\nSIZE 4 4 4 4 2\nTYPE F F F F U\n"
+      "COUNT 1 1 1 1 2\nWIDTH ",
+      points, "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS ", points, "\nDATA ", data, "\n");
+}
+std::string PcdPoint(float x, float y, float z, uint32_t rgb) {
+  return Bytes(x) + Bytes(y) + Bytes(z) + Bytes(rgb) + Bytes<uint16_t>(1) + Bytes<uint16_t>(2);
+}
+
+TEST_F(Clouds, PcdInItsThreeWays) {
+  const float packed = std::bit_cast<float>(0x00102030u);
+  const std::vector<Point3> positions = {{1, 2, 3}, {-4, 0.5, 6}};
+  const std::vector<Rgb> colors = {{0x10, 0x20, 0x30}, {0, 0, 255}};
+
+  const Part ascii = Points(
+      "a.pcd", PcdHeader("2", "ascii") + absl::StrCat("1 2 3 ", packed, " 1 2\n-4 .5 6 ",
+                                                      std::bit_cast<float>(0xFFu), " 1 2\n"));
+  EXPECT_EQ(ascii.positions, positions);
+
+  const std::string binary = PcdPoint(1, 2, 3, 0x102030) + PcdPoint(-4, 0.5, 6, 0xFF);
+  const Part rows = Points("b.pcd", PcdHeader("2", "binary") + binary);
+  EXPECT_EQ(rows.positions, positions);
+  EXPECT_EQ(rows.colors, colors);
+
+  std::string columns;
+  for (const auto& [at, size] : {std::pair(0, 4), {4, 4}, {8, 4}, {12, 4}, {16, 4}}) {
+    for (const int point : {0, 20}) columns += binary.substr(point + at, size);
+  }
+  columns.resize(40);
+  std::string squeezed(100, '\0');
+  const unsigned size = lzf_compress(columns.data(), 40, squeezed.data(), 100);
+  // Forty bytes may not become fewer: as one literal run of 32 and one of 8.
+  if (size == 0) {
+    squeezed = absl::StrCat(std::string(1, 31), columns.substr(0, 32), std::string(1, 7),
+                            columns.substr(32));
+  } else {
+    squeezed.resize(size);
+  }
+  const Part compressed = Points("c.pcd", PcdHeader("2", "binary_compressed") +
+                                              Bytes(static_cast<uint32_t>(squeezed.size())) +
+                                              Bytes(uint32_t{40}) + squeezed);
+  EXPECT_EQ(compressed.positions, positions);
+  EXPECT_EQ(compressed.colors, colors);
+}
+
+// Two points whose fields have 4 bytes each.
+std::string AsciiPcd(const std::string& fields, const std::string& types,
+                     const std::string& points) {
+  std::string sizes, counts;
+  for (size_t i = 0; i < types.size(); i += 2) {
+    sizes += " 4";
+    counts += " 1";
+  }
+  return absl::StrCat("VERSION 0.7\nFIELDS ", fields, "\nSIZE", sizes, "\nTYPE ", types, "\nCOUNT",
+                      counts, "\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA ascii\n", points);
+}
+
+TEST_F(Clouds, PcdPackedColoursWhateverTheirTypeSays) {
+  const auto colors = [&](const std::string& type, const std::string& first,
+                          const std::string& second) {
+    return Points("a.pcd", AsciiPcd("x y z rgba", "F F F " + type,
+                                    absl::StrCat("0 0 0 ", first, "\n1 0 0 ", second, "\n")))
+        .colors;
+  };
+  const auto two = ElementsAre(Rgb{255, 0, 0}, Rgb{0, 128, 255});
+  EXPECT_THAT(colors("I", "-65536", "-16744193"), two);
+  EXPECT_THAT(colors("U", "4294901760", "4278223103"), two);
+  EXPECT_THAT(colors("U", "16711680", "33023"), two);
+  EXPECT_THAT(colors("F", "nan", "2.3418052e-38"), ElementsAre(Rgb{255, 255, 255}, Rgb{255, 0, 0}))
+      << "\"nan\" does not say which";
+}
+
+TEST_F(Clouds, PcdColoursByTheirGreatestValue) {
+  const auto colors = [&](const std::string& types, const std::string& first,
+                          const std::string& second) {
+    return Points("a.pcd", AsciiPcd("x y z r g b", "F F F " + types,
+                                    absl::StrCat("0 0 0 ", first, "\n1 0 0 ", second, "\n")))
+        .colors;
+  };
+  EXPECT_THAT(colors("F F F", "255 128 0", "0 64 1"), ElementsAre(Rgb{255, 128, 0}, Rgb{0, 64, 1}));
+  EXPECT_THAT(colors("F F F", "1 0.5 0", "0 0.25 1"),
+              ElementsAre(Rgb{255, 128, 0}, Rgb{0, 64, 255}));
+  EXPECT_THAT(colors("U U U", "1 0 0", "0 1 1"), ElementsAre(Rgb{1, 0, 0}, Rgb{0, 1, 1}))
+      << "whole numbers count to 255";
+}
+
+TEST_F(Clouds, PcdPointsThatAreNowhereAreLeftOut) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const auto model =
+      Import("a.pcd", PcdHeader("2", "binary") + PcdPoint(nan, 0, 0, 0) + PcdPoint(1, 1, 1, 0));
+  ASSERT_THAT(model, IsOk());
+  EXPECT_THAT(model->parts[0].positions, ElementsAre(Point3{1, 1, 1}));
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"points that are not finite", 1}}));
+}
+
+TEST_F(Clouds, PcdThatIsWrong) {
+  const std::string point = PcdPoint(1, 2, 3, 4);
+  EXPECT_THAT(Error("a.pcd", "hello"), HasSubstr("a PCD header is expected"));
+  EXPECT_THAT(Error("a.pcd", PcdHeader("2", "binary") + point),
+              HasSubstr("has 20 bytes of data for 2 points of 20"));
+  EXPECT_THAT(Error("a.pcd", PcdHeader("99999999999", "binary") + point),
+              HasSubstr("has 99999999999 points"));
+  EXPECT_THAT(Error("a.pcd", PcdHeader("0", "binary")), HasSubstr("has 0 points"));
+  EXPECT_THAT(Error("a.pcd", PcdHeader("1", "morse") + point),
+              HasSubstr("line 11 has DATA \"morse\""));
+  EXPECT_THAT(Error("a.pcd", PcdHeader("1", "ascii") + "1 2 three"),
+              HasSubstr("point 0 of 1 has \"three\" for z"));
+  EXPECT_THAT(Error("a.pcd", PcdHeader("1", "ascii") + "1 2 3"),
+              HasSubstr("point 0 of 1 has nothing for rgb"));
+  EXPECT_THAT(Error("a.pcd", PcdHeader("1", "binary_compressed") + "1234"),
+              HasSubstr("the file is truncated or damaged"));
+  EXPECT_THAT(Error("a.pcd", PcdHeader("1", "binary_compressed") + Bytes(uint32_t{3}) +
+                                 Bytes(uint32_t{20}) + "\xff\xff\xff"),
+              HasSubstr("compressed data that do not decompress"));
+  EXPECT_THAT(Error("a.pcd", "FIELDS x y\nSIZE 4\nDATA ascii\n"),
+              HasSubstr("line 2 has 1 values of SIZE; there are 2 FIELDS"));
+  EXPECT_THAT(Error("a.pcd", "FIELDS x y\nSIZE 4 3\nDATA ascii\n"), HasSubstr("SIZE \"3\""));
+  EXPECT_THAT(Error("a.pcd", "FIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 1\nDATA ascii\n1 2\n"),
+              HasSubstr("has no column z"));
+}
+
+struct LasPoint {
+  int32_t x, y, z;
+  uint16_t intensity;
+  uint8_t flags;
+  uint16_t rgb[3];
+};
+
+// The public header block and records, as the specification numbers their bytes.
+std::string Las(uint8_t minor, uint8_t format, uint16_t record, size_t color,
+                const std::vector<LasPoint>& points) {
+  const size_t header = minor >= 4 ? 375 : 227;
+  std::string out = "LASF";
+  out.resize(header, '\0');
+  Put<uint8_t>(&out, 24, 1);
+  Put<uint8_t>(&out, 25, minor);
+  Put<uint32_t>(&out, 96, static_cast<uint32_t>(header));
+  Put<uint8_t>(&out, 104, format);
+  Put<uint16_t>(&out, 105, record);
+  if (minor >= 4) {
+    Put<uint64_t>(&out, 247, points.size());
+  } else {
+    Put<uint32_t>(&out, 107, static_cast<uint32_t>(points.size()));
+  }
+  for (int a = 0; a < 3; ++a) {
+    Put<double>(&out, 131 + 8 * a, 0.5);
+    Put<double>(&out, 155 + 8 * a, 100.0 * (a + 1));
+  }
+  for (const LasPoint& p : points) {
+    std::string bytes(record, '\0');
+    Put(&bytes, 0, p.x);
+    Put(&bytes, 4, p.y);
+    Put(&bytes, 8, p.z);
+    Put(&bytes, 12, p.intensity);
+    Put(&bytes, 15, p.flags);
+    for (size_t c = 0; color != 0 && c < 3; ++c) Put(&bytes, color + 2 * c, p.rgb[c]);
+    out += bytes;
+  }
+  return out;
+}
+
+TEST_F(Clouds, LasInEveryPointFormat) {
+  const std::vector<LasPoint> points = {{2, -4, 6, 10, 0, {65535, 32768, 0}},
+                                        {0, 0, 0, 20, 0, {0, 0, 65535}}};
+  const std::vector<Point3> positions = {{101, 198, 303}, {100, 200, 300}};
+  const struct {
+    uint8_t minor, format;
+    uint16_t record;
+    size_t color;
+  } cases[] = {{2, 0, 20, 0},  {2, 1, 28, 0},  {2, 2, 26, 20},  {2, 3, 34, 28},
+               {3, 4, 57, 0},  {3, 5, 63, 28}, {4, 6, 30, 0},   {4, 7, 36, 30},
+               {4, 8, 38, 30}, {4, 9, 59, 0},  {4, 10, 67, 30}, {4, 7, 50, 30}};
+  for (const auto& c : cases) {
+    const Part part = Points("a.las", Las(c.minor, c.format, c.record, c.color, points));
+    EXPECT_EQ(part.positions, positions) << int{c.format};
+    if (c.color != 0) {
+      EXPECT_THAT(part.colors, ElementsAre(Rgb{255, 128, 0}, Rgb{0, 0, 255})) << int{c.format};
+    } else {
+      EXPECT_THAT(part.colors, ElementsAre(Rgb{0, 0, 0}, Rgb{255, 255, 255})) << int{c.format};
+    }
+  }
+}
+
+TEST_F(Clouds, LasColoursOfEightBitsAndPointsThatAreWithheld) {
+  const auto model = Import(
+      "a.las", Las(2, 2, 26, 20, {{0, 0, 0, 1, 0, {255, 16, 0}}, {1, 0, 0, 1, 0x80, {1, 1, 1}}}));
+  ASSERT_THAT(model, IsOk());
+  EXPECT_THAT(model->parts[0].colors, ElementsAre(Rgb{255, 16, 0}));
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"points marked as withheld", 1}}));
+  const auto newer =
+      Import("b.las", Las(4, 6, 30, 0, {{0, 0, 0, 1, 4, {}}, {1, 0, 0, 1, 0x80, {}}}));
+  ASSERT_THAT(newer, IsOk());
+  EXPECT_EQ(newer->parts[0].positions.size(), 1u) << "the flag moved with format 6";
+}
+
+TEST_F(Clouds, LasThatIsWrong) {
+  const std::string good = Las(2, 0, 20, 0, {{0, 0, 0, 1, 0, {}}, {1, 0, 0, 1, 0, {}}});
+  EXPECT_THAT(Error("a.las", "hello"), HasSubstr("a LAS file is expected"));
+  EXPECT_THAT(Error("a.las", good.substr(0, good.size() - 1)),
+              HasSubstr("tells of 2 points of 20 bytes, and has room for 1"));
+  std::string bad = good;
+  Put<uint8_t>(&bad, 104, 0x80);
+  EXPECT_THAT(Error("a.laz", bad), HasSubstr("is compressed (LAZ)"));
+  bad = good;
+  Put<uint8_t>(&bad, 104, 11);
+  EXPECT_THAT(Error("a.las", bad), HasSubstr("has point format 11; 0 to 10 are read"));
+  bad = good;
+  Put<uint16_t>(&bad, 105, 19);
+  EXPECT_THAT(Error("a.las", bad), HasSubstr("of 19 bytes"));
+  bad = good;
+  Put<uint32_t>(&bad, 107, 0xFFFFFFFF);
+  EXPECT_THAT(Error("a.las", bad), HasSubstr("tells of 4294967295 points"));
+  bad = good;
+  Put<uint32_t>(&bad, 96, 0xFFFFFFFF);
+  EXPECT_THAT(Error("a.las", bad), HasSubstr("has room for 0"));
+  bad = good;
+  Put<double>(&bad, 131, 0);
+  EXPECT_THAT(Error("a.las", bad), HasSubstr("has scale 0"));
+}
+
+// Whatever a byte of it becomes: an error, or points; never more than the file has room for.
+TEST_F(Clouds, DamagedOnesEndWell) {
+  const std::string files[] = {
+      PcdHeader("2", "binary") + PcdPoint(1, 2, 3, 4) + PcdPoint(5, 6, 7, 8),
+      Las(4, 7, 36, 30, {{0, 0, 0, 1, 0, {1, 2, 3}}, {1, 0, 0, 1, 0, {4, 5, 6}}}),
+      "x,y,z,r,g,b\n1,2,3,4,5,6\n7,8,9,10,11,12\n"};
+  const char* names[] = {"a.pcd", "a.las", "a.csv"};
+  std::mt19937 random(11);
+  for (int f = 0; f < 3; ++f) {
+    for (int i = 0; i < 400; ++i) {
+      std::string bytes = files[f];
+      bytes[random() % bytes.size()] = static_cast<char>(random());
+      if (i % 3 == 0) bytes.resize(1 + random() % bytes.size());
+      const auto model = Import(names[f], bytes);
+      if (model.ok()) {
+        EXPECT_LE(model->parts.at(0).positions.size(), bytes.size());
+      } else {
+        EXPECT_THAT(std::string(model.status().message()), HasSubstr(names[f]));
+      }
+    }
+  }
+}
+
+}  // namespace cloud_test
+}  // namespace voxeld::voxelctl

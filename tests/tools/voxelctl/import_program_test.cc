@@ -1,0 +1,87 @@
+// Files that voxelctl hands to voxeld-import, where that is beside it and where it is not.
+#include "tools/voxelctl/import/import_program.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "tests/tools/voxelctl/status_matchers.h"
+#include "tests/tools/voxelctl/temp_folder.h"
+#include "tools/voxelctl/import/importer.h"
+
+namespace voxeld::voxelctl {
+namespace import_program_test {
+
+using ::testing::HasSubstr;
+
+TEST(OwnFormats, AreReadWithoutTheProgram) {
+  EXPECT_THAT(ImportFile(DataFile("points.ply"), {}), IsOk());
+  EXPECT_THAT(ImportFile(DataFile("quad.topojson"), {}), IsOk());
+}
+
+TEST(OwnFormats, HaveNoAnimations) {
+  EXPECT_THAT(OpenAnimation(DataFile("points.ply"), 1, 20),
+              Fails(Words{"points.ply", "which has no animations", ".glb"}));
+}
+
+class ImportProgram : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (const absl::Status status = CheckImporters("play"); !status.ok())
+      GTEST_SKIP() << status.message();
+  }
+  TempFolder folder_;
+};
+
+TEST_F(ImportProgram, ReadsAMesh) {
+  const auto model = ImportFile(DataFile("arrow.obj"), {});
+  ASSERT_THAT(model, IsOk());
+  EXPECT_FALSE(model->parts.empty());
+}
+
+TEST_F(ImportProgram, TakesEveryOption) {
+  ImportOptions options;
+  options.raw = RawLayout{.size = {2, 1, 3}, .type = SampleType::kU16, .big_endian = true};
+  const auto model =
+      ImportFile(folder_.Write("a.raw", std::string("\0\1\0\2\0\3\1\0\0\5\0\6", 12)), options);
+  ASSERT_THAT(model, IsOk());
+  ASSERT_EQ(model->volumes.size(), 1u);
+  EXPECT_EQ(model->volumes[0].size, (std::array<uint32_t, 3>{2, 1, 3}));
+  EXPECT_EQ(model->volumes[0].samples, (std::vector<float>{1, 2, 3, 256, 5, 6}));
+}
+
+TEST_F(ImportProgram, AFileWhoseNameLooksLikeAnOptionIsAFile) {
+  const std::string path = folder_.Write("--help", "x");
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::current_path(std::filesystem::path(path).parent_path());
+  EXPECT_THAT(ImportFile("--help", {}), Fails(Words{"--help", "its name has no extension"}));
+  std::filesystem::current_path(before);
+}
+
+TEST_F(ImportProgram, ErrorsAreItsOwn) {
+  EXPECT_THAT(ImportFile(folder_.Path("missing.obj"), {}),
+              Fails(Words{"missing.obj", "No such file"}));
+  EXPECT_THAT(ImportFile(folder_.Write("a.docx", "PK\x03\x04"), {}),
+              Fails(Words{"files of type .docx are not read", ".obj"}));
+}
+
+TEST_F(ImportProgram, ASequenceIsReadByOneProgram) {
+  std::vector<std::string> paths;
+  for (const char* name : {"a.obj", "b.obj", "c.ply"}) paths.push_back(folder_.Path(name));
+  const std::string triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  folder_.Write("a.obj", triangle);
+  folder_.Write("b.obj", "f 1 2 3\n");
+  folder_.Write("c.ply",
+                "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty "
+                "float y\nproperty float z\nend_header\n1 2 3\n");
+  const auto frames = OpenSequence(paths, {}, nullptr);
+  ASSERT_THAT(frames, IsOk());
+  EXPECT_EQ((*frames)->count(), 3);
+  EXPECT_THAT((*frames)->Read(2), IsOk());
+  EXPECT_THAT(std::string((*frames)->Read(1).status().message()), HasSubstr("b.obj"));
+  EXPECT_THAT((*frames)->Read(0), IsOk());
+}
+
+}  // namespace import_program_test
+}  // namespace voxeld::voxelctl

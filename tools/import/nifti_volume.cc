@@ -1,0 +1,306 @@
+#include "tools/import/nifti_volume.h"
+
+#include <nifti2_io.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
+#include "tools/import/inflate.h"
+#include "tools/import/volume_samples.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+std::optional<SampleType> TypeOf(int datatype) {
+  switch (datatype) {
+    case DT_UINT8:
+      return SampleType::kU8;
+    case DT_INT8:
+      return SampleType::kI8;
+    case DT_INT16:
+      return SampleType::kI16;
+    case DT_UINT16:
+      return SampleType::kU16;
+    case DT_INT32:
+      return SampleType::kI32;
+    case DT_UINT32:
+      return SampleType::kU32;
+    case DT_INT64:
+      return SampleType::kI64;
+    case DT_UINT64:
+      return SampleType::kU64;
+    case DT_FLOAT32:
+      return SampleType::kF32;
+    case DT_FLOAT64:
+      return SampleType::kF64;
+    default:
+      return std::nullopt;
+  }
+}
+
+constexpr size_t kHeader1 = sizeof(nifti_1_header), kHeader2 = sizeof(nifti_2_header);
+constexpr double kMostOffset = 1 << 28;
+static_assert(kHeader1 == 348 && kHeader2 == 540);
+
+struct FreeImage {
+  void operator()(nifti_image* image) const { nifti_image_free(image); }
+};
+
+// What both headers say, in one form.
+struct Head {
+  std::array<int64_t, 8> dim = {};
+  int datatype = 0;
+  double vox_offset = 0, slope = 0, intercept = 0, cal_min = 0, cal_max = 0;
+  bool apart = false;  // the samples are in a file beside it
+};
+
+template <typename Header>
+Head HeadOf(const Header& header, bool apart) {
+  Head head;
+  for (size_t i = 0; i < head.dim.size(); ++i) head.dim[i] = header.dim[i];
+  head.datatype = header.datatype;
+  head.vox_offset = static_cast<double>(header.vox_offset);
+  head.slope = header.scl_slope;
+  head.intercept = header.scl_inter;
+  head.cal_min = header.cal_min;
+  head.cal_max = header.cal_max;
+  head.apart = apart;
+  return head;
+}
+
+bool IsPacked(const SourceFile& file) { return absl::StartsWith(file.bytes, "\x1f\x8b"); }
+
+// The first `most` bytes of what it holds; a copy only of what is compressed.
+absl::StatusOr<absl::string_view> BeginningOf(const SourceFile& file, uint64_t most,
+                                              std::string* room) {
+  if (!IsPacked(file)) return absl::string_view(file.bytes).substr(0, most);
+  absl::StatusOr<std::string> inflated = Inflate(file, file.bytes, most);
+  if (!inflated.ok()) return inflated.status();
+  *room = *std::move(inflated);
+  return absl::string_view(*room);
+}
+
+// The other file of two, whatever case and compression its extension has; nothing if there is none.
+std::optional<std::string> Beside(const std::string& path, absl::string_view extension) {
+  std::filesystem::path stem(path);
+  if (absl::EqualsIgnoreCase(stem.extension().string(), ".gz")) stem.replace_extension();
+  for (const absl::string_view end : {"", ".gz", ".GZ"}) {
+    for (const bool upper : {false, true}) {
+      const std::string name =
+          absl::StrCat(upper ? absl::AsciiStrToUpper(extension) : std::string(extension), end);
+      std::error_code ignored;
+      const std::filesystem::path other = std::filesystem::path(stem).replace_extension(name);
+      if (std::filesystem::is_regular_file(other, ignored)) return other.string();
+    }
+  }
+  return std::nullopt;
+}
+
+absl::StatusOr<SourceFile> ReadBeside(const SourceFile& file, const std::string& path) {
+  absl::StatusOr<SourceFile> read =
+      ReadOtherFile(file, std::filesystem::path(path).filename().string());
+  if (read.ok()) return read;
+  return FileError(file, absl::StrCat("needs ", EscapeForTerminal(path), " beside it"),
+                   read.status().message());
+}
+
+class NiftiReader {
+ public:
+  explicit NiftiReader(const SourceFile& file) : file_(file) {}
+
+  absl::StatusOr<Model> Read() {
+    if (absl::Status status = ReadHeader(); !status.ok()) return status;
+    if (absl::Status status = CheckHead(); !status.ok()) return status;
+    if (!head_.apart) return ReadSamples(file_);
+    const std::optional<std::string> beside = Beside(file_.path, "img");
+    if (!beside) {
+      return FileError(file_, "has its samples in another file, and there is none",
+                       "the file of the same name with the extension .img is expected beside it");
+    }
+    const absl::StatusOr<SourceFile> samples = ReadBeside(file_, *beside);
+    return samples.ok() ? ReadSamples(*samples) : samples.status();
+  }
+
+ private:
+  uint64_t BytesEach() const { return channels_ > 0 ? channels_ : SampleBytes(code_.type); }
+
+  absl::StatusOr<Model> ReadSamples(const SourceFile& file) const {
+    SampledVolume volume;
+    uint64_t samples = 1;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      volume.size[axis] = static_cast<uint32_t>(size_[axis]);
+      samples *= size_[axis];
+    }
+    const uint64_t bytes = samples * BytesEach();
+    std::string room;
+    const absl::StatusOr<absl::string_view> all = BeginningOf(file, from_ + bytes, &room);
+    if (!all.ok()) return all.status();
+    if (all->size() < from_ + bytes) {
+      return FileError(file,
+                       absl::StrCat("has ", all->size() - std::min<uint64_t>(from_, all->size()),
+                                    " bytes of samples; ", size_[0], " by ", size_[1], " by ",
+                                    size_[2], " of ", BytesEach(), " take ", bytes),
+                       "the file is truncated");
+    }
+    if (channels_ > 0) {
+      DecodeColors(all->substr(from_, bytes), channels_, &volume);
+    } else {
+      DecodeSamples(all->substr(from_, bytes), code_, &volume.samples);
+    }
+    if (absl::Status status = Place(&volume); !status.ok()) return status;
+    if (head_.cal_max > head_.cal_min && std::isfinite(head_.cal_max - head_.cal_min)) {
+      volume.window = {head_.cal_min, head_.cal_max};
+    }
+    Model model;
+    model.path = file_.path;
+    model.format = absl::StrCat(is_second_ ? "NIfTI-2" : "NIfTI", head_.apart ? ", two files" : "",
+                                IsPacked(file) ? ", compressed" : "");
+    model.up = Up::kZ;
+    if (volumes_ > 1) {
+      model.note = absl::StrCat(file_.path, ": the first of its ", volumes_, " volumes is shown");
+    }
+    model.volumes.push_back(std::move(volume));
+    return model;
+  }
+
+  absl::Status ReadHeader() {
+    std::string room;
+    const absl::StatusOr<absl::string_view> head = BeginningOf(file_, kHeader2, &room);
+    if (!head.ok()) return head.status();
+    if (head->size() < kHeader1) {
+      return FileError(file_, absl::StrCat("has ", head->size(), " bytes"),
+                       "a NIfTI header of 348 or 540 is expected");
+    }
+    nifti_1_header& first = first_;
+    nifti_2_header& second = second_;
+    std::memcpy(&first, head->data(), kHeader1);
+    const bool one = std::memcmp(first.magic, "n+1", 4) == 0;
+    if (one || std::memcmp(first.magic, "ni1", 4) == 0) {
+      code_.big_endian = first.sizeof_hdr != kHeader1;
+      if (code_.big_endian) swap_nifti_header(&first, 1);
+      if (first.sizeof_hdr != kHeader1) return WrongSize(first.sizeof_hdr, kHeader1);
+      head_ = HeadOf(first, !one);
+      return absl::OkStatus();
+    }
+    std::memcpy(&second, head->data(), std::min(head->size(), kHeader2));
+    const bool both = std::memcmp(second.magic, "n+2", 4) == 0;
+    if (head->size() < kHeader2 || (!both && std::memcmp(second.magic, "ni2", 4) != 0)) {
+      return FileError(
+          file_, absl::StrCat("is ", DescribeContents(*head)),
+          "a header of NIfTI is expected (magic \"n+1\" at byte 344, or \"n+2\" at 4)");
+    }
+    is_second_ = true;
+    code_.big_endian = second.sizeof_hdr != kHeader2;
+    if (code_.big_endian) nifti_swap_as_nifti2(&second);
+    if (second.sizeof_hdr != kHeader2) return WrongSize(second.sizeof_hdr, kHeader2);
+    head_ = HeadOf(second, !both);
+    return absl::OkStatus();
+  }
+
+  absl::Status WrongSize(int says, size_t right) const {
+    return FileError(file_, absl::StrCat("its header says that it has ", says, " bytes"),
+                     absl::StrCat(right, " are expected"));
+  }
+
+  absl::Status CheckHead() {
+    const int64_t dimensions = head_.dim[0];
+    if (dimensions < 1 || dimensions > 7) {
+      return FileError(file_, absl::StrCat("has ", dimensions, " dimensions (dim[0])"),
+                       "1 to 7 are expected");
+    }
+    for (size_t axis = 1; axis <= static_cast<size_t>(dimensions); ++axis) {
+      const int64_t along = head_.dim[axis];
+      if (along < 1) {
+        return FileError(file_, absl::StrCat("has ", along, " samples along axis ", axis),
+                         "at least 1 is expected");
+      }
+      if (axis <= 3) {
+        size_[axis - 1] = static_cast<uint64_t>(along);
+      } else if (static_cast<uint64_t>(along) <= kMaxModelSamples / volumes_) {
+        volumes_ *= static_cast<uint64_t>(along);
+      } else {
+        return FileError(file_, absl::StrCat("has ", along, " samples along axis ", axis),
+                         absl::StrCat("at most ", kMaxModelSamples, " volumes are read"));
+      }
+    }
+    if (absl::Status status = CheckVolumeSize(file_, size_); !status.ok()) return status;
+    const std::optional<SampleType> type = TypeOf(head_.datatype);
+    if (head_.datatype == DT_RGB24) channels_ = 3;
+    if (head_.datatype == DT_RGBA32) channels_ = 4;
+    if (!type && channels_ == 0) {
+      return FileError(
+          file_, absl::StrCat("has samples of datatype ", head_.datatype),
+          "whole numbers of 8 to 64 bits, floats of 32 or 64, and colours (128, 2304) are read");
+    }
+    if (type) code_.type = *type;
+    if (std::isfinite(head_.slope) && head_.slope != 0 && std::isfinite(head_.intercept)) {
+      code_.slope = head_.slope;
+      code_.intercept = head_.intercept;
+    }
+    const double least = head_.apart ? 0 : static_cast<double>(is_second_ ? kHeader2 : kHeader1);
+    // Some programs write 0 if the samples follow the header and its four bytes for extensions.
+    if (head_.vox_offset == 0 && !head_.apart) {
+      from_ = static_cast<uint64_t>(least) + 4;
+      return absl::OkStatus();
+    }
+    if (!(head_.vox_offset >= least) || head_.vox_offset > kMostOffset) {
+      return FileError(
+          file_, absl::StrCat("has its samples from byte ", head_.vox_offset, " on (vox_offset)"),
+          absl::StrCat(least, " to ", kMostOffset, " is expected"));
+    }
+    from_ = static_cast<uint64_t>(head_.vox_offset);
+    return absl::OkStatus();
+  }
+
+  // The library knows how quaternions become a matrix; it sees a header that has been checked, and nothing else.
+  absl::Status Place(SampledVolume* volume) const {
+    const std::unique_ptr<nifti_image, FreeImage> image(
+        is_second_ ? nifti_convert_n2hdr2nim(second_, nullptr)
+                   : nifti_convert_n1hdr2nim(first_, nullptr));
+    if (image == nullptr)
+      return FileError(file_, "could not be read as NIfTI", "the header is damaged");
+    const nifti_dmat44& m = image->sform_code > 0 ? image->sto_xyz : image->qto_xyz;
+    // The file's x goes to the right and y to the front of the head; the viewer stands before it, on the side of -y.
+    const auto column = [&m](int c) { return Point3{-m.m[0][c], -m.m[1][c], m.m[2][c]}; };
+    return PlaceVolume(file_, column(3), {column(0), column(1), column(2)}, volume);
+  }
+
+  const SourceFile& file_;
+  Head head_;
+  // The second is packed; the library takes it for aligned.
+  nifti_1_header first_ = {};
+  alignas(8) nifti_2_header second_ = {};
+  bool is_second_ = false;  // which of them the file has
+  SampleCode code_;
+  size_t channels_ = 0;  // of colours; 0: numbers
+  std::array<uint64_t, 3> size_ = {1, 1, 1};
+  uint64_t volumes_ = 1, from_ = 0;
+};
+
+}  // namespace
+
+absl::StatusOr<Model> ReadNiftiVolume(const SourceFile& file) {
+  nifti_set_debug_level(0);
+  if (file.extension != "img") return NiftiReader(file).Read();
+  const std::optional<std::string> header = Beside(file.path, "hdr");
+  if (!header) {
+    return FileError(file, "has no header beside it",
+                     "the file of the same name with the extension .hdr is expected");
+  }
+  const absl::StatusOr<SourceFile> read = ReadBeside(file, *header);
+  return read.ok() ? NiftiReader(*read).Read() : read.status();
+}
+
+}  // namespace voxeld::voxelctl

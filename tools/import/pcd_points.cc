@@ -1,0 +1,354 @@
+#include "tools/import/pcd_points.h"
+
+#include <liblzf/lzf.h>
+
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/functional/function_ref.h"
+#include "absl/strings/ascii.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+#include "common/text/printable.h"
+#include "tools/voxelctl/import/point_table.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "values are read in place");
+
+struct Field {
+  std::string name;
+  uint32_t size = 0;   // of one value
+  char type = 'F';     // I, U, F
+  uint32_t count = 1;  // values of each point
+};
+
+enum class Data : uint8_t { kAscii, kBinary, kCompressed };
+
+struct PcdHeader {
+  std::vector<Field> fields;
+  uint64_t points = 0;
+  Data data = Data::kAscii;
+  size_t body = 0;  // where it begins
+  uint64_t point_bytes = 0;
+};
+
+constexpr uint64_t kMostPointBytes = 4096;
+constexpr uint64_t kMostExpanded = 100;  // times; LZF makes 264 bytes of 3 at the most
+
+using Words = std::vector<absl::string_view>;
+
+absl::Status Wrong(const SourceFile& file, size_t line, absl::string_view found,
+                   absl::string_view expected) {
+  return FileError(file, absl::StrCat("line ", line, " ", found), expected);
+}
+
+// One line of the header. `done`: it was the last.
+absl::Status TakeLine(const SourceFile& file, size_t line, const Words& words, PcdHeader* out,
+                      uint64_t* width, uint64_t* height, bool* done) {
+  const absl::string_view key = words[0];
+  const auto each = [&](auto&& take) -> absl::Status {
+    if (words.size() != out->fields.size() + 1) {
+      return Wrong(file, line, absl::StrCat("has ", words.size() - 1, " values of ", key),
+                   absl::StrCat("there are ", out->fields.size(), " FIELDS"));
+    }
+    for (size_t i = 0; i < out->fields.size(); ++i) {
+      if (!take(words[i + 1], &out->fields[i])) {
+        return Wrong(file, line,
+                     absl::StrCat("has ", key, " \"", EscapeForTerminal(words[i + 1]), "\""),
+                     "SIZE is 1, 2, 4 or 8, TYPE I, U or F, COUNT a number from 1 on");
+      }
+    }
+    return absl::OkStatus();
+  };
+  if (key == "FIELDS" || key == "COLUMNS") {
+    for (size_t i = 1; i < words.size(); ++i) out->fields.push_back({std::string(words[i])});
+    return absl::OkStatus();
+  }
+  if (key == "SIZE") {
+    return each([](absl::string_view word, Field* field) {
+      return absl::SimpleAtoi(word, &field->size) && std::has_single_bit(field->size) &&
+             field->size <= 8;
+    });
+  }
+  if (key == "TYPE") {
+    return each([](absl::string_view word, Field* field) {
+      field->type = word[0];
+      return word == "I" || word == "U" || word == "F";
+    });
+  }
+  if (key == "COUNT") {
+    return each([](absl::string_view word, Field* field) {
+      return absl::SimpleAtoi(word, &field->count) && field->count >= 1 &&
+             field->count <= kMostPointBytes;
+    });
+  }
+  uint64_t* const number = key == "WIDTH"    ? width
+                           : key == "HEIGHT" ? height
+                           : key == "POINTS" ? &out->points
+                                             : nullptr;
+  if (number != nullptr && (words.size() != 2 || !absl::SimpleAtoi(words[1], number))) {
+    return Wrong(file, line, absl::StrCat("has no number for ", key), "one is expected");
+  }
+  if (key != "DATA") return absl::OkStatus();  // VERSION, VIEWPOINT and what others may add
+  *done = true;
+  const absl::string_view data = words.size() > 1 ? words[1] : "";
+  if (data == "ascii") return absl::OkStatus();
+  out->data = data == "binary" ? Data::kBinary : Data::kCompressed;
+  if (data == "binary" || data == "binary_compressed") return absl::OkStatus();
+  return Wrong(file, line, absl::StrCat("has DATA \"", EscapeForTerminal(data), "\""),
+               "ascii, binary and binary_compressed are read");
+}
+
+absl::StatusOr<PcdHeader> ReadPcdHeader(const SourceFile& file) {
+  PcdHeader out;
+  uint64_t width = 0, height = 1;
+  bool done = false;
+  const absl::string_view bytes = file.bytes;
+  for (size_t line = 1; !done; ++line) {
+    const size_t end = bytes.find('\n', out.body);
+    if (end == absl::string_view::npos || line > 1000) {
+      return FileError(file, absl::StrCat("is ", DescribeContents(bytes)),
+                       "a PCD header is expected, up to its line DATA");
+    }
+    const absl::string_view text =
+        absl::StripAsciiWhitespace(bytes.substr(out.body, end - out.body));
+    out.body = end + 1;
+    if (text.empty() || text.front() == '#') continue;
+    const Words words = absl::StrSplit(text, absl::ByAnyChar(" \t"), absl::SkipEmpty());
+    if (absl::Status status = TakeLine(file, line, words, &out, &width, &height, &done);
+        !status.ok()) {
+      return status;
+    }
+  }
+  if (out.points == 0 && width <= kMaxModelVertices && height <= kMaxModelVertices) {
+    out.points = width * height;
+  }
+  for (const Field& field : out.fields) {
+    if (field.size == 0) return FileError(file, "has no line SIZE", "a PCD header is expected");
+    out.point_bytes += uint64_t{field.size} * field.count;
+  }
+  if (out.points == 0 || out.points > kMaxModelVertices || out.point_bytes > kMostPointBytes) {
+    return FileError(
+        file, absl::StrCat("has ", out.points, " points of ", out.point_bytes, " bytes"),
+        absl::StrCat("1 to ", kMaxModelVertices, " of at most ", kMostPointBytes, " are read"));
+  }
+  return out;
+}
+
+template <typename T>
+double As(const char* at) {
+  T value;
+  std::memcpy(&value, at, sizeof(value));
+  return static_cast<double>(value);
+}
+
+double ValueOf(const Field& field, const char* at) {
+  switch (field.type) {
+    case 'F':
+      return field.size == 8 ? As<double>(at) : field.size == 4 ? As<float>(at) : 0;
+    case 'I':
+      return field.size == 1   ? As<int8_t>(at)
+             : field.size == 2 ? As<int16_t>(at)
+             : field.size == 4 ? As<int32_t>(at)
+                               : As<int64_t>(at);
+    default:
+      return field.size == 1   ? As<uint8_t>(at)
+             : field.size == 2 ? As<uint16_t>(at)
+             : field.size == 4 ? As<uint32_t>(at)
+                               : As<uint64_t>(at);
+  }
+}
+
+bool IsPacked(const Field& field) {
+  return (field.name == "rgb" || field.name == "rgba") && field.size == 4;
+}
+
+void SetPacked(uint32_t word, PointRow* row) {
+  (*row)[static_cast<size_t>(PointColumn::kRed)] = word >> 16 & 0xFF;
+  (*row)[static_cast<size_t>(PointColumn::kGreen)] = word >> 8 & 0xFF;
+  (*row)[static_cast<size_t>(PointColumn::kBlue)] = word & 0xFF;
+}
+
+// What becomes of a field's first value.
+void Take(const Field& field, const char* at, PointRow* row) {
+  if (IsPacked(field)) {
+    uint32_t word;
+    std::memcpy(&word, at, sizeof(word));
+    SetPacked(word, row);
+  } else if (const auto column = PointColumnOf(field.name)) {
+    (*row)[static_cast<size_t>(*column)] = ValueOf(field, at);
+  }
+}
+
+// A word of ascii data: a packed colour may be the float that its bits are, or a whole number.
+bool TakeWord(const Field& field, absl::string_view word, PointRow* row) {
+  double value = 0;
+  if (word == "nan" || word == "NaN" || word == "-nan") {
+    value = std::nan("");
+  } else {
+    const auto read = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (read.ec != std::errc() || read.ptr != word.data() + word.size()) return false;
+  }
+  if (IsPacked(field)) {
+    // With its alpha the word of most colours is negative as a signed number, and not a number as a float: then the text does not
+    // say which colour it is.
+    const bool unknown = std::isnan(value) || value < INT32_MIN || value > UINT32_MAX;
+    SetPacked(field.type == 'F' && !std::isnan(value)
+                  ? std::bit_cast<uint32_t>(static_cast<float>(value))
+              : unknown ? 0xFFFFFF
+                        : static_cast<uint32_t>(static_cast<int64_t>(value)),
+              row);
+  } else if (const auto column = PointColumnOf(field.name)) {
+    (*row)[static_cast<size_t>(*column)] = value;
+  }
+  return true;
+}
+
+bool IsThere(const PointRow& row) {
+  return std::isfinite(row[0]) && std::isfinite(row[1]) && std::isfinite(row[2]);
+}
+
+using TakeRow = absl::FunctionRef<absl::Status(const PointRow&, uint64_t number)>;
+
+absl::Status ReadAscii(const SourceFile& file, const PcdHeader& header, TakeRow take) {
+  absl::string_view rest = absl::string_view(file.bytes).substr(header.body);
+  for (uint64_t i = 0; i < header.points; ++i) {
+    PointRow row = {};
+    for (const Field& field : header.fields) {
+      for (uint32_t k = 0; k < field.count; ++k) {
+        rest = absl::StripLeadingAsciiWhitespace(rest);
+        const absl::string_view word = rest.substr(0, rest.find_first_of(" \t\r\n"));
+        rest.remove_prefix(word.size());
+        PointRow ignored = {};
+        if (!TakeWord(field, word, k == 0 ? &row : &ignored)) {
+          return FileError(
+              file,
+              absl::StrCat("point ", i, " of ", header.points, " has ",
+                           word.empty()
+                               ? "nothing"
+                               : absl::StrCat("\"", EscapeForTerminal(word.substr(0, 24)), "\""),
+                           " for ", EscapeForTerminal(field.name)),
+              "a number is expected");
+        }
+      }
+    }
+    if (absl::Status status = take(row, i); !status.ok()) return status;
+  }
+  return absl::OkStatus();
+}
+
+// Points one after another, or field after field (`by_field`), as the compressed data have them.
+absl::Status ReadBinary(const SourceFile& file, const PcdHeader& header, absl::string_view bytes,
+                        bool by_field, TakeRow take) {
+  if (bytes.size() < header.points * header.point_bytes) {
+    return FileError(file,
+                     absl::StrCat("has ", bytes.size(), " bytes of data for ", header.points,
+                                  " points of ", header.point_bytes, TextModeHint(file.bytes)),
+                     "the file is truncated or damaged");
+  }
+  for (uint64_t i = 0; i < header.points; ++i) {
+    PointRow row = {};
+    uint64_t before = 0;  // bytes of the fields before
+    for (const Field& field : header.fields) {
+      const uint64_t bytes_of_field = uint64_t{field.size} * field.count;
+      const uint64_t at =
+          by_field ? before * header.points + i * bytes_of_field : i * header.point_bytes + before;
+      if (field.count > 0) Take(field, bytes.data() + at, &row);
+      before += bytes_of_field;
+    }
+    if (absl::Status status = take(row, i); !status.ok()) return status;
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::string> Decompress(const SourceFile& file, const PcdHeader& header) {
+  const absl::string_view body = absl::string_view(file.bytes).substr(header.body);
+  uint32_t packed = 0, whole = 0;
+  if (body.size() >= 8) {
+    std::memcpy(&packed, body.data(), 4);
+    std::memcpy(&whole, body.data() + 4, 4);
+  }
+  if (body.size() < 8 || packed > body.size() - 8 || whole != header.points * header.point_bytes ||
+      whole > packed * kMostExpanded) {
+    return FileError(
+        file,
+        absl::StrCat("has ", packed, " compressed bytes of ", whole, " in ", body.size(),
+                     " bytes of data for ", header.points, " points of ", header.point_bytes),
+        "the file is truncated or damaged");
+  }
+  std::string out(whole, '\0');
+  if (lzf_decompress(body.data() + 8, packed, out.data(), whole) != whole) {
+    return FileError(file, "has compressed data that do not decompress",
+                     "the file is truncated or damaged");
+  }
+  return out;
+}
+
+}  // namespace
+
+absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file) {
+  const absl::StatusOr<PcdHeader> header = ReadPcdHeader(file);
+  if (!header.ok()) return header.status();
+  std::array<bool, kPointColumns> has = {};
+  bool floats = false;  // colours whose scale depends on their greatest value
+  for (const Field& field : header->fields) {
+    if (IsPacked(field)) {
+      for (const PointColumn c : {PointColumn::kRed, PointColumn::kGreen, PointColumn::kBlue}) {
+        has[static_cast<size_t>(c)] = true;
+      }
+    } else if (const auto column = PointColumnOf(field.name)) {
+      has[static_cast<size_t>(*column)] = true;
+      if (IsColor(*column) && field.type == 'F') floats = true;
+    }
+  }
+  std::string decompressed;
+  if (header->data == Data::kCompressed) {
+    absl::StatusOr<std::string> bytes = Decompress(file, *header);
+    if (!bytes.ok()) return bytes.status();
+    decompressed = *std::move(bytes);
+  }
+  const auto read = [&](TakeRow take) {
+    if (header->data == Data::kAscii) return ReadAscii(file, *header, take);
+    const bool by_field = header->data == Data::kCompressed;
+    return ReadBinary(file, *header,
+                      by_field ? decompressed : absl::string_view(file.bytes).substr(header->body),
+                      by_field, take);
+  };
+  double greatest = floats ? 0 : 255;
+  if (floats) {
+    const absl::Status looked = read([&](const PointRow& row, uint64_t) {
+      for (const PointColumn c : {PointColumn::kRed, PointColumn::kGreen, PointColumn::kBlue}) {
+        greatest = std::max(greatest, row[static_cast<size_t>(c)]);
+      }
+      return absl::OkStatus();
+    });
+    if (!looked.ok()) return looked;
+  }
+  absl::StatusOr<PointTable> table = PointTable::Make(file, has, FullScaleOf(greatest));
+  if (!table.ok()) return table.status();
+  uint64_t nowhere = 0;
+  const absl::Status status = read([&](const PointRow& row, uint64_t number) {
+    if (IsThere(row)) return table->Add(file, row, absl::StrCat("point ", number));
+    ++nowhere;
+    return absl::OkStatus();
+  });
+  if (!status.ok()) return status;
+  if (table->size() == 0) {
+    return FileError(file, "has no point that is anywhere", "at least one is expected");
+  }
+  Model model = std::move(*table).Finish(file, "PCD points");
+  AddLeftOut("points that are not finite", nowhere, &model);
+  return model;
+}
+
+}  // namespace voxeld::voxelctl

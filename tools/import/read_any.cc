@@ -1,0 +1,70 @@
+#include "tools/import/read_any.h"
+
+#include <assimp/Importer.hpp>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
+#include "tools/import/assimp_scene.h"
+#include "tools/import/dicom_check.h"
+#include "tools/import/dicom_volume.h"
+#include "tools/import/las_points.h"
+#include "tools/import/mesh_beginning.h"
+#include "tools/import/mesh_checks.h"
+#include "tools/import/nifti_volume.h"
+#include "tools/import/nrrd_volume.h"
+#include "tools/import/pcd_points.h"
+#include "tools/import/svg_drawing.h"
+#include "tools/voxelctl/import/importer.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+absl::StatusOr<Model> ReadMesh(const SourceFile& file) {
+  if (absl::Status status = CheckMeshFile(file); !status.ok()) return status;
+  Assimp::Importer importer;
+  const absl::StatusOr<const aiScene*> scene = LoadScene(file, false, &importer);
+  if (!scene.ok()) return scene.status();
+  return ModelOf(file, **scene, nullptr);
+}
+
+}  // namespace
+
+absl::Status CheckMeshFile(const SourceFile& file) {
+  const std::string& extension = file.extension;
+  if (extension == "obj") return CheckObj(file);
+  if (extension == "gltf" || extension == "glb") return CheckGltf(file);
+  return CheckMeshBeginning(file);
+}
+
+absl::StatusOr<Model> ReadAny(const SourceFile& file, const ImportOptions& options) {
+  const std::string& extension = file.extension;
+  if (IsOwnFormat(extension)) return ReadOwnFormat(file, options);
+  if (extension == "obj" || extension == "gltf" || extension == "glb") return ReadMesh(file);
+  if (extension == "pcd") return ReadPcdPoints(file);
+  if (extension == "las" || extension == "laz") return ReadLasPoints(file);
+  if (extension == "nii" || (extension == "gz" && absl::EndsWithIgnoreCase(file.path, ".nii.gz")))
+    return ReadNiftiVolume(file);
+  if (extension == "hdr" || extension == "img") return ReadNiftiVolume(file);
+  if (extension == "nrrd" || extension == "nhdr") return ReadNrrdVolume(file);
+  if (extension == "raw") return ReadRawVolume(file, options.raw);
+  if (extension == "pdb" || extension == "ent") return ReadPdbMolecule(file, options.style);
+  if (extension == "svg") return ReadSvgDrawing(file);
+  // Slices often have no extension, or what looks like one.
+  if (extension == "dcm" || LooksLikeDicom(file)) return ReadDicomVolume(file);
+  if (AssimpReads(extension)) return ReadMesh(file);
+  return FileError(
+      file,
+      extension.empty()
+          ? "its name has no extension"
+          : absl::StrCat("files of type .", EscapeForTerminal(extension), " are not read"),
+      "play reads meshes (.obj, .stl, .ply, .gltf, .glb, .off, .fbx, .3mf, .dae, "
+      ".blend, .ifc, .bvh and more), voxels (.vox), points (.ply, .pcd, "
+      ".las, .xyz, .txt, .asc, .pts, .csv), maps (.geojson, .topojson, .json), volumes (.nii, "
+      ".nii.gz, .hdr with .img, .nrrd, .nhdr, .raw, .dcm), molecules (.pdb, .ent) and drawings "
+      "(.svg)");
+}
+
+absl::StatusOr<Model> ReadFolder(const std::string& path) { return ReadDicomFolder(path); }
+
+}  // namespace voxeld::voxelctl

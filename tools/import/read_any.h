@@ -1,0 +1,27 @@
+// Which reader reads what.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "tools/voxelctl/import/frames.h"
+#include "tools/voxelctl/import/import_options.h"
+#include "tools/voxelctl/import/model.h"
+#include "tools/voxelctl/import/source_file.h"
+
+namespace voxeld::voxelctl {
+
+// Reads a file in this process: DICOM also by its contents, the others by their extension, those that voxelctl reads itself too.
+// InvalidArgument for an extension that nothing reads, with those that are read. Nobody has checked the model (CheckModel).
+absl::StatusOr<Model> ReadAny(const SourceFile& file, const ImportOptions& options);
+
+// Reads a folder, which is taken for slices of DICOM.
+absl::StatusOr<Model> ReadFolder(const std::string& path);
+
+// Opens an animation in this process (OpenAnimation in tools/voxelctl/import/import_program.h).
+absl::StatusOr<std::unique_ptr<FrameSource>> OpenAnimationHere(SourceFile file, size_t number,
+                                                               double fps);
+
+}  // namespace voxeld::voxelctl

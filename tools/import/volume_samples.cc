@@ -1,0 +1,162 @@
+#include "tools/import/volume_samples.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <type_traits>
+
+#include "absl/strings/str_cat.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+static_assert(std::endian::native == std::endian::little);
+
+constexpr uint64_t kMostAlong = 65536;
+constexpr double kLeastSlab = 0.05;  // of a volume's greatest length
+
+template <typename T>
+void Decode(absl::string_view bytes, const SampleCode& code, std::vector<float>* out) {
+  const size_t count = bytes.size() / sizeof(T);
+  out->reserve(out->size() + count);
+  for (size_t i = 0; i < count; ++i) {
+    char raw[sizeof(T)];
+    std::memcpy(raw, bytes.data() + i * sizeof(T), sizeof(T));
+    if (code.big_endian) std::reverse(raw, raw + sizeof(T));
+    T value;
+    std::memcpy(&value, raw, sizeof(T));
+    if constexpr (std::is_integral_v<T>) {
+      // Shifting right copies the sign bit if T is signed.
+      value = static_cast<T>(
+          static_cast<T>(static_cast<std::make_unsigned_t<T>>(value) << code.spare_bits) >>
+          code.spare_bits);
+    }
+    const auto number =
+        static_cast<float>(static_cast<double>(value) * code.slope + code.intercept);
+    out->push_back(std::isfinite(number) ? number : std::numeric_limits<float>::quiet_NaN());
+  }
+}
+
+}  // namespace
+
+size_t SampleBytes(SampleType type) {
+  switch (type) {
+    case SampleType::kI8:
+    case SampleType::kU8:
+      return 1;
+    case SampleType::kI16:
+    case SampleType::kU16:
+      return 2;
+    case SampleType::kI32:
+    case SampleType::kU32:
+    case SampleType::kF32:
+      return 4;
+    case SampleType::kI64:
+    case SampleType::kU64:
+    case SampleType::kF64:
+      return 8;
+  }
+  return 1;
+}
+
+absl::Status CheckVolumeSize(const SourceFile& file, const std::array<uint64_t, 3>& size) {
+  uint64_t samples = 1;
+  for (const uint64_t along : size) {
+    if (along < 1 || along > kMostAlong) {
+      return FileError(file, absl::StrCat("has ", along, " samples along an axis"),
+                       absl::StrCat("1 to ", kMostAlong, " are expected"));
+    }
+    samples *= along;
+  }
+  if (samples <= kMaxModelSamples) return absl::OkStatus();
+  return FileError(file,
+                   absl::StrCat("has ", size[0], " by ", size[1], " by ", size[2], " samples"),
+                   absl::StrCat("at most ", kMaxModelSamples, " in all are read"));
+}
+
+void DecodeSamples(absl::string_view bytes, const SampleCode& code, std::vector<float>* out) {
+  switch (code.type) {
+    case SampleType::kI8:
+      return Decode<int8_t>(bytes, code, out);
+    case SampleType::kU8:
+      return Decode<uint8_t>(bytes, code, out);
+    case SampleType::kI16:
+      return Decode<int16_t>(bytes, code, out);
+    case SampleType::kU16:
+      return Decode<uint16_t>(bytes, code, out);
+    case SampleType::kI32:
+      return Decode<int32_t>(bytes, code, out);
+    case SampleType::kU32:
+      return Decode<uint32_t>(bytes, code, out);
+    case SampleType::kI64:
+      return Decode<int64_t>(bytes, code, out);
+    case SampleType::kU64:
+      return Decode<uint64_t>(bytes, code, out);
+    case SampleType::kF32:
+      return Decode<float>(bytes, code, out);
+    case SampleType::kF64:
+      return Decode<double>(bytes, code, out);
+  }
+}
+
+void DecodeColors(absl::string_view bytes, size_t bytes_each, SampledVolume* volume) {
+  const size_t count = bytes.size() / bytes_each;
+  volume->colors.reserve(volume->colors.size() + count);
+  volume->samples.reserve(volume->samples.size() + count);
+  for (size_t i = 0; i < count; ++i) {
+    const auto at = [&](size_t k) { return static_cast<uint8_t>(bytes[i * bytes_each + k]); };
+    const int alpha = bytes_each == 4 ? at(3) : 255;
+    const auto channel = [&](size_t k) { return static_cast<uint8_t>(at(k) * alpha / 255); };
+    const Rgb color = {channel(0), channel(1), channel(2)};
+    volume->colors.push_back(color);
+    volume->samples.push_back(
+        static_cast<float>(0.299 * color.r + 0.587 * color.g + 0.114 * color.b));
+  }
+}
+
+absl::Status PlaceVolume(const SourceFile& file, const Point3& first,
+                         const std::array<Point3, 3>& steps, SampledVolume* volume) {
+  const auto& [a, b, c] = steps;
+  const double spans =
+      a.x * (b.y * c.z - b.z * c.y) + a.y * (b.z * c.x - b.x * c.z) + a.z * (b.x * c.y - b.y * c.x);
+  const double lengths =
+      std::hypot(a.x, a.y, a.z) * std::hypot(b.x, b.y, b.z) * std::hypot(c.x, c.y, c.z);
+  if (!(std::abs(spans) > 1e-6 * lengths) || !std::isfinite(lengths) ||
+      !std::isfinite(first.x + first.y + first.z)) {
+    return FileError(file,
+                     absl::StrCat("its axes are (", a.x, ", ", a.y, ", ", a.z, "), (", b.x, ", ",
+                                  b.y, ", ", b.z, ") and (", c.x, ", ", c.y, ", ", c.z, ")"),
+                     "three directions that span a volume are expected");
+  }
+  std::array<double, 3> lengths_of;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    lengths_of[axis] = std::hypot(steps[axis].x, steps[axis].y, steps[axis].z) * volume->size[axis];
+  }
+  const double longest = *std::max_element(lengths_of.begin(), lengths_of.end());
+  for (size_t corner = 0; corner < 8; ++corner) {
+    Point3 at = first;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double middle = (volume->size[axis] - 1) / 2.0;
+      const double half =
+          volume->size[axis] / 2.0 * std::max(1.0, kLeastSlab * longest / lengths_of[axis]);
+      const double along = (corner >> axis & 1) != 0 ? middle + half : middle - half;
+      at.x += steps[axis].x * along;
+      at.y += steps[axis].y * along;
+      at.z += steps[axis].z * along;
+    }
+    if (!std::isfinite(at.x) || !std::isfinite(at.y) || !std::isfinite(at.z)) {
+      return FileError(file,
+                       absl::StrCat("has a corner at (", at.x, ", ", at.y, ", ", at.z,
+                                    "), by steps of (", a.x, ", ", a.y, ", ", a.z, "), (", b.x,
+                                    ", ", b.y, ", ", b.z, ") and (", c.x, ", ", c.y, ", ", c.z,
+                                    ") from (", first.x, ", ", first.y, ", ", first.z, ")"),
+                       "corners at finite places are expected");
+    }
+    volume->corners[corner] = at;
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace voxeld::voxelctl

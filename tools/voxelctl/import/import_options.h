@@ -1,0 +1,32 @@
+// How files are to be read.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "tools/voxelctl/import/source_file.h"
+
+namespace voxeld::voxelctl {
+
+// Small balls with bonds between them, or balls as large as atoms are.
+enum class MoleculeStyle : uint8_t { kBalls, kSpace };
+
+enum class SampleType : uint8_t { kI8, kU8, kI16, kU16, kI32, kU32, kI64, kU64, kF32, kF64 };
+
+// What a file holds that is nothing but samples (.raw).
+struct RawLayout {
+  std::array<uint64_t, 3> size = {};
+  SampleType type = SampleType::kU8;
+  bool big_endian = false;
+};
+
+struct ImportOptions {
+  bool globe = false;  // longitude and latitude of maps go on a sphere; other files ignore it
+  std::optional<RawLayout> raw;
+  MoleculeStyle style = MoleculeStyle::kBalls;
+  uint32_t pixels = 512;  // of the longer side of drawings
+  OtherFiles other_files = OtherFiles::kBelow;
+};
+
+}  // namespace voxeld::voxelctl

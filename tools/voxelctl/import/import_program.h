@@ -1,0 +1,37 @@
+// voxeld-import, the program that reads the files for which libraries are needed. It is an optional package.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "tools/voxelctl/import/frames.h"
+#include "tools/voxelctl/import/import_options.h"
+#include "tools/voxelctl/import/model.h"
+#include "tools/voxelctl/process/interrupt.h"
+
+namespace voxeld::voxelctl {
+
+// Returns: OK if there is the program, beside this one or in ../libexec/voxeld. Errors: Unimplemented "SUBJECT: …" with how to get it.
+absl::Status CheckImporters(absl::string_view subject);
+
+// Reads a file or folder as ImportFile does, with the program.
+absl::StatusOr<Model> ImportByProgram(const std::string& path, const ImportOptions& options,
+                                      Interrupt* interrupt);
+
+// Animation `number`, from 1 on, of a mesh file or skeleton (glTF, FBX, COLLADA, BVH, …), in frames of `fps` a second from its
+// beginning to its end. Meshes follow their bones; without meshes the bones are lines. The program reads it as long as the result lives.
+// `interrupt` may be null. Errors: InvalidArgument if there is no such animation, with the names of those there are; as above.
+absl::StatusOr<std::unique_ptr<FrameSource>> OpenAnimation(
+    const std::string& path, size_t number, double fps, OtherFiles other_files = OtherFiles::kBelow,
+    Interrupt* interrupt = nullptr);
+
+// Files that are frames, all of them read by one run of the program.
+absl::StatusOr<std::unique_ptr<FrameSource>> OpenSequence(const std::vector<std::string>& paths,
+                                                          const ImportOptions& options,
+                                                          Interrupt* interrupt);
+
+}  // namespace voxeld::voxelctl

@@ -1,0 +1,142 @@
+#include "tools/voxelctl/import/reader_process.h"
+
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdint>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "daemon/address/descriptor.h"
+#include "tools/voxelctl/import/model_bytes.h"
+#include "tools/voxelctl/import/sandbox.h"
+
+// Sanitizers reserve more address space than the limit.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define VOXELD_SHADOW_MEMORY
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define VOXELD_SHADOW_MEMORY
+#endif
+#endif
+
+namespace voxeld::voxelctl {
+namespace {
+
+[[maybe_unused]] constexpr rlim_t kMostMemory = rlim_t{4} << 30, kOfFile = 4;
+constexpr rlim_t kMostDescriptors = 64;
+// Limit of what the reader may write: more than the largest model (kMaxModelVertices and the others).
+constexpr rlim_t kMostModelBytes = rlim_t{5} << 30;
+
+// The folder below which the reader may open files: that of the file, or the one that is read.
+std::string Readable(const SourceFile& file) {
+  if (file.other_files == OtherFiles::kNone) return "";
+  if (file.other_files == OtherFiles::kAny) return "/";
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file.path, ignored)) return file.path;
+  const std::string folder = std::filesystem::path(file.path).parent_path().string();
+  return folder.empty() ? "." : folder;
+}
+
+void Limit(int resource, rlim_t most) {
+  const rlimit limit = {most, most};
+  ::setrlimit(static_cast<__rlimit_resource>(resource), &limit);
+}
+
+// Bytes of address space that this process uses. Builds with a sanitizer do not call it: they have no
+// limit on address space.
+[[maybe_unused]] rlim_t AddressSpace() {
+  const daemon::Descriptor file(::open("/proc/self/statm", O_RDONLY | O_CLOEXEC));
+  char text[64] = {};
+  if (::read(file.get(), text, sizeof(text) - 1) <= 0) return 0;
+  return std::strtoull(text, nullptr, 10) * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE));
+}
+
+// The whole of a number from a socket. False at its end.
+bool ReadNumber(int descriptor, int64_t* number) {
+  ssize_t got = 0;
+  do {
+    got = ::read(descriptor, number, sizeof(*number));
+  } while (got < 0 && errno == EINTR);
+  return got == sizeof(*number);
+}
+
+// A few bytes, of which a socket takes all or none.
+bool WriteNumber(int descriptor, int64_t number) {
+  return ::write(descriptor, &number, sizeof(number)) == sizeof(number);
+}
+
+}  // namespace
+
+bool ConfineReader(const SourceFile& file, Answers answers,
+                   const std::vector<std::string>& folders) {
+  if (answers == Answers::kModel) {  // who asks for frames watches the time of each
+    ::alarm(kMostReadingSeconds);
+    Limit(RLIMIT_CPU, kMostProcessorSeconds);
+  }
+  Limit(RLIMIT_CORE, 0);
+  Limit(RLIMIT_NOFILE, kMostDescriptors);
+  Limit(RLIMIT_FSIZE, kMostModelBytes);
+#if !defined(VOXELD_SHADOW_MEMORY)
+  Limit(RLIMIT_AS, AddressSpace() + kMostMemory + kOfFile * file.bytes.size());
+#endif
+  // For a file of the user's own the sandbox is a second line: without Landlock the first remains.
+  return Sandbox::Get().Enter(Readable(file), folders).ok() ||
+         file.other_files != OtherFiles::kNone;
+}
+
+ReaderMain ReaderOf(const SourceFile& file, std::function<absl::StatusOr<Model>()> read) {
+  return [&file, read = std::move(read)] {
+    if (!ConfineReader(file, Answers::kModel)) ::_exit(kNotConfined);
+    AnswerModel(read);
+  };
+}
+
+ReaderMain FramesOf(SourceFile file, OpenFrames open) {
+  return [file = std::move(file), open = std::move(open)] {
+    if (!ConfineReader(file, Answers::kFrames)) ::_exit(kNotConfined);
+    ServeFrames([&] { return open(file); });
+  };
+}
+
+ReaderMain ProgramOf(std::vector<std::string> command) {
+  return [command = std::move(command)]() mutable {
+    std::vector<char*> words;
+    for (std::string& word : command) words.push_back(word.data());
+    words.push_back(nullptr);
+    ::execv(words[0], words.data());
+    ::_exit(kNotStarted);
+  };
+}
+
+void AnswerModel(const std::function<absl::StatusOr<Model>()>& read) {
+  bool good = false;
+  try {
+    good = WriteModel(read(), kModelDescriptor);
+  } catch (const std::exception&) {
+  }
+  ::_exit(good ? 0 : 1);
+}
+
+void ServeFrames(const std::function<absl::StatusOr<std::unique_ptr<FrameSource>>()>& open) {
+  bool good = true;
+  try {
+    const absl::StatusOr<std::unique_ptr<FrameSource>> source = open();
+    if (!source.ok()) good = WriteModel(source.status(), kModelDescriptor);
+    good = good && WriteNumber(kChannelDescriptor, source.ok() ? (*source)->count() : -1);
+    for (int64_t frame = 0; good && source.ok() && ReadNumber(kChannelDescriptor, &frame);) {
+      good = WriteModel((*source)->Read(frame), kModelDescriptor) &&
+             WriteNumber(kChannelDescriptor, 0);
+    }
+  } catch (const std::exception&) {
+    good = false;
+  }
+  ::_exit(good ? 0 : 1);
+}
+
+}  // namespace voxeld::voxelctl
