@@ -16,6 +16,7 @@
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_replace.h"
 #include "absl/strings/str_split.h"
+#include "common/text/color_names.h"
 #include "common/text/printable.h"
 
 namespace voxeld::voxelctl {
@@ -272,29 +273,10 @@ absl::Status SetVec3(absl::string_view name, absl::string_view text, v1::Vec3* o
 }
 
 absl::Status SetColor(absl::string_view name, absl::string_view text, v1::Color* out) {
-  constexpr std::pair<absl::string_view, uint32_t> kNames[] = {
-      {"black", 0x000000},   {"blue", 0x0000FF},    {"brown", 0xA52A2A}, {"cyan", 0x00FFFF},
-      {"gold", 0xFFD700},    {"gray", 0x808080},    {"green", 0x00C000}, {"lime", 0x00FF00},
-      {"magenta", 0xFF00FF}, {"orange", 0xFF8000},  {"pink", 0xFFA0C0},  {"purple", 0xA020F0},
-      {"red", 0xFF0000},     {"skyblue", 0x40C0FF}, {"teal", 0x008080},  {"violet", 0xC060FF},
-      {"white", 0xFFFFFF},   {"yellow", 0xFFFF00}};
-  for (const auto& [known, rgb] : kNames) {
-    if (known == text) {
-      out->set_rgb(rgb);
-      return absl::OkStatus();
-    }
-  }
-  absl::string_view digits = text;
-  uint32_t rgb = 0;
-  if (absl::ConsumePrefix(&digits, "#") && digits.size() == 6 &&
-      absl::SimpleHexAtoi(digits, &rgb)) {
-    out->set_rgb(rgb);
-    return absl::OkStatus();
-  }
-  std::vector<std::string> names;
-  for (const auto& known : kNames) names.emplace_back(known.first);
-  return Wrong(name, text,
-               absl::StrCat("#rrggbb would be right, or one of ", absl::StrJoin(names, ", ")));
+  const std::optional<uint32_t> rgb = ParseColor(text);
+  if (!rgb) return Wrong(name, text, ColorAdvice(text));
+  out->set_rgb(*rgb);
+  return absl::OkStatus();
 }
 
 absl::Status SetField(const FieldDescriptor& field, absl::string_view text, Message* out) {
