@@ -40,7 +40,9 @@ ALLOWED = {
               # What a display's geometry is, on the wire.
               "daemon/geometry_wire",
               # Strokes of letters: in scenes and in pictures of them.
-              "daemon/text"],
+              "daemon/text",
+              # Colour maps and pictures of meshes, read as the daemon reads them.
+              "daemon/colormaps", "daemon/pictures"],
     # Emulated devices are of display; this is their program.
     "tools/emulator": ["display", "daemon/usage", "tools/emulator"],
     "tools/bench": ["gpu", "display", "daemon/wire", "voxeld/v1", "tools/bench"],

@@ -89,9 +89,16 @@ absl::StatusOr<LasHeader> ReadLasHeader(const SourceFile& file) {
   return out;
 }
 
+// Offsets of what a point has besides, by its kind of format: before and from 6 on.
+struct OtherFields {
+  uint32_t return_bits, classification, classification_bits, source;
+};
+constexpr OtherFields kOthersBefore6 = {0x07, 15, 0x1F, 18}, kOthersFrom6 = {0x0F, 16, 0xFF, 20};
+constexpr size_t kReturns = 14;
+
 }  // namespace
 
-absl::StatusOr<Model> ReadLasPoints(const SourceFile& file) {
+absl::StatusOr<Model> ReadLasPoints(const SourceFile& file, bool attributes) {
   const absl::StatusOr<LasHeader> header = ReadLasHeader(file);
   if (!header.ok()) return header.status();
   const absl::string_view points = absl::string_view(file.bytes).substr(header->points_at);
@@ -111,6 +118,12 @@ absl::StatusOr<Model> ReadLasPoints(const SourceFile& file) {
   absl::StatusOr<PointTable> table = PointTable::Make(file, has, brightest > 255 ? 65535 : 255);
   if (!table.ok()) return table.status();
   table->Reserve(header->count);
+  std::vector<double> values;
+  if (attributes) {
+    table->SetAttributes({"intensity", "classification", "return", "source"});
+    values.resize(4);
+  }
+  const OtherFields& others = header->format.withheld == 0x80 ? kOthersBefore6 : kOthersFrom6;
   uint64_t withheld = 0;
   for (uint64_t i = 0; i < header->count; ++i) {
     const size_t at = i * header->record;
@@ -127,7 +140,15 @@ absl::StatusOr<Model> ReadLasPoints(const SourceFile& file) {
       }
     }
     row[static_cast<size_t>(PointColumn::kIntensity)] = Take<uint16_t>(points, at + kIntensity);
-    if (absl::Status status = table->Add(file, row, absl::StrCat("point ", i)); !status.ok()) {
+    if (attributes) {
+      values = {row[static_cast<size_t>(PointColumn::kIntensity)],
+                static_cast<double>(Take<uint8_t>(points, at + others.classification) &
+                                    others.classification_bits),
+                static_cast<double>(Take<uint8_t>(points, at + kReturns) & others.return_bits),
+                static_cast<double>(Take<uint16_t>(points, at + others.source))};
+    }
+    if (absl::Status status = table->Add(file, row, absl::StrCat("point ", i), values);
+        !status.ok()) {
       return status;
     }
   }

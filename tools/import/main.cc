@@ -66,6 +66,7 @@ absl::Status Parse(int argc, char** argv, Wanted* wanted) {
   app.add_option("--style", wanted->options.style)->transform(CLI::Transformer(styles));
   app.add_option("--pixels", wanted->options.pixels);
   app.add_flag("--globe", wanted->options.globe);
+  app.add_flag("--attributes", wanted->options.attributes);
   app.add_option("--size", size)->delimiter('x')->expected(3);
   app.add_option("--type", raw.type)->transform(CLI::Transformer(types));
   app.add_flag("--big-endian", raw.big_endian);

@@ -27,9 +27,16 @@ static_assert(std::endian::native == std::endian::little, "values are read in pl
 
 struct Field {
   std::string name;
-  uint32_t size = 0;   // of one value
-  char type = 'F';     // I, U, F
-  uint32_t count = 1;  // values of each point
+  uint32_t size = 0;                // of one value
+  char type = 'F';                  // I, U, F
+  uint32_t count = 1;               // values of each point
+  std::optional<size_t> attribute;  // its first value is this one of a point's attributes
+};
+
+// What a point has.
+struct PcdPoint {
+  PointRow row = {};
+  std::vector<double> attributes;
 };
 
 enum class Data : uint8_t { kAscii, kBinary, kCompressed };
@@ -179,19 +186,25 @@ void SetPacked(uint32_t word, PointRow* row) {
   (*row)[static_cast<size_t>(PointColumn::kBlue)] = word & 0xFF;
 }
 
+void SetNumber(const Field& field, double value, PcdPoint* point) {
+  if (field.attribute) point->attributes[*field.attribute] = value;
+  if (const auto column = PointColumnOf(field.name))
+    point->row[static_cast<size_t>(*column)] = value;
+}
+
 // What becomes of a field's first value.
-void Take(const Field& field, const char* at, PointRow* row) {
+void Take(const Field& field, const char* at, PcdPoint* point) {
   if (IsPacked(field)) {
     uint32_t word;
     std::memcpy(&word, at, sizeof(word));
-    SetPacked(word, row);
-  } else if (const auto column = PointColumnOf(field.name)) {
-    (*row)[static_cast<size_t>(*column)] = ValueOf(field, at);
+    SetPacked(word, &point->row);
+  } else {
+    SetNumber(field, ValueOf(field, at), point);
   }
 }
 
 // A word of ascii data: a packed colour may be the float that its bits are, or a whole number.
-bool TakeWord(const Field& field, absl::string_view word, PointRow* row) {
+bool TakeWord(const Field& field, absl::string_view word, PcdPoint* point) {
   double value = 0;
   if (word == "nan" || word == "NaN" || word == "-nan") {
     value = std::nan("");
@@ -207,9 +220,9 @@ bool TakeWord(const Field& field, absl::string_view word, PointRow* row) {
                   ? std::bit_cast<uint32_t>(static_cast<float>(value))
               : unknown ? 0xFFFFFF
                         : static_cast<uint32_t>(static_cast<int64_t>(value)),
-              row);
-  } else if (const auto column = PointColumnOf(field.name)) {
-    (*row)[static_cast<size_t>(*column)] = value;
+              &point->row);
+  } else {
+    SetNumber(field, value, point);
   }
   return true;
 }
@@ -218,19 +231,26 @@ bool IsThere(const PointRow& row) {
   return std::isfinite(row[0]) && std::isfinite(row[1]) && std::isfinite(row[2]);
 }
 
-using TakeRow = absl::FunctionRef<absl::Status(const PointRow&, uint64_t number)>;
+using TakePoint = absl::FunctionRef<absl::Status(const PcdPoint&, uint64_t number)>;
 
-absl::Status ReadAscii(const SourceFile& file, const PcdHeader& header, TakeRow take) {
+PcdPoint EmptyPoint(const PcdHeader& header) {
+  PcdPoint point;
+  for (const Field& field : header.fields) {
+    if (field.attribute) point.attributes.push_back(0);
+  }
+  return point;
+}
+
+absl::Status ReadAscii(const SourceFile& file, const PcdHeader& header, TakePoint take) {
   absl::string_view rest = absl::string_view(file.bytes).substr(header.body);
+  PcdPoint point = EmptyPoint(header), ignored = point;
   for (uint64_t i = 0; i < header.points; ++i) {
-    PointRow row = {};
     for (const Field& field : header.fields) {
       for (uint32_t k = 0; k < field.count; ++k) {
         rest = absl::StripLeadingAsciiWhitespace(rest);
         const absl::string_view word = rest.substr(0, rest.find_first_of(" \t\r\n"));
         rest.remove_prefix(word.size());
-        PointRow ignored = {};
-        if (!TakeWord(field, word, k == 0 ? &row : &ignored)) {
+        if (!TakeWord(field, word, k == 0 ? &point : &ignored)) {
           return FileError(
               file,
               absl::StrCat("point ", i, " of ", header.points, " has ",
@@ -242,31 +262,31 @@ absl::Status ReadAscii(const SourceFile& file, const PcdHeader& header, TakeRow 
         }
       }
     }
-    if (absl::Status status = take(row, i); !status.ok()) return status;
+    if (absl::Status status = take(point, i); !status.ok()) return status;
   }
   return absl::OkStatus();
 }
 
 // Points one after another, or field after field (`by_field`), as the compressed data have them.
 absl::Status ReadBinary(const SourceFile& file, const PcdHeader& header, absl::string_view bytes,
-                        bool by_field, TakeRow take) {
+                        bool by_field, TakePoint take) {
   if (bytes.size() < header.points * header.point_bytes) {
     return FileError(file,
                      absl::StrCat("has ", bytes.size(), " bytes of data for ", header.points,
                                   " points of ", header.point_bytes, TextModeHint(file.bytes)),
                      "the file is truncated or damaged");
   }
+  PcdPoint point = EmptyPoint(header);
   for (uint64_t i = 0; i < header.points; ++i) {
-    PointRow row = {};
     uint64_t before = 0;  // bytes of the fields before
     for (const Field& field : header.fields) {
       const uint64_t bytes_of_field = uint64_t{field.size} * field.count;
       const uint64_t at =
           by_field ? before * header.points + i * bytes_of_field : i * header.point_bytes + before;
-      if (field.count > 0) Take(field, bytes.data() + at, &row);
+      if (field.count > 0) Take(field, bytes.data() + at, &point);
       before += bytes_of_field;
     }
-    if (absl::Status status = take(row, i); !status.ok()) return status;
+    if (absl::Status status = take(point, i); !status.ok()) return status;
   }
   return absl::OkStatus();
 }
@@ -296,12 +316,21 @@ absl::StatusOr<std::string> Decompress(const SourceFile& file, const PcdHeader& 
 
 }  // namespace
 
-absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file) {
-  const absl::StatusOr<PcdHeader> header = ReadPcdHeader(file);
+absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file, bool attributes) {
+  absl::StatusOr<PcdHeader> header = ReadPcdHeader(file);
   if (!header.ok()) return header.status();
   std::array<bool, kPointColumns> has = {};
   bool floats = false;  // colours whose scale depends on their greatest value
-  for (const Field& field : header->fields) {
+  std::vector<std::string> names;
+  uint64_t others = 0;
+  for (Field& field : header->fields) {
+    const std::optional<PointColumn> known =
+        IsPacked(field) ? PointColumn::kRed : PointColumnOf(field.name);
+    if (!known && field.name != "_") ++others;
+    if (attributes && field.name != "_" && (!known || *known == PointColumn::kIntensity)) {
+      field.attribute = names.size();
+      names.push_back(field.name);
+    }
     if (IsPacked(field)) {
       for (const PointColumn c : {PointColumn::kRed, PointColumn::kGreen, PointColumn::kBlue}) {
         has[static_cast<size_t>(c)] = true;
@@ -317,7 +346,7 @@ absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file) {
     if (!bytes.ok()) return bytes.status();
     decompressed = *std::move(bytes);
   }
-  const auto read = [&](TakeRow take) {
+  const auto read = [&](TakePoint take) {
     if (header->data == Data::kAscii) return ReadAscii(file, *header, take);
     const bool by_field = header->data == Data::kCompressed;
     return ReadBinary(file, *header,
@@ -326,9 +355,9 @@ absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file) {
   };
   double greatest = floats ? 0 : 255;
   if (floats) {
-    const absl::Status looked = read([&](const PointRow& row, uint64_t) {
+    const absl::Status looked = read([&](const PcdPoint& point, uint64_t) {
       for (const PointColumn c : {PointColumn::kRed, PointColumn::kGreen, PointColumn::kBlue}) {
-        greatest = std::max(greatest, row[static_cast<size_t>(c)]);
+        greatest = std::max(greatest, point.row[static_cast<size_t>(c)]);
       }
       return absl::OkStatus();
     });
@@ -336,9 +365,11 @@ absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file) {
   }
   absl::StatusOr<PointTable> table = PointTable::Make(file, has, FullScaleOf(greatest));
   if (!table.ok()) return table.status();
+  table->SetAttributes(std::move(names));
   uint64_t nowhere = 0;
-  const absl::Status status = read([&](const PointRow& row, uint64_t number) {
-    if (IsThere(row)) return table->Add(file, row, absl::StrCat("point ", number));
+  const absl::Status status = read([&](const PcdPoint& point, uint64_t number) {
+    if (IsThere(point.row))
+      return table->Add(file, point.row, absl::StrCat("point ", number), point.attributes);
     ++nowhere;
     return absl::OkStatus();
   });
@@ -348,6 +379,7 @@ absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file) {
   }
   Model model = std::move(*table).Finish(file, "PCD points");
   AddLeftOut("points that are not finite", nowhere, &model);
+  if (!attributes) AddLeftOut("other fields", others, &model);
   return model;
 }
 

@@ -81,6 +81,7 @@ class PdbReader {
     }
     Model model;
     model.path = file_.path;
+    model.molecule = true;
     model.format = "PDB molecule";
     model.up = Up::kZ;
     model.lit_already = true;

@@ -41,8 +41,8 @@ absl::StatusOr<Model> ReadAny(const SourceFile& file, const ImportOptions& optio
   const std::string& extension = file.extension;
   if (IsOwnFormat(extension)) return ReadOwnFormat(file, options);
   if (extension == "obj" || extension == "gltf" || extension == "glb") return ReadMesh(file);
-  if (extension == "pcd") return ReadPcdPoints(file);
-  if (extension == "las" || extension == "laz") return ReadLasPoints(file);
+  if (extension == "pcd") return ReadPcdPoints(file, options.attributes);
+  if (extension == "las" || extension == "laz") return ReadLasPoints(file, options.attributes);
   if (extension == "nii" || (extension == "gz" && absl::EndsWithIgnoreCase(file.path, ".nii.gz")))
     return ReadNiftiVolume(file);
   if (extension == "hdr" || extension == "img") return ReadNiftiVolume(file);

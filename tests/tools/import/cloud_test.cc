@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "tests/tools/import/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
@@ -227,6 +228,75 @@ TEST_F(Clouds, PcdPointsThatAreNowhereAreLeftOut) {
   EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"points that are not finite", 1}}));
 }
 
+// The attributes of a file that is read for them, as "NAME: NUMBERS" each.
+std::vector<std::string> AttributesOf(const std::string& path) {
+  const absl::StatusOr<Model> model = ReadHere(path, {.attributes = true});
+  EXPECT_THAT(model, IsOk());
+  std::vector<std::string> texts;
+  if (!model.ok()) return texts;
+  EXPECT_TRUE(model->left_out.empty());
+  for (const Attribute& one : model->parts.at(0).attributes)
+    texts.push_back(absl::StrCat(one.name, ": ", absl::StrJoin(one.values, " ")));
+  return texts;
+}
+
+TEST_F(Clouds, TextColumnsAreAttributesOnlyIfTheyAreWanted) {
+  const std::string path =
+      folder_.Write("a.csv", "x,y,z,Temp,i,name\n0,0,0,1.5,7,anna\n1,0,0,,8,bob\n0,1,0,-3,9,eve\n");
+  EXPECT_THAT(AttributesOf(path), ElementsAre("Temp: 1.5 nan -3", "i: 7 8 9", "name: nan nan nan"));
+  const auto plain = ReadHere(path);
+  ASSERT_THAT(plain, IsOk());
+  EXPECT_TRUE(plain->parts[0].attributes.empty());
+  EXPECT_EQ(plain->left_out, (std::vector<LeftOut>{{"other columns", 2}}));
+}
+
+TEST_F(Clouds, TextColumnsWithoutNamesHaveNumbers) {
+  EXPECT_THAT(AttributesOf(folder_.Write("a.xyz", "0 0 0 5 6\n1 0 0 7 8\n")),
+              ElementsAre("intensity: 5 7", "column 5: 6 8"));
+  EXPECT_THAT(AttributesOf(folder_.Write("b.txt",
+                                         "//X Y Z R G B Scalar_field\n0 0 0 1 2 3 4\n1 "
+                                         "1 1 5 6 7 8\n")),
+              ElementsAre("Scalar_field: 4 8"));
+}
+
+TEST_F(Clouds, PropertiesOfPlyAreAttributes) {
+  const std::string head =
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float "
+      "z\nproperty float quality\nproperty list uchar int around\nproperty uchar red\n";
+  const std::string body = "0 0 0 1 1 9 1\n1 0 0 2 0 2\nnan 1 0 3 0 3\n0 1 0 4 0 4\n";
+  const auto cloud =
+      ReadHere(folder_.Write("a.ply", head + "end_header\n" + body), {.attributes = true});
+  ASSERT_THAT(cloud, IsOk());
+  ASSERT_EQ(cloud->parts[0].attributes.size(), 2u);
+  EXPECT_EQ(cloud->parts[0].attributes[0], (Attribute{"quality", {1, 2, 4}}));
+  EXPECT_EQ(cloud->parts[0].attributes[1], (Attribute{"red", {1, 2, 4}})) << "there is no green";
+  EXPECT_EQ(cloud->left_out, (std::vector<LeftOut>{{"points that are not a number", 1},
+                                                   {"other properties of vertices", 1}}));
+  // Two vertices at one place have different numbers.
+  const auto mesh = ReadHere(
+      folder_.Write(
+          "b.ply",
+          "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float "
+          "y\nproperty float z\nproperty int part\nelement face 2\nproperty list uchar int "
+          "vertex_index\nend_header\n0 0 0 1\n1 0 0 2\n0 1 0 3\n0 0 0 4\n3 0 1 2\n3 3 2 "
+          "1\n"),
+      {.attributes = true});
+  ASSERT_THAT(mesh, IsOk());
+  const Part& part = mesh->parts[0];
+  ASSERT_EQ(part.attributes.size(), 1u);
+  std::vector<float> at_corners;
+  for (const uint32_t v : part.indices) at_corners.push_back(part.attributes[0].values.at(v));
+  EXPECT_THAT(at_corners, ElementsAre(1, 2, 3, 4, 3, 2));
+}
+
+TEST_F(Clouds, FieldsOfPcdAreAttributes) {
+  const std::string path =
+      folder_.Write("a.pcd", AsciiPcd("x y z label intensity rgb", "F F F U F U",
+                                      "0 0 0 3 0.5 16711680\n1 0 0 4 nan 255\n"));
+  EXPECT_THAT(AttributesOf(path), ElementsAre("label: 3 4", "intensity: 0.5 nan"));
+  EXPECT_EQ(ReadHere(path)->left_out, (std::vector<LeftOut>{{"other fields", 1}}));
+}
+
 TEST_F(Clouds, PcdThatIsWrong) {
   const std::string point = PcdPoint(1, 2, 3, 4);
   EXPECT_THAT(Error("a.pcd", "hello"), HasSubstr("a PCD header is expected"));
@@ -373,6 +443,24 @@ TEST_F(Clouds, DamagedOnesEndWell) {
       }
     }
   }
+}
+
+TEST_F(Clouds, FieldsOfLasAreAttributes) {
+  // LAS 1.4, tables 7 and 10: of formats before 6 bits 0 to 2 of byte 14 are the return and bits 0 to 4 of byte 15 the class, the source is
+  // at 18; from 6 on bits 0 to 3, byte 16, and 20.
+  std::string before = Las(2, 0, 20, 0, {{0, 0, 0, 77, 0, {}}});
+  before[227 + 14] = '\x0a';  // the second of one
+  before[227 + 15] = '\x46';  // class 6, key point
+  before[227 + 18] = '\x05';
+  EXPECT_THAT(AttributesOf(folder_.Write("a.las", before)),
+              ElementsAre("intensity: 77", "classification: 6", "return: 2", "source: 5"));
+  std::string from = Las(4, 6, 30, 0, {{0, 0, 0, 78, 0, {}}});
+  const size_t at = from.size() - 30;
+  from[at + 14] = '\x29';  // the ninth of two
+  from[at + 16] = '\x88';
+  from[at + 20] = '\x07';
+  EXPECT_THAT(AttributesOf(folder_.Write("b.las", from)),
+              ElementsAre("intensity: 78", "classification: 136", "return: 9", "source: 7"));
 }
 
 }  // namespace cloud_test

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "client/cpp/src/encode.h"
+#include "tests/daemon/pictures/files.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tools/voxelctl/scene/look.h"
 #include "tools/voxelctl/scene/pack.h"
@@ -341,6 +342,83 @@ TEST(PackObject, KindsGoIntoPiecesOfTheirOwn) {
                 .vertices()
                 .count(),
             2u);
+}
+
+// `triangles` without a picture, and as many on the second of two pictures.
+Model HalfTextured(const std::string& picture, size_t triangles) {
+  Model model = Strip(triangles);
+  model.pictures = {"another", picture};
+  Part textured = model.parts[0];
+  textured.picture = 1;
+  for (size_t v = 0; v < textured.positions.size(); ++v)
+    textured.texture_coordinates.push_back({static_cast<float>(v), 0.25f});
+  model.parts.push_back(std::move(textured));
+  return model;
+}
+
+TEST(PackObject, APictureGoesWithEachPieceOfItsPart) {
+  const std::string picture = pictures::PngOf(2, 1, {0xff0000, 0x00ff00});
+  for (const uint64_t message : {uint64_t{0}, uint64_t{64} << 10}) {
+    client::Limits limits;
+    limits.max_message_bytes = message;
+    const Packed packed = Pack(HalfTextured(picture, 5000), limits);
+    ASSERT_THAT(packed.sizes, IsOk());
+    uint64_t textured = 0, plain = 0;
+    for (const v1::StreamRequest& request : packed.requests) {
+      if (message > 0) {
+        EXPECT_LE(request.ByteSizeLong(), message);
+      }
+      if (!request.define_object().definition().parts(0).primitive().has_mesh()) continue;
+      const v1::Mesh& mesh = request.define_object().definition().parts(0).primitive().mesh();
+      if (!mesh.has_texture()) {
+        plain += mesh.vertices().index_count() / 3;
+        continue;
+      }
+      textured += mesh.vertices().index_count() / 3;
+      EXPECT_EQ(mesh.texture().picture(), picture);
+      ASSERT_EQ(mesh.texture().coordinates().size(), mesh.vertices().count() * 8u);
+      for (uint32_t v = 0; v < mesh.vertices().count(); ++v) {
+        float place[2], position[3];
+        std::memcpy(place, mesh.texture().coordinates().data() + v * 8, 8);
+        std::memcpy(position, mesh.vertices().positions().data() + v * 12, 12);
+        EXPECT_EQ(place[1], 0.25f);
+        EXPECT_EQ(place[0], position[0]) << v;  // as HalfTextured places them
+      }
+    }
+    EXPECT_EQ(textured, 5000u);
+    EXPECT_EQ(plain, 5000u);
+    EXPECT_EQ(packed.sizes->note, "");
+  }
+}
+
+TEST(PackObject, APictureThatIsNotSentColoursTheVertices) {
+  // Of points there are no pictures, and the second is larger than a message.
+  const std::string picture = pictures::PngOf(2, 1, {0xff8000, 0x00ff00});
+  Model points{.path = "p"};
+  points.pictures = {picture};
+  points.parts.push_back({.kind = Kind::kPoints,
+                          .positions = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}},
+                          .colors = {{255, 255, 255}, {255, 255, 255}, {100, 100, 100}},
+                          .texture_coordinates = {{0.1f, 0}, {-0.1f, 7}, {2.2f, 0.5f}},
+                          .picture = 0});
+  const Packed packed = Pack(points, {});
+  ASSERT_THAT(packed.sizes, IsOk());
+  EXPECT_THAT(packed.sizes->note, testing::HasSubstr("at the vertices alone"));
+  EXPECT_EQ(packed.requests[0]
+                .define_object()
+                .definition()
+                .parts(0)
+                .primitive()
+                .points()
+                .vertices()
+                .colors(),
+            std::string("\xff\x80\x00\x00\xff\x00\x64\x32\x00", 9));
+}
+
+TEST(PackObject, APictureThatCannotBeReadIsSaid) {
+  const Packed packed = Pack(HalfTextured("GIF89a", 2), {});
+  ASSERT_THAT(packed.sizes, IsOk());
+  EXPECT_THAT(packed.sizes->note, testing::HasSubstr("a picture of it"));
 }
 
 TEST(PackLevels, AnObjectForEach) {

@@ -21,6 +21,8 @@ namespace voxeld::voxelctl {
 
 struct PlayOptions {
   std::vector<std::string> files;  // at least one
+  std::vector<std::string>
+      given;  // the options that only some files have a use for, as they are typed
   bool spin = false;
   bool clear = false;  // takes it down at the end
   bool globe = false;
@@ -32,7 +34,9 @@ struct PlayOptions {
   std::optional<double> duration_s;
   std::string display;  // whose space is filled; empty: all of them fit
   std::optional<RawLayout> raw;
-  VolumeLook volume;
+  VolumeLook volume;     // its colour map also of color_by
+  std::string color_by;  // the numbers that points and meshes are coloured by; empty: none
+  std::optional<std::array<double, 2>> range;  // of those; the first less than the second
   MoleculeStyle style = MoleculeStyle::kBalls;
   OtherFiles other_files = OtherFiles::kBelow;  // the files that they name
   bool sequence = false;                        // the files one after another, at `fps`

@@ -25,9 +25,22 @@ const Choices<SampleType> kTypes = {{"u8", SampleType::kU8},   {"i8", SampleType
                                     {"u32", SampleType::kU32}, {"i32", SampleType::kI32},
                                     {"f32", SampleType::kF32}, {"f64", SampleType::kF64}};
 
+// Two numbers, the first less than the second.
+std::array<double, 2> ReadRange(absl::string_view option, const std::string& text) {
+  const std::pair<std::string, std::string> ends = absl::StrSplit(text, absl::MaxSplits(':', 1));
+  std::array<double, 2> range;
+  if (!absl::SimpleAtod(ends.first, &range[0]) || !absl::SimpleAtod(ends.second, &range[1]) ||
+      !(range[0] < range[1]) || !std::isfinite(range[1] - range[0])) {
+    throw UsageError{absl::StrCat(option, " is ", EscapeForTerminal(text),
+                                  "; LOW:HIGH is expected, such as -160:240")};
+  }
+  return range;
+}
+
 }  // namespace
 
 void PlayArguments::Add(CLI::App* c) {
+  command_ = c;
   c->add_option("FILE", options_.files,
                 "Files; several share one space, as parts of one thing (meshes beside a --globe "
                 "come inside it)")
@@ -73,8 +86,17 @@ void PlayArguments::Add(CLI::App* c) {
       ->type_name("balls|space")
       ->capture_default_str();
   c->add_option("--colormap", options_.volume.colormap,
-                "Of volumes: colours by a map's name, such as viridis (default: grey)")
+                "Of volumes and with --color-by: colours by a map's name, such as viridis (default "
+                "of volumes: grey)")
       ->type_name("NAME");
+  c->add_option("--color-by", options_.color_by,
+                "Of points, meshes and molecules: colours by a column or attribute of the file, or "
+                "by x, y or z. --colormap says which (default: viridis)")
+      ->type_name("NAME");
+  c->add_option("--range", range_,
+                "With --color-by: the numbers that have the first and the last colour (default: "
+                "the least and the greatest)")
+      ->type_name("LOW:HIGH");
   c->add_option("--window", window_,
                 "Of volumes: the numbers that are dark and as bright as can be (default: the "
                 "file's, else found from the samples)")
@@ -110,16 +132,10 @@ void PlayArguments::ReadAnimation() {
 }
 
 void PlayArguments::ReadVolume() {
-  if (!window_.empty()) {
-    const std::pair<std::string, std::string> ends =
-        absl::StrSplit(window_, absl::MaxSplits(':', 1));
-    std::array<double, 2> window;
-    if (!absl::SimpleAtod(ends.first, &window[0]) || !absl::SimpleAtod(ends.second, &window[1]) ||
-        !(window[0] < window[1]) || !std::isfinite(window[1] - window[0])) {
-      throw UsageError{absl::StrCat("--window is ", EscapeForTerminal(window_),
-                                    "; LOW:HIGH is expected, such as -160:240")};
-    }
-    options_.volume.window = window;
+  if (!window_.empty()) options_.volume.window = ReadRange("--window", window_);
+  if (!range_.empty()) {
+    options_.range = ReadRange("--range", range_);
+    if (options_.color_by.empty()) throw UsageError{"--range is of --color-by, which is missing"};
   }
   if (!std::isnan(level_)) {
     if (options_.volume.window) throw UsageError{"--window and --level do not go together"};
@@ -149,6 +165,10 @@ PlayOptions PlayArguments::Read(const std::vector<std::string>& plain) {
   options_.files.insert(options_.files.end(), plain.begin(), plain.end());
   ReadAnimation();
   if (options_.files.empty()) throw UsageError{"play wants at least one FILE"};
+  for (const char* name :
+       {"--globe", "--style", "--fill", "--colormap", "--window", "--level", "--size"}) {
+    if (command_->count(name) > 0) options_.given.push_back(name);
+  }
   options_.up = Choose("--up", up_, kUps);
   options_.fill = Choose("--fill", fill_, kFills);
   options_.style = Choose("--style", style_, kStyles);

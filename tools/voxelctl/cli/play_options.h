@@ -27,9 +27,10 @@ class PlayArguments {
 
   PlayOptions options_;
   std::string up_ = "auto", fill_ = "surface", style_ = "balls", other_files_ = "below";
-  std::string size_, type_, window_;
+  std::string size_, type_, range_, window_;
   std::vector<std::string> animate_;  // with nothing, or a number, or what is a file
   CLI::Option* animate_option_ = nullptr;
+  CLI::App* command_ = nullptr;
   bool big_endian_ = false;
   double duration_ = std::nan(""), level_ = std::nan("");
 };

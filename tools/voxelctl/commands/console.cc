@@ -1,6 +1,7 @@
 #include "tools/voxelctl/commands/console.h"
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
@@ -17,6 +18,14 @@ bool Console::Data(absl::string_view text) {
 void Console::Say(absl::string_view text) {
   EndProgress();
   err_ << EscapeLines(text) << std::endl;
+}
+
+void Console::Swatches(const std::vector<std::array<uint8_t, 3>>& colors) {
+  if (!live_ || std::getenv("NO_COLOR") != nullptr) return;
+  EndProgress();
+  for (const auto& [red, green, blue] : colors)
+    err_ << absl::StrFormat("\x1b[48;2;%d;%d;%dm ", red, green, blue);
+  err_ << "\x1b[0m" << std::endl;
 }
 
 void Console::Progress(absl::string_view text) {

@@ -1,8 +1,11 @@
 // Where the tool writes.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <ostream>
 #include <string>
+#include <vector>
 
 #include "absl/strings/string_view.h"
 
@@ -24,6 +27,9 @@ class Console {
 
   // A line of words. Ends a progress line first.
   void Say(absl::string_view text);
+
+  // A line of colours (red, green, blue), if err is a terminal.
+  void Swatches(const std::vector<std::array<uint8_t, 3>>& colors);
 
   // Draws over the progress line before; nothing unless live().
   void Progress(absl::string_view text);

@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
 #include "common/text/printable.h"
 #include "display/sync/clock.h"
 #include "tools/voxelctl/commands/choose_space.h"
@@ -19,6 +20,7 @@
 #include "tools/voxelctl/commands/play_summary.h"
 #include "tools/voxelctl/connection/scene_session.h"
 #include "tools/voxelctl/import/frames.h"
+#include "tools/voxelctl/scene/color_by.h"
 #include "tools/voxelctl/scene/look.h"
 #include "tools/voxelctl/scene/pack.h"
 #include "tools/voxelctl/scene/placement.h"
@@ -36,6 +38,7 @@ constexpr sync::TimeNs kLiveLineTime = 200 * sync::kMillisecond;
 constexpr uint64_t kStagedBytes = 8 << 20;
 constexpr uint64_t kDefinitionBytes = 256;  // of a definition, beside its vertices, about
 constexpr size_t kLabelBytes = 200;
+constexpr size_t kSwatches = 32;         // of a legend
 constexpr int64_t kMeasuredFrames = 16;  // of a sequence, for its place
 
 // At most kLabelBytes of what a person calls the file; no code point is cut.
@@ -54,6 +57,7 @@ class Player {
 
   absl::Status Run(std::vector<Model> models) {
     if (absl::Status status = FindSpace(); !status.ok()) return status;
+    if (absl::Status status = Color(models); !status.ok()) return status;
     PlaceModels(models, space_, {.up = options_.up, .spin = options_.spin, .each = options_.each});
     ApplyLook(models, {.fill = options_.fill, .flat = options_.flat});
     if (absl::Status status = Open(); !status.ok()) return status;
@@ -61,6 +65,7 @@ class Player {
     // After the new scene is in: for a moment both may be up, but never neither.
     if (status.ok()) status = TakeBeforeDown();
     if (!status.ok()) return status;
+    Announce();
     return Finish(Stay());
   }
 
@@ -87,6 +92,48 @@ class Player {
   }
 
  private:
+  // Colours by an attribute, if that is wanted. The range of the first models is that of all that follow.
+  absl::Status Color(std::span<Model> models) {
+    if (options_.color_by.empty()) return absl::OkStatus();
+    ColorBy wanted{.attribute = options_.color_by,
+                   .colormap = options_.volume.colormap,
+                   .range = options_.range};
+    const std::optional<Legend>& known = summary_.legend;
+    if (known && known->low < known->high) wanted.range = {known->low, known->high};
+    const absl::StatusOr<Legend> legend = ApplyColorBy(wanted, models);
+    if (!legend.ok()) return legend.status();
+    if (!summary_.legend) summary_.legend = *legend;
+    return absl::OkStatus();
+  }
+
+  // Waits for the displays and tells on which of them the files are up, what their colours mean and what of them is not shown.
+  void Announce() {
+    const bool moving = options_.spin || summary_.frames > 0;
+    const absl::Status settled = session_->WaitSettled(moving ? kLastOutcomeTime : kOutcomeTime);
+    up_since_ = clock_.Now();
+    std::vector<std::string> displays;
+    for (const auto& [name, counts] : session_->client().GetTally().displays) {
+      if (counts.presented + counts.unchanged > 0) displays.push_back(EscapeForTerminal(name));
+    }
+    const std::vector<PlayedFile>& files = summary_.files;
+    const std::string label = files.empty() ? "it" : Label(files[0].path);
+    const bool many = files.size() > 1;
+    const std::string subject = many ? absl::StrCat(label, " and ", files.size() - 1, " more are")
+                                     : absl::StrCat(label, " is");
+    console_.Say(displays.empty()
+                     ? absl::StrCat(subject, " accepted, but no display has shown ",
+                                    many ? "them" : "it", " yet", settled.ok() ? "" : ": ",
+                                    settled.message())
+                     : absl::StrCat(subject, " up on ", absl::StrJoin(displays, " and ")));
+    if (summary_.legend) {
+      console_.Say(LegendText(*summary_.legend));
+      console_.Swatches(LegendColors(*summary_.legend, kSwatches));
+    }
+    for (const PlayedFile& file : files) {
+      if (!file.note.empty()) console_.Say(EscapeForTerminal(file.note));
+    }
+  }
+
   absl::Status FindSpace() {
     const absl::StatusOr<Room> room = ChooseSpace(connection_, options_.display, console_);
     if (room.ok()) space_ = room->space;
@@ -231,9 +278,8 @@ class Player {
     const PackedSizes& sizes = packed.sizes;
     std::string note = NoteOf(model);
     if (!sizes.note.empty()) {
-      const std::string more = absl::StrCat(model.path, ": ", sizes.note);
-      console_.Say(EscapeForTerminal(more));
-      note = note.empty() ? more : absl::StrCat(note, "; ", more);
+      note = note.empty() ? absl::StrCat(model.path, ": ", sizes.note)
+                          : absl::StrCat(note, "; ", sizes.note);
     }
     summary_.files.push_back({model.path, model.format, std::move(note), model.left_out,
                               packed.levels.size(), sizes.vertices, sizes.indices, sizes.samples,
@@ -241,10 +287,8 @@ class Player {
   }
 
   absl::Status ShowFrames(FrameAhead& ahead, const FramePlacement& placement, int64_t count) {
-    sync::TimeNs began = 0, next_line = 0;
+    sync::TimeNs began = 0, next_line = 0, end = sync::kNever;
     const double period_ns = 1e9 / options_.fps;
-    const sync::TimeNs end =
-        options_.duration_s ? start_ + std::llround(*options_.duration_s * 1e9) : sync::kNever;
     const auto due = [&](int64_t frame) -> sync::TimeNs {
       return began + std::llround(static_cast<double>(frame) * period_ns);
     };
@@ -268,6 +312,10 @@ class Player {
             options_.spin ? static_cast<double>(clock_.Now() - began) / 1e9 / kSecondsPerTurn : 0;
         absl::Status status = PutFrame(*std::move(model), placement, turns);
         if (!status.ok()) return status;
+        if (frame == 0) {  // the displays were waited for
+          began = clock_.Now();
+          if (options_.duration_s) end = began + std::llround(*options_.duration_s * 1e9);
+        }
         ++summary_.frames;
       } else {
         ++summary_.frames_skipped;
@@ -289,6 +337,10 @@ class Player {
   // Frames are two objects in turn: one is defined anew while the other is up.
   absl::Status PutFrame(Model model, const FramePlacement& placement, double turns) {
     const bool first = summary_.frames == 0;
+    if (first) {
+      if (absl::Status status = CheckOptions(options_, {&model, 1}); !status.ok()) return status;
+    }
+    if (absl::Status status = Color({&model, 1}); !status.ok()) return status;
     placement.Place(&model);
     ApplyLook({&model, 1}, {.fill = options_.fill, .flat = options_.flat});
     // The first frame's window is that of all, or they would flicker.
@@ -318,7 +370,9 @@ class Player {
     Describe(model, *packed);
     if (absl::Status status = TakePatternsDown(); !status.ok()) return status;
     if (absl::Status status = CommitAndWait(); !status.ok()) return status;
-    return TakeBeforeDown();
+    const absl::Status status = TakeBeforeDown();
+    if (status.ok()) Announce();
+    return status;
   }
 
   // What the frame before last had more of; an object before the pieces that it draws.
@@ -370,9 +424,9 @@ class Player {
   }
 
   sync::TimeNs End() const {
-    if (options_.duration_s) return start_ + std::llround(*options_.duration_s * 1e9);
+    if (options_.duration_s) return up_since_ + std::llround(*options_.duration_s * 1e9);
     // What is taken down at the end must have been up for someone.
-    return options_.spin || options_.clear ? sync::kNever : start_;
+    return options_.spin || options_.clear ? sync::kNever : up_since_;
   }
 
   std::string UntilWhen() const {
@@ -460,6 +514,7 @@ class Player {
   std::unique_ptr<SceneSession> session_;
   std::optional<client::Layer> layer_;
   sync::TimeNs start_ = 0;
+  sync::TimeNs up_since_ = 0;  // when the displays had been waited for
   uint64_t staged_bytes_ = 0, staged_operations_ = 0, sent_bytes_ = 0;
   std::vector<OwnedLayer> before_;                       // what an earlier command left
   std::vector<std::vector<PackedLevel>> levels_;         // of each file

@@ -1,10 +1,13 @@
 #include "tools/voxelctl/commands/play_files.h"
 
 #include <algorithm>
+#include <functional>
 #include <string>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "absl/strings/string_view.h"
 #include "common/text/printable.h"
 #include "tools/voxelctl/import/import_program.h"
 #include "tools/voxelctl/import/importer.h"
@@ -16,6 +19,7 @@ ImportOptions OptionsOf(const PlayOptions& options) {
   return {.globe = options.globe,
           .raw = options.raw,
           .style = options.style,
+          .attributes = !options.color_by.empty(),
           .other_files = options.other_files};
 }
 
@@ -32,8 +36,6 @@ absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interru
                         EscapeForTerminal(options.files[i]));
     absl::StatusOr<Model> model = ImportFile(options.files[i], OptionsOf(options), &interrupt);
     if (model.ok()) {
-      const std::string note = NoteOf(*model);
-      if (!note.empty()) console.Say(EscapeForTerminal(note));
       models.push_back(*std::move(model));
     } else {
       errors.emplace_back(model.status().message());
@@ -44,12 +46,41 @@ absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interru
       errors.emplace_back("nothing is put up unless all files can be");
     return absl::InvalidArgumentError(absl::StrJoin(errors, "\n"));
   }
-  const auto is_globe = [](const Model& model) { return model.globe; };
-  if (options.globe && std::none_of(models.begin(), models.end(), is_globe)) {
-    return absl::InvalidArgumentError(
-        "--globe is for maps (GeoJSON, TopoJSON), and none of the files is one");
-  }
+  if (absl::Status status = CheckOptions(options, models); !status.ok()) return status;
   return models;
+}
+
+absl::Status CheckOptions(const PlayOptions& options, std::span<const Model> models) {
+  const auto any = [&models](const std::function<bool(const Model&)>& is) {
+    return std::any_of(models.begin(), models.end(), is);
+  };
+  const bool volume = any([](const Model& model) { return !model.volumes.empty(); });
+  const struct {
+    absl::string_view option;
+    bool applies;
+    absl::string_view what;
+  } wants[] = {
+      {"--globe", any([](const Model& model) { return model.globe; }), "maps (GeoJSON, TopoJSON)"},
+      {"--style", any([](const Model& model) { return model.molecule; }), "molecules (PDB)"},
+      {"--fill", any([](const Model& model) {
+         return std::any_of(model.parts.begin(), model.parts.end(),
+                            [](const Part& part) { return part.kind == Kind::kTriangles; });
+       }),
+       "meshes"},
+      {"--colormap", volume || !options.color_by.empty(), "volumes and --color-by"},
+      {"--window", volume, "volumes"},
+      {"--level", volume, "volumes"},
+      {"--size", any([](const Model& model) { return ExtensionOf(model.path) == "raw"; }),
+       ".raw files"},
+  };
+  for (const auto& [option, applies, what] : wants) {
+    const bool given =
+        std::find(options.given.begin(), options.given.end(), option) != options.given.end();
+    if (!given || applies) continue;
+    return absl::InvalidArgumentError(
+        absl::StrCat(option, " is for ", what, ", and none of the files is one"));
+  }
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenFrameSource(const PlayOptions& options,

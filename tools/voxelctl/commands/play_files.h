@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -13,9 +14,12 @@
 
 namespace voxeld::voxelctl {
 
-// Of all files; what each is to have said of it is said. InvalidArgument names all files that are wrong.
+// Of all files. InvalidArgument names all files that are wrong, or an option that none of them has a use for.
 absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interrupt& interrupt,
                                              Console& console);
+
+// Returns: InvalidArgument if an option was given (PlayOptions::given) that none of the models has a use for.
+absl::Status CheckOptions(const PlayOptions& options, std::span<const Model> models);
 
 // Of a sequence or an animation. Null if all that there is stays as it is.
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenFrameSource(const PlayOptions& options,

@@ -69,10 +69,17 @@ ordered_json Json(const PlaySummary& s, const Quantiles& latency) {
                       {"message", issue.message},
                       {"applied", issue.applied}});
   }
+  const ordered_json legend = s.legend ? ordered_json{{"attribute", s.legend->attribute},
+                                                      {"colormap", s.legend->colormap},
+                                                      {"low", s.legend->low},
+                                                      {"high", s.legend->high},
+                                                      {"without", s.legend->without}}
+                                       : ordered_json(nullptr);
   return {{"layer", s.layer},
           {"owner", s.owner},
           {"entities", EntitiesOf(s)},
           {"files", files},
+          {"legend", legend},
           {"duration_ns", s.duration_ns},
           {"frames", s.frames},
           {"frames_skipped", s.frames_skipped},

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "tools/voxelctl/commands/console.h"
 #include "tools/voxelctl/connection/scene_session.h"
 #include "tools/voxelctl/import/model.h"
+#include "tools/voxelctl/scene/color_by.h"
 
 namespace voxeld::voxelctl {
 
@@ -21,6 +23,7 @@ struct PlayedFile {
 struct PlaySummary {
   std::string layer;
   uint64_t owner = 0;
+  std::optional<Legend> legend;
   std::vector<PlayedFile> files;
   int64_t duration_ns = 0;
   uint64_t frames = 0, frames_skipped = 0;  // of a spin; skipped while the displays were behind

@@ -36,7 +36,7 @@ absl::StatusOr<Model> ReadMap(const SourceFile& file, bool globe) {
                              : ReadGeoJson(file, *document, globe);
 }
 
-absl::StatusOr<Model> ReadPly(const SourceFile& file) {
+absl::StatusOr<Model> ReadPly(const SourceFile& file, bool attributes) {
   const absl::StatusOr<PlyHeader> header = ParsePlyHeader(file);
   if (!header.ok()) {
     const absl::StatusOr<PlyHeader> unchecked = ParsePlyHeader(file, PlyCounts::kUnchecked);
@@ -51,7 +51,8 @@ absl::StatusOr<Model> ReadPly(const SourceFile& file) {
     }
     return model;
   }
-  return HasPlySurfaces(*header) ? ReadPlyMesh(file, *header) : ReadPlyPoints(file, *header);
+  return HasPlySurfaces(*header) ? ReadPlyMesh(file, *header, attributes)
+                                 : ReadPlyPoints(file, *header, attributes);
 }
 
 bool IsFiniteValue(const Point3& p) {
@@ -160,12 +161,12 @@ bool IsOwnFormat(absl::string_view extension) {
 
 absl::StatusOr<Model> ReadOwnFormat(const SourceFile& file, const ImportOptions& options) {
   const std::string& extension = file.extension;
-  if (extension == "ply") return ReadPly(file);
+  if (extension == "ply") return ReadPly(file, options.attributes);
   if (extension == "stl") return ReadStlMesh(file);
   if (extension == "vox") return ReadVoxModel(file);
   if (extension == "json" || extension == "geojson" || extension == "topojson")
     return ReadMap(file, options.globe);
-  return ReadTextPoints(file);
+  return ReadTextPoints(file, options.attributes);
 }
 
 absl::StatusOr<Model> ImportFile(const std::string& path, const ImportOptions& options,

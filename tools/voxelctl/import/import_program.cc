@@ -61,6 +61,7 @@ std::vector<std::string> Words(const ImportOptions& options) {
       absl::StrCat("--style=", kStyles[static_cast<size_t>(options.style)]),
       absl::StrCat("--pixels=", options.pixels)};
   if (options.globe) words.push_back("--globe");
+  if (options.attributes) words.push_back("--attributes");
   if (options.raw) {
     const RawLayout& raw = *options.raw;
     words.push_back(absl::StrCat("--size=", raw.size[0], "x", raw.size[1], "x", raw.size[2]));

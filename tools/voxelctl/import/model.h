@@ -29,6 +29,7 @@ enum class Kind : uint8_t { kPoints, kSegments, kTriangles };
 struct Attribute {
   std::string name;           // as in the file
   std::vector<float> values;  // as many as positions; not a number where the file has none
+  bool operator==(const Attribute&) const = default;
 };
 
 // Vertices of one kind. Arrays beside `positions` are empty or as long as it.
@@ -82,6 +83,7 @@ struct Model {
   std::vector<LeftOut> left_out;  // one of each kind, none with a count of 0
   Up up = Up::kZ;                 // the format's own; never kAuto
   bool globe = false;             // on the unit sphere about the origin, upright already
+  bool molecule = false;          // atoms and bonds
   bool lit_already = false;  // its colours carry their light (scans): no shading is baked into them
   std::vector<Part> parts;
   std::vector<SampledVolume> volumes;

@@ -113,6 +113,7 @@ bool WriteModel(const absl::StatusOr<Model>& model, int descriptor) {
   }
   writer.Bytes(&model->up, sizeof(model->up));
   writer.Bytes(&model->globe, sizeof(model->globe));
+  writer.Bytes(&model->molecule, sizeof(model->molecule));
   writer.Bytes(&model->lit_already, sizeof(model->lit_already));
   writer.Bytes(&parts, sizeof(parts));
   for (const Part& part : model->parts) {
@@ -175,7 +176,7 @@ absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_
   }
   Model model;
   uint64_t parts = 0, volumes = 0;
-  uint8_t up = 0, globe = 0, lit_already = 0;
+  uint8_t up = 0, globe = 0, molecule = 0, lit_already = 0;
   reader.All(&model.path);
   reader.All(&model.format);
   reader.All(&model.note);
@@ -189,10 +190,12 @@ absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_
   }
   reader.Bytes(&up, 1);
   reader.Bytes(&globe, 1);
+  reader.Bytes(&molecule, 1);
   reader.Bytes(&lit_already, 1);
   if (up > static_cast<uint8_t>(Up::kZ)) return Spoilt(file, "gave up halfway");
   model.up = static_cast<Up>(up);
   model.globe = globe != 0;
+  model.molecule = molecule != 0;
   model.lit_already = lit_already != 0;
   reader.Bytes(&parts, sizeof(parts));
   for (uint64_t i = 0; i < parts && reader.ok(); ++i) {

@@ -252,13 +252,33 @@ absl::StatusOr<Part> Surface(const SourceFile& file, const PlyVertices& vertices
   return std::move(surface).Finish();
 }
 
+// Gives each corner of the triangles a vertex of its own, with the attributes of the vertex that it is in the file.
+void AddAttributes(const PlyVertices& vertices, const PlyTriangles& triangles, Part* part) {
+  if (vertices.attributes.empty()) return;
+  Part apart;
+  apart.kind = part->kind;
+  for (uint32_t c = 0; c < part->indices.size(); ++c) {
+    const uint32_t v = part->indices[c];
+    apart.positions.push_back(part->positions[v]);
+    if (!part->normals.empty()) apart.normals.push_back(part->normals[v]);
+    if (!part->colors.empty()) apart.colors.push_back(part->colors[v]);
+    apart.indices.push_back(c);
+  }
+  for (const Attribute& attribute : vertices.attributes) {
+    Attribute& own = apart.attributes.emplace_back(Attribute{attribute.name, {}});
+    for (const uint32_t v : triangles.vertices) own.values.push_back(attribute.values[v]);
+  }
+  *part = std::move(apart);
+}
+
 }  // namespace
 
 bool HasPlySurfaces(const PlyHeader& header) {
   return header.Find("face") != nullptr || header.Find("tristrips") != nullptr;
 }
 
-absl::StatusOr<Model> ReadPlyMesh(const SourceFile& file, const PlyHeader& header) {
+absl::StatusOr<Model> ReadPlyMesh(const SourceFile& file, const PlyHeader& header,
+                                  bool attributes) {
   const PlyElement* const vertex = header.Find("vertex");
   PlyValues values(file, header);
   absl::StatusOr<PlyVertices> vertices = PlyVertices();
@@ -266,7 +286,7 @@ absl::StatusOr<Model> ReadPlyMesh(const SourceFile& file, const PlyHeader& heade
   for (const PlyElement& element : header.elements) {
     absl::Status status;
     if (&element == vertex) {
-      vertices = ReadPlyVertices(file, element, &values);
+      vertices = ReadPlyVertices(file, element, attributes, &values);
       status = vertices.status();
     } else if (&element == header.Find("face")) {
       faces = ReadFaces(file, element, vertex->count, false, &values);
@@ -291,8 +311,10 @@ absl::StatusOr<Model> ReadPlyMesh(const SourceFile& file, const PlyHeader& heade
     if (triangles->vertices.empty()) continue;
     absl::StatusOr<Part> part = Surface(file, *vertices, *triangles);
     if (!part.ok()) return part.status();
+    AddAttributes(*vertices, *triangles, &*part);
     model.parts.push_back(*std::move(part));
   }
+  AddLeftOut("other properties of vertices", vertices->others, &model);
   if (model.parts.empty()) {
     return FileError(file, "its faces are no triangle", "a face has at least three vertices");
   }

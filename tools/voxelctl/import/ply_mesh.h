@@ -15,6 +15,7 @@ bool HasPlySurfaces(const PlyHeader& header);
 // Polygons become triangles (triangulate.h); a strip's −1 begins a new one. Normals are the file's, or the mean of the faces around
 // a vertex that lie within 50 degrees of each other. A face's color goes before its vertices'.
 // Returns: InvalidArgument with the face or the vertex that is wrong.
-absl::StatusOr<Model> ReadPlyMesh(const SourceFile& file, const PlyHeader& header);
+absl::StatusOr<Model> ReadPlyMesh(const SourceFile& file, const PlyHeader& header,
+                                  bool attributes = false);
 
 }  // namespace voxeld::voxelctl

@@ -9,14 +9,15 @@
 
 namespace voxeld::voxelctl {
 
-absl::StatusOr<Model> ReadPlyPoints(const SourceFile& file, const PlyHeader& header) {
+absl::StatusOr<Model> ReadPlyPoints(const SourceFile& file, const PlyHeader& header,
+                                    bool attributes) {
   PlyValues values(file, header);
   const PlyElement* vertex = header.Find("vertex");
   for (const PlyElement& element : header.elements) {
     if (&element == vertex) break;
     if (absl::Status status = SkipPlyElement(file, element, &values); !status.ok()) return status;
   }
-  absl::StatusOr<PlyVertices> vertices = ReadPlyVertices(file, *vertex, &values);
+  absl::StatusOr<PlyVertices> vertices = ReadPlyVertices(file, *vertex, attributes, &values);
   if (!vertices.ok()) return vertices.status();
 
   // Scanners write NaN for what they have not seen.
@@ -34,6 +35,7 @@ absl::StatusOr<Model> ReadPlyPoints(const SourceFile& file, const PlyHeader& hea
     vertices->positions[kept] = p;
     if (!vertices->normals.empty()) vertices->normals[kept] = vertices->normals[i];
     if (!vertices->colors.empty()) vertices->colors[kept] = vertices->colors[i];
+    for (Attribute& attribute : vertices->attributes) attribute.values[kept] = attribute.values[i];
     ++kept;
   }
   if (kept == 0) {
@@ -43,11 +45,14 @@ absl::StatusOr<Model> ReadPlyPoints(const SourceFile& file, const PlyHeader& hea
   vertices->positions.resize(kept);
   if (!vertices->normals.empty()) vertices->normals.resize(kept);
   if (!vertices->colors.empty()) vertices->colors.resize(kept);
+  for (Attribute& attribute : vertices->attributes) attribute.values.resize(kept);
   Model model;
   AddLeftOut("points that are not a number", count - kept, &model);
+  AddLeftOut("other properties of vertices", vertices->others, &model);
   part.positions = std::move(vertices->positions);
   part.normals = std::move(vertices->normals);
   part.colors = std::move(vertices->colors);
+  part.attributes = std::move(vertices->attributes);
   model.path = file.path;
   model.format = "PLY points";
   model.up = Up::kZ;

@@ -180,7 +180,7 @@ Rgb PlyColorProperties::ColorOf(const double (&channels)[3], bool to_255) const 
 }
 
 absl::StatusOr<PlyVertices> ReadPlyVertices(const SourceFile& file, const PlyElement& vertex,
-                                            PlyValues* values) {
+                                            bool attributes, PlyValues* values) {
   const PlyColorProperties colors(vertex);
   const size_t count = vertex.properties.size();
   std::vector<int> coordinates(count, -1);
@@ -195,6 +195,22 @@ absl::StatusOr<PlyVertices> ReadPlyVertices(const SourceFile& file, const PlyEle
   const bool normals = has[3] && has[4] && has[5];
 
   PlyVertices out;
+  std::vector<size_t> numbers;  // the properties that are attributes
+  for (size_t p = 0; p < count; ++p) {
+    const PlyProperty& property = vertex.properties[p];
+    // A lone channel or half a normal is a number like any other.
+    if ((colors.found() && colors.ChannelOf(p) >= 0) ||
+        (coordinates[p] >= 0 && (coordinates[p] < 3 || normals))) {
+      continue;
+    }
+    if (property.is_list || !attributes) {
+      ++out.others;
+      continue;
+    }
+    numbers.push_back(p);
+    out.attributes.push_back({property.name, {}});
+    out.attributes.back().values.reserve(vertex.count);
+  }
   std::vector<float> floating;  // colors until their range is known
   out.positions.reserve(vertex.count);
   if (normals) out.normals.reserve(vertex.count);
@@ -204,11 +220,13 @@ absl::StatusOr<PlyVertices> ReadPlyVertices(const SourceFile& file, const PlyEle
   bool to_255 = false;
   for (uint64_t i = 0; i < vertex.count; ++i) {
     double at[6] = {}, color[3] = {};
-    for (size_t p = 0; p < count; ++p) {
+    for (size_t p = 0, number = 0; p < count; ++p) {
       double value = 0;
       if (!ReadProperty(vertex.properties[p], values, &value))
         return CutOff(file, "vertex", i, vertex.count);
       if (coordinates[p] >= 0) at[coordinates[p]] = value;
+      if (number < numbers.size() && numbers[number] == p)
+        out.attributes[number++].values.push_back(static_cast<float>(value));
       if (const int channel = colors.ChannelOf(p); channel >= 0) color[channel] = value;
     }
     out.positions.push_back({at[0], at[1], at[2]});

@@ -54,15 +54,17 @@ class PlyColorProperties {
 };
 
 struct PlyVertices {
-  std::vector<Point3> positions;  // not all finite
-  std::vector<Point3> normals;    // of unit length, or zero; or none
-  std::vector<Rgb> colors;        // or none
+  std::vector<Point3> positions;      // not all finite
+  std::vector<Point3> normals;        // of unit length, or zero; or none
+  std::vector<Rgb> colors;            // or none
+  std::vector<Attribute> attributes;  // the other properties that are no lists, if they are wanted
+  uint64_t others = 0;                // properties that are not there
 };
 
 // Reads the entries of "vertex": x, y, z; nx, ny, nz; red, green, blue (also r, g, b and diffuse_…) of any type.
 // Returns: InvalidArgument with the number of the vertex that is cut off or no number.
 absl::StatusOr<PlyVertices> ReadPlyVertices(const SourceFile& file, const PlyElement& vertex,
-                                            PlyValues* values);
+                                            bool attributes, PlyValues* values);
 
 // Passes over the entries of an element. Returns: InvalidArgument with the entry that is cut off.
 absl::Status SkipPlyElement(const SourceFile& file, const PlyElement& element, PlyValues* values);

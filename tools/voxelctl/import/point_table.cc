@@ -92,7 +92,12 @@ void PointTable::Reserve(uint64_t count) {
   part_.positions.reserve(std::min(count, kMaxModelVertices));
 }
 
-absl::Status PointTable::Add(const SourceFile& file, const PointRow& row, absl::string_view what) {
+void PointTable::SetAttributes(std::vector<std::string> names) {
+  for (std::string& name : names) part_.attributes.push_back({std::move(name), {}});
+}
+
+absl::Status PointTable::Add(const SourceFile& file, const PointRow& row, absl::string_view what,
+                             std::span<const double> attributes) {
   const Point3 at{Of(row, PointColumn::kX), Of(row, PointColumn::kY), Of(row, PointColumn::kZ)};
   if (!std::isfinite(at.x) || !std::isfinite(at.y) || !std::isfinite(at.z)) {
     return FileError(file, absl::StrCat(what, " is (", at.x, ", ", at.y, ", ", at.z, ")"),
@@ -103,6 +108,8 @@ absl::Status PointTable::Add(const SourceFile& file, const PointRow& row, absl::
                      "take a part of it");
   }
   part_.positions.push_back(at);
+  for (size_t i = 0; i < part_.attributes.size(); ++i)
+    part_.attributes[i].values.push_back(static_cast<float>(attributes[i]));
   if (Has(PointColumn::kNormalX) && Has(PointColumn::kNormalY) && Has(PointColumn::kNormalZ)) {
     part_.normals.push_back(
         UnitOrZero({Of(row, PointColumn::kNormalX), Of(row, PointColumn::kNormalY),

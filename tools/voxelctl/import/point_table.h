@@ -6,7 +6,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -51,9 +53,12 @@ class PointTable {
                                          double full_scale);
 
   void Reserve(uint64_t count);
+  // Names the further numbers that Add gets of each point. Call it before the first Add.
+  void SetAttributes(std::vector<std::string> names);
   // InvalidArgument: a coordinate is not finite, or there are more than kMaxModelVertices; `what` names
-  // the row, as in "point 3" or "line 17".
-  absl::Status Add(const SourceFile& file, const PointRow& row, absl::string_view what);
+  // the row, as in "point 3" or "line 17". `attributes`: one of each name.
+  absl::Status Add(const SourceFile& file, const PointRow& row, absl::string_view what,
+                   std::span<const double> attributes = {});
   size_t size() const { return part_.positions.size(); }
 
   Model Finish(const SourceFile& file, std::string format) &&;

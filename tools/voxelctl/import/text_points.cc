@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -21,7 +22,12 @@
 namespace voxeld::voxelctl {
 namespace {
 
-using Columns = std::vector<std::optional<PointColumn>>;
+struct Column {
+  std::optional<PointColumn> known;
+  std::string name;  // as in the file; empty: it has none
+  bool operator==(const Column&) const = default;
+};
+using Columns = std::vector<Column>;
 constexpr size_t kMostColumns = 256;
 
 // Lines without their ends, comments and blanks around. A comment begins with "#" or "//".
@@ -168,12 +174,14 @@ Ranges RangesOf(absl::string_view text, char mark, size_t columns) {
 
 Columns ByCount(size_t count, const Ranges& ranges) {
   using C = PointColumn;
-  const Columns xyz = {C::kX, C::kY, C::kZ}, color = {C::kRed, C::kGreen, C::kBlue},
-                normal = {C::kNormalX, C::kNormalY, C::kNormalZ};
-  const auto with = [&xyz](const Columns& more, const Columns& and_more = {}) {
-    Columns all = xyz;
-    all.insert(all.end(), more.begin(), more.end());
-    all.insert(all.end(), and_more.begin(), and_more.end());
+  using Known = std::vector<C>;
+  const Known color = {C::kRed, C::kGreen, C::kBlue},
+              normal = {C::kNormalX, C::kNormalY, C::kNormalZ};
+  const auto with = [count](const Known& more, const Known& and_more = {}) {
+    Columns all = {{C::kX, ""}, {C::kY, ""}, {C::kZ, ""}};
+    for (const C column : more) all.push_back({column, ""});
+    for (const C column : and_more) all.push_back({column, ""});
+    all.resize(std::max(all.size(), count));
     return all;
   };
   const double least = *std::min_element(ranges.least, ranges.least + 3),
@@ -189,7 +197,7 @@ Columns ByCount(size_t count, const Ranges& ranges) {
     case 9:
       return with(color, normal);
     default:
-      return count > 7 ? with(color) : xyz;
+      return with(count > 7 ? color : Known());
   }
 }
 
@@ -200,19 +208,23 @@ double FullScale(absl::string_view text, char mark, const Columns& columns) {
   while (lines.Next(&line)) {
     const auto words = WordsOf(line, mark, columns.size());
     for (size_t c = 0; c < std::min(words.size(), columns.size()); ++c) {
-      const bool color = columns[c].has_value() && IsColor(*columns[c]);
+      const bool color = columns[c].known.has_value() && IsColor(*columns[c].known);
       if (color) greatest = std::max(greatest, Number(words[c]).value_or(0));
     }
   }
   return FullScaleOf(greatest);
 }
 
+bool Has(const Columns& columns, PointColumn column) {
+  return std::ranges::find(columns, column, &Column::known) != columns.end();
+}
+
 Columns ByNames(const Words& words) {
   Columns columns;
   for (const absl::string_view word : words) {
     const auto column = PointColumnOf(word);
-    const bool twice = column.has_value() && std::ranges::find(columns, column) != columns.end();
-    columns.push_back(twice ? std::nullopt : column);
+    const bool twice = column.has_value() && Has(columns, *column);
+    columns.push_back({twice ? std::nullopt : column, std::string(word)});
   }
   return columns;
 }
@@ -222,11 +234,8 @@ Columns ByNames(const Words& words) {
 Columns ByComment(absl::string_view comment, char mark, size_t count) {
   for (const char at : {mark, ' '}) {
     Columns columns = ByNames(SplitAt(comment, at));
-    const auto names = [&columns](PointColumn column) {
-      return std::ranges::find(columns, column) != columns.end();
-    };
-    if (columns.size() == count && names(PointColumn::kX) && names(PointColumn::kY) &&
-        names(PointColumn::kZ)) {
+    if (columns.size() == count && Has(columns, PointColumn::kX) && Has(columns, PointColumn::kY) &&
+        Has(columns, PointColumn::kZ)) {
       return columns;
     }
   }
@@ -278,25 +287,38 @@ absl::StatusOr<Columns> ReadHead(const SourceFile& file, char mark, Lines* lines
 
 }  // namespace
 
-absl::StatusOr<Model> ReadTextPoints(const SourceFile& file) {
+absl::StatusOr<Model> ReadTextPoints(const SourceFile& file, bool attributes) {
   const char mark = MarkOf(file.bytes);
   Lines lines(file.bytes);
   absl::string_view line;
   const absl::StatusOr<Columns> columns = ReadHead(file, mark, &lines, &line);
   if (!columns.ok()) return columns.status();
   std::array<bool, kPointColumns> has = {};
-  for (const auto& column : *columns) {
-    if (column.has_value()) has[static_cast<size_t>(*column)] = true;
+  std::vector<size_t> numbers;  // the columns that are attributes
+  std::vector<std::string> names;
+  uint64_t others = 0;
+  for (size_t c = 0; c < columns->size(); ++c) {
+    const Column& column = (*columns)[c];
+    if (column.known.has_value()) has[static_cast<size_t>(*column.known)] = true;
+    if (!column.known.has_value()) ++others;
+    if (column.known.has_value() && *column.known != PointColumn::kIntensity) continue;
+    numbers.push_back(c);
+    names.push_back(!column.name.empty()       ? column.name
+                    : column.known.has_value() ? "intensity"
+                                               : absl::StrCat("column ", c + 1));
   }
+  if (!attributes) numbers.clear();
   absl::StatusOr<PointTable> table =
       PointTable::Make(file, has, FullScale(file.bytes, mark, *columns));
   if (!table.ok()) return table.status();
+  if (attributes) table->SetAttributes(std::move(names));
+  std::vector<double> values(numbers.size());
   bool has_points = false, has_commas = false;  // decimal points and decimal commas
   do {
     const auto words = WordsOf(line, mark, columns->size());
     PointRow row = {};
     for (size_t c = 0; c < columns->size(); ++c) {
-      if (!(*columns)[c].has_value()) continue;
+      if (!(*columns)[c].known.has_value()) continue;
       const std::optional<double> value = c < words.size() ? Number(words[c]) : std::nullopt;
       if (!value.has_value()) {
         return FileError(
@@ -317,14 +339,21 @@ absl::StatusOr<Model> ReadTextPoints(const SourceFile& file) {
                                       c + 1, ", but the file has both decimal points and commas"),
                          "one of the two is expected");
       }
-      row[static_cast<size_t>(*(*columns)[c])] = *value;
+      row[static_cast<size_t>(*(*columns)[c].known)] = *value;
     }
-    if (absl::Status status = table->Add(file, row, absl::StrCat("line ", lines.number()));
+    for (size_t i = 0; i < numbers.size(); ++i) {
+      const size_t c = numbers[i];
+      values[i] = c < words.size() ? Number(words[c]).value_or(std::nan("")) : std::nan("");
+    }
+    if (absl::Status status = table->Add(file, row, absl::StrCat("line ", lines.number()), values);
         !status.ok()) {
       return status;
     }
   } while (lines.Next(&line));
-  return std::move(*table).Finish(file, file.extension == "csv" ? "CSV points" : "XYZ points");
+  Model model =
+      std::move(*table).Finish(file, file.extension == "csv" ? "CSV points" : "XYZ points");
+  if (!attributes) AddLeftOut("other columns", others, &model);
+  return model;
 }
 
 }  // namespace voxeld::voxelctl

@@ -13,6 +13,6 @@ namespace voxeld::voxelctl {
 // beyond −1 to 1 and one is negative), x y z intensity r g b, or x y z r g b nx ny nz. Colours go to 255, or, where none of them is
 // greater than 1, to 1.
 // InvalidArgument with the line's number.
-absl::StatusOr<Model> ReadTextPoints(const SourceFile& file);
+absl::StatusOr<Model> ReadTextPoints(const SourceFile& file, bool attributes = false);
 
 }  // namespace voxeld::voxelctl

@@ -92,9 +92,13 @@ void ApplyLook(std::span<Model> models, const LookOptions& options) {
     for (const Part& part : models[m].parts)
       seen[static_cast<size_t>(part.kind)] = number[static_cast<size_t>(part.kind)] + 1;
     for (Part& part : models[m].parts) {
-      if (part.colors.empty())
-        part.colors.assign(part.positions.size(),
-                           DefaultColor(part.kind, number[static_cast<size_t>(part.kind)]));
+      if (part.colors.empty()) {
+        // A picture has its own colours, which these are multiplied by.
+        const Rgb plain = part.picture == kNoPicture
+                              ? DefaultColor(part.kind, number[static_cast<size_t>(part.kind)])
+                              : Rgb{255, 255, 255};
+        part.colors.assign(part.positions.size(), plain);
+      }
       const bool shaded = !options.flat && !models[m].lit_already && !part.normals.empty();
       for (size_t v = 0; v < part.colors.size(); ++v) {
         Rgb color = Lift(part.colors[v]);

@@ -6,14 +6,20 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/pictures/picture.h"
+#include "tools/voxelctl/scene/paint.h"
 
 namespace voxeld::voxelctl {
 namespace {
 
 constexpr uint64_t kPieceBytes = 512 << 10;
-constexpr uint64_t kInstanceBytes = 32;  // of a part that draws another object, about
+constexpr uint64_t kInstanceBytes = 32;              // of a part that draws another object, about
+constexpr uint64_t kPlaceBytes = 2 * sizeof(float);  // of a vertex on a picture
 constexpr uint64_t kVertexBytes = 3 * sizeof(float) + 3;
-constexpr uint32_t kU16Vertices = 65536;  // of which 16-bit indices can speak
+constexpr uint32_t kMostPictureSide = 4096;        // that every server takes
+constexpr uint64_t kMostTexturedBytes = 16 << 20;  // of a piece with a picture
+constexpr uint64_t kMostPictureBytes = 4 << 20;    // that is sent with each piece
+constexpr uint32_t kU16Vertices = 65536;           // of which 16-bit indices can speak
 constexpr uint32_t kNone = UINT32_MAX;
 
 // 0 means that the server did not say.
@@ -21,21 +27,32 @@ uint64_t AtMost(uint64_t wanted, uint64_t limit) {
   return limit == 0 ? wanted : std::min(wanted, limit);
 }
 
+// For the bulk of a message; 0: the server did not say.
+uint64_t MessageBytes(const client::Limits& limits) {
+  return limits.max_message_bytes > 2 * kMessageOverhead
+             ? limits.max_message_bytes - kMessageOverhead
+             : limits.max_message_bytes;
+}
+
 // Gathers elements of one kind until a piece is full.
 class Piece {
  public:
   Piece(Kind kind, const client::Limits& limits)
       : kind_(kind),
-        most_bytes_(AtMost(kPieceBytes, limits.max_message_bytes > 2 * kMessageOverhead
-                                            ? limits.max_message_bytes - kMessageOverhead
-                                            : limits.max_message_bytes)),
+        most_message_bytes_(AtMost(kMostTexturedBytes, MessageBytes(limits))),
+        most_bytes_(AtMost(kPieceBytes, most_message_bytes_)),
         most_vertices_(AtMost(kU16Vertices, limits.max_vertices_per_entity)),
         most_indices_(AtMost(UINT32_MAX, limits.max_indices_per_entity)) {}
 
   Kind kind() const { return kind_; }
-  // Of all that it holds: a piece is flushed before this changes.
-  void set_thickness(double thickness) { thickness_ = thickness; }
-  double thickness() const { return thickness_; }
+  // Of all that it holds: a piece is flushed before these change. `picture` is null, or lives as long as the piece.
+  void SetLook(double thickness, const std::string* picture) {
+    thickness_ = thickness;
+    picture_ = picture;
+  }
+  bool HasLook(double thickness, const std::string* picture) const {
+    return thickness_ == thickness && picture_ == picture;
+  }
   bool empty() const { return count_ == 0; }
   uint64_t vertices() const { return count_; }
   uint64_t indices() const { return index_count_; }
@@ -43,7 +60,11 @@ class Piece {
   // Whether an element of `corners` new vertices at most still fits.
   bool HasRoom(uint32_t corners) const {
     return count_ + corners <= most_vertices_ && index_count_ + corners <= most_indices_ &&
-           bytes() + corners * (kVertexBytes + sizeof(uint16_t)) <= most_bytes_;
+           bytes() + corners * (kVertexBytes + kPlaceBytes + sizeof(uint16_t)) <= MostBytes();
+  }
+
+  void AddPlace(const std::array<float, 2>& place) {
+    places_.insert(places_.end(), place.begin(), place.end());
   }
 
   uint32_t AddVertex(const Point3& p, const Rgb& c) {
@@ -59,7 +80,8 @@ class Piece {
   }
 
   uint64_t bytes() const {
-    return positions_.size() * sizeof(float) + colors_.size() + indices_.size() * sizeof(uint16_t);
+    return positions_.size() * sizeof(float) + colors_.size() + indices_.size() * sizeof(uint16_t) +
+           places_.size() * sizeof(float) + (picture_ == nullptr ? 0 : picture_->size());
   }
 
   // The piece as a shape; leaves this one empty.
@@ -77,10 +99,19 @@ class Piece {
       case Kind::kTriangles:
         break;
     }
-    return client::Mesh{.vertices = std::move(vertices)};
+    client::Mesh mesh{.vertices = std::move(vertices)};
+    if (picture_ != nullptr) {
+      mesh.texture =
+          client::Texture{.picture = std::vector<uint8_t>(picture_->begin(), picture_->end()),
+                          .coordinates = std::exchange(places_, {})};
+    }
+    return mesh;
   }
 
  private:
+  // A picture is sent with each piece, so there should be few of them.
+  uint64_t MostBytes() const { return picture_ == nullptr ? most_bytes_ : most_message_bytes_; }
+
   client::Thickness ToThickness() const {
     if (thickness_ == 0) return {};
     return {static_cast<float>(thickness_), client::Thickness::Unit::kUnits};
@@ -88,11 +119,13 @@ class Piece {
 
   const Kind kind_;
   double thickness_ = 0;
-  const uint64_t most_bytes_, most_vertices_, most_indices_;
+  const std::string* picture_ = nullptr;
+  const uint64_t most_message_bytes_, most_bytes_, most_vertices_, most_indices_;
   uint32_t count_ = 0, index_count_ = 0;
   std::vector<float> positions_;
   std::vector<uint8_t> colors_;
   std::vector<uint16_t> indices_;
+  std::vector<float> places_;  // on the picture
 };
 
 class Packer {
@@ -100,13 +133,14 @@ class Packer {
   Packer(const std::string& object, const client::Limits& limits, const ObjectSink& sink)
       : object_(object), limits_(limits), sink_(sink) {}
 
-  absl::Status Add(const Part& part, Piece* piece) {
+  // `picture` is that of the part, or null.
+  absl::Status Add(const Part& part, const std::string* picture, Piece* piece) {
     const size_t corners = part.kind == Kind::kPoints ? 1 : part.kind == Kind::kSegments ? 2 : 3;
     const size_t elements =
         part.kind == Kind::kPoints ? part.positions.size() : part.indices.size() / corners;
-    if (part.thickness != piece->thickness()) {
+    if (!piece->HasLook(part.thickness, picture)) {
       if (absl::Status status = Flush(piece); !status.ok()) return status;
-      piece->set_thickness(part.thickness);
+      piece->SetLook(part.thickness, picture);
     }
     std::vector<uint32_t> in_piece(part.positions.size(), kNone);
     std::vector<uint32_t> used;
@@ -122,6 +156,7 @@ class Packer {
             corners == 1 ? static_cast<uint32_t>(e) : part.indices[e * corners + c];
         if (in_piece[vertex] == kNone) {
           in_piece[vertex] = piece->AddVertex(part.positions[vertex], part.colors[vertex]);
+          if (picture != nullptr) piece->AddPlace(part.texture_coordinates[vertex]);
           used.push_back(vertex);
         }
         if (corners > 1) piece->AddIndex(in_piece[vertex]);
@@ -137,6 +172,11 @@ class Packer {
     sizes_.samples += packed->samples;
     if (sizes_.note.empty()) sizes_.note = packed->note;
     return DefinePiece(std::move(packed->part), packed->bytes);
+  }
+
+  // Keeps the first of all notes.
+  void Note(absl::string_view note) {
+    if (sizes_.note.empty()) sizes_.note = std::string(note);
   }
 
   absl::Status Flush(Piece* piece) {
@@ -182,6 +222,15 @@ class Packer {
   PackedSizes sizes_;
 };
 
+// Whether a part goes to the server with its picture. Lines and points have none, and a message has room for some of them only.
+bool IsSentWithPicture(const Part& part, const Model& model, const client::Limits& limits) {
+  if (part.picture == kNoPicture || part.kind != Kind::kTriangles) return false;
+  const std::string& picture = model.pictures[part.picture];
+  const absl::StatusOr<pictures::PictureFile> file = pictures::PictureFile::Open(picture);
+  return file.ok() && std::max(file->size().width, file->size().height) <= kMostPictureSide &&
+         picture.size() <= AtMost(kMostPictureBytes, MessageBytes(limits) / 2);
+}
+
 }  // namespace
 
 absl::StatusOr<PackedSizes> PackObject(const Model& model, const std::string& object,
@@ -196,7 +245,17 @@ absl::StatusOr<PackedSizes> PackObject(const Model& model, const std::string& ob
     }
     for (const Part& part : model.parts) {
       if (part.kind != kind) continue;
-      const absl::Status status = packer.Add(part, &piece);
+      absl::Status status;
+      if (IsSentWithPicture(part, model, limits)) {
+        status = packer.Add(part, &model.pictures[part.picture], &piece);
+      } else if (part.picture == kNoPicture) {
+        status = packer.Add(part, nullptr, &piece);
+      } else {
+        absl::StatusOr<Part> painted = PaintVertices(part, model.pictures[part.picture]);
+        packer.Note(painted.ok() ? "a picture is shown by its colours at the vertices alone"
+                                 : painted.status().message());
+        status = packer.Add(painted.ok() ? *painted : part, nullptr, &piece);
+      }
       if (!status.ok()) return status;
     }
     const absl::Status status = packer.Flush(&piece);
@@ -216,6 +275,7 @@ absl::StatusOr<PackedLevels> PackLevels(Model* model, const std::string& object,
   for (Part& part : std::exchange(model->parts, {}))
     levels[part.level].parts.push_back(std::move(part));
   if (levels.empty()) levels[0];
+  for (auto& [level, content] : levels) content.pictures = model->pictures;
   levels.begin()->second.volumes = std::exchange(model->volumes, {});
   PackedLevels packed;
   for (const auto& [level, content] : levels) {
