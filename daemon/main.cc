@@ -45,6 +45,7 @@
 #include "daemon/services/health_watch.h"
 #include "daemon/services/server.h"
 #include "daemon/state/kept_state.h"
+#include "daemon/usage/standard_output.h"
 #include "daemon/version/version.h"
 #include "daemon/viewer/viewer.h"
 #include "display/drivers/registry.h"
@@ -467,7 +468,7 @@ int Main(int argc, char** argv) {
   if (!command_line.ok()) return Fail(kUsageError, command_line.status());
   if (!command_line->print_and_exit.empty()) {
     std::fputs(command_line->print_and_exit.c_str(), stdout);
-    return 0;
+    return usage::CheckedExit("voxeld", 0);
   }
   absl::StatusOr<Config> config = LoadConfig(command_line->config, ProcessEnvironment());
   if (!config.ok()) return Fail(1, config.status());
@@ -508,7 +509,7 @@ int Main(int argc, char** argv) {
   }
   if (command_line->check_config) {
     std::fputs(ToToml(*config).c_str(), stdout);
-    return 0;
+    return usage::CheckedExit("voxeld", 0);
   }
 
   Logger log(*level, *format);

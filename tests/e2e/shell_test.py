@@ -182,5 +182,22 @@ class Manual(unittest.TestCase):
             self.assertIn(path.stem, made.stdout)
 
 
+class StandardOutput(unittest.TestCase):
+    def test_output_that_cannot_be_written_is_an_error(self) -> None:
+        for program in (VOXELCTL, os.environ["VOXELD"]):
+            for arguments in (["--help"], ["--version"]):
+                with self.subTest(f"{program} {arguments}"), open("/dev/full", "wb") as full:
+                    made = subprocess.run([program, *arguments], stdout=full, stderr=subprocess.PIPE, text=True, check=False, timeout=LONG)
+                    self.assertEqual(made.returncode, 1)
+                    self.assertIn("standard output could not be written", made.stderr)
+
+    def test_a_reader_that_goes_away_is_no_error(self) -> None:
+        reader, writer = os.pipe()
+        os.close(reader)
+        made = subprocess.run([VOXELCTL, "--help"], stdout=writer, stderr=subprocess.PIPE, text=True, check=False, timeout=LONG)
+        os.close(writer)
+        self.assertEqual((made.returncode, made.stderr), (0, ""))
+
+
 if __name__ == "__main__":
     unittest.main()

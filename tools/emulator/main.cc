@@ -24,6 +24,7 @@
 
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
+#include "daemon/usage/standard_output.h"
 #include "daemon/usage/usage_error.h"
 #include "display/emulator/carriers/usbip.h"
 #include "display/emulator/carriers/usbredir.h"
@@ -290,7 +291,7 @@ int Main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
     std::printf("%s", app.help().c_str());
-    return 0;
+    return usage::CheckedExit("voxeld-emulator", 0);
   } catch (const CLI::ParseError& error) {
     std::fprintf(stderr, "voxeld-emulator: %s\n", usage::ExplainError(error, {&app}).c_str());
     return 2;

@@ -6,13 +6,17 @@
 namespace voxeld::lights {
 namespace {
 
-constexpr size_t kUniverseBytes = size_t{display::network::kUniversePixels} * 3;
 // Most sources of a universe that are told apart.
 constexpr size_t kMostSources = 16;
 // After so long without a sync packet pictures are shown without one (Art-Net 4, ArtSync; E1.31 §6.2.4.2's time-out).
 constexpr sync::TimeNs kSyncLife = 4 * sync::kSecond;
 
 }  // namespace
+
+int32_t UniversesOf(const IntakeOptions& options) {
+  return static_cast<int32_t>((options.lights * 3 + options.universe_channels - 1) /
+                              options.universe_channels);
+}
 
 Intake::Intake(const IntakeOptions& options)
     : options_(options), values_(options.lights * 3), picture_(options.lights * 3) {}
@@ -61,11 +65,13 @@ void Intake::AddLights(const Datagram& packet, sync::TimeNs now) {
     const bool set = Set(static_cast<int64_t>(packet.first_byte), packet.first_byte, packet.values,
                          packet.push ? More::kNo : More::kPerhaps, now + options_.gather_ns);
     ++(set ? tally_.set : tally_.outside);
+    if (set) CountUnused(packet.first_byte, packet.values.size(), packet.values.size());
     if (!set && packet.push && due_ != sync::kNever) Show();
     return;
   }
   const int64_t index = int64_t{packet.universe} - options_.first_universe;
-  if (index < 0 || static_cast<uint64_t>(index) * kUniverseBytes >= values_.size()) {
+  const size_t channels = options_.universe_channels;
+  if (index < 0 || static_cast<uint64_t>(index) * channels >= values_.size()) {
     ++tally_.outside;
     return;
   }
@@ -77,9 +83,12 @@ void Intake::AddLights(const Datagram& packet, sync::TimeNs now) {
   }
   // Where sync packets come, a picture waits for them; if they stop, for no longer than they may be apart.
   const bool told = (synchronised_ || sync_universe_ != 0) && now - sync_heard_ns_ < kSyncLife;
-  const bool set = Set(packet.universe, static_cast<size_t>(index) * kUniverseBytes,
-                       packet.values.first(std::min(packet.values.size(), kUniverseBytes)),
-                       told ? More::kTold : More::kPerhaps,
+  const size_t used = std::min(packet.values.size(), channels);
+  const auto rest = packet.values.subspan(used);
+  if (std::any_of(rest.begin(), rest.end(), [](uint8_t value) { return value != 0; }))
+    ++tally_.unused;
+  const bool set = Set(packet.universe, static_cast<size_t>(index) * channels,
+                       packet.values.first(used), told ? More::kTold : More::kPerhaps,
                        told ? sync_heard_ns_ + kSyncLife : now + options_.gather_ns);
   ++(set ? tally_.set : tally_.outside);  // not set: a packet of no values
 }
@@ -142,6 +151,17 @@ void Intake::AddMessage(const OpcReader::Message& message, sync::TimeNs now) {
   const bool set = Set(message.channel, first * 3, values, all ? More::kNo : More::kPerhaps,
                        now + options_.gather_ns);
   ++(set ? tally_.set : tally_.outside);
+  if (message.channel > 1 && options_.a_channel == 0) ++tally_.unmapped;
+  if (set) CountUnused(first * 3, message.data.size(), values.size());
+}
+
+void Intake::CountUnused(size_t first_byte, size_t count, size_t most) {
+  const size_t there = std::min(most, values_.size() - first_byte);
+  if (count > there) {
+    ++tally_.beyond;
+  } else if (count % 3 != 0) {
+    ++tally_.split;
+  }
 }
 
 bool Intake::Set(int64_t part, size_t first_byte, std::span<const uint8_t> values, More more,

@@ -2,8 +2,8 @@
 // It knows no sockets and reads no clock.
 //
 // Lights are numbered from 0. A DDP packet says from which byte on it sets them. Open Pixel Control's channel 0 is every
-// channel: a message sets the lights from the first on; channel n those from (n − 1) · a_channel on. A DMX universe sets
-// the 170 lights from (universe − first_universe) · 170 on, three values each; its last two values are no light's.
+// channel: a message sets the lights from the first on; channel n those from (n − 1) · a_channel on. DMX universes follow one
+// another: each brings the next `universe_channels` values, three a light, so that a light may lie across two of them.
 #pragma once
 
 #include <array>
@@ -26,7 +26,9 @@ struct IntakeOptions {
   Protocol protocol = Protocol::kOpc;
   size_t lights = 0;
   int32_t first_universe = 1;  // E1.31, Art-Net
-  size_t a_channel = 0;        // Open Pixel Control; 0: as many as there are
+  // Of a universe, values that are lights'; 1 to 512. 510 are 170 whole lights.
+  size_t universe_channels = 510;
+  size_t a_channel = 0;  // Open Pixel Control; 0: as many as there are
   // How long what came without a word that it is to be shown waits for the rest of its picture, which may come in more
   // packets. Part of a picture that comes a second time ends the first.
   sync::TimeNs gather_ns = 4 * sync::kMillisecond;
@@ -44,12 +46,22 @@ struct IntakeTally {
   uint64_t stale = 0;      // E1.31: behind one that came before (§6.7.2)
   uint64_t malformed = 0;
 
+  // Of messages with lights: those with values that were not used.
+  uint64_t split = 0;   // DDP, Open Pixel Control: they end within a light
+  uint64_t beyond = 0;  // there are no such lights
+  uint64_t unused = 0;  // E1.31, Art-Net: behind the universe's channels, and not 0
+  // Open Pixel Control: for a channel from 2 on, and a_channel does not say which lights it has; these are outside too.
+  uint64_t unmapped = 0;
+
   uint64_t lost = 0;        // numbers that no message had; not among them
   uint64_t bytes = 0;       // of them
   uint64_t pictures = 0;    // that were to be shown: taken, superseded, and the one that waits
   uint64_t taken = 0;       // by Take
   uint64_t superseded = 0;  // by a newer one, before it was taken
 };
+
+// How many universes the lights take.
+int32_t UniversesOf(const IntakeOptions& options);
 
 // Bound to one thread.
 class Intake {
@@ -87,6 +99,8 @@ class Intake {
   void AddLights(const Datagram& packet, sync::TimeNs now);
   // Whether the packet's source has its universe and the packet is in its order.
   bool TakesFrom(const Datagram& packet, sync::TimeNs now);
+  // Of a message that set lights from `first_byte` on and has `count` values: no more than `most` of them can be lights'.
+  void CountUnused(size_t first_byte, size_t count, size_t most);
   void CountLost(std::optional<uint8_t> sequence, int32_t of, int numbers);
   // Part `part` of a picture; false if none of it is a light's. Without `more` it is to be shown at once, else when its
   // time has come, at `until` the latest.

@@ -175,10 +175,7 @@ class Receiver::Impl {
   }
 
   void JoinGroups() {
-    const auto universes =
-        static_cast<int32_t>((lights_.lights + display::network::kUniversePixels - 1) /
-                             display::network::kUniversePixels);
-    for (int32_t i = 0; i < std::min(universes, kMostGroups); ++i) {
+    for (int32_t i = 0; i < std::min(UniversesOf(lights_), kMostGroups); ++i) {
       const auto universe = static_cast<uint32_t>(lights_.first_universe + i);
       error_code error;
       socket_.set_option(
@@ -211,10 +208,8 @@ class Receiver::Impl {
   void Answer(const udp::endpoint& to) {
     std::array<uint8_t, 4> ip{};
     if (local_.address().is_v4()) ip = local_.address().to_v4().to_bytes();
-    const auto universes =
-        static_cast<int32_t>((lights_.lights + display::network::kUniversePixels - 1) /
-                             display::network::kUniversePixels);
-    const auto reply = ArtPollReply(ip, local_.port(), lights_.first_universe, universes);
+    const auto reply =
+        ArtPollReply(ip, local_.port(), lights_.first_universe, UniversesOf(lights_));
     error_code error;
     socket_.send_to(asio::buffer(reply), to, 0, error);  // who asked will ask again
   }

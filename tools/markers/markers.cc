@@ -54,7 +54,7 @@ std::vector<float> PositionsOf(const google::protobuf::RepeatedPtrField<foxglove
   return out;
 }
 
-// One colour each, or none of them where one is for all.
+// One colour each, or none of them: then one is for all.
 std::vector<uint8_t> ColorsOf(const google::protobuf::RepeatedPtrField<foxglove::Color>& colors,
                               int points) {
   std::vector<uint8_t> out;
@@ -64,6 +64,11 @@ std::vector<uint8_t> ColorsOf(const google::protobuf::RepeatedPtrField<foxglove:
     out.insert(out.end(), {color.r, color.g, color.b});
   }
   return out;
+}
+
+// Whether there are colours that are not one of each point, which is a fault of the sender's.
+bool HasOddColors(const auto& primitive) {
+  return !primitive.colors().empty() && primitive.colors_size() != primitive.points_size();
 }
 
 client::Vertices VerticesOf(const auto& primitive) {
@@ -91,6 +96,11 @@ class Maker {
     for (const auto& triangles : entity.triangles()) Triangles(triangles);
     for (const auto& text : entity.texts()) Text(text);
     if (entity.models_size() > 0) left_out_.emplace_back("models");
+    const auto is_odd = [](const auto& primitive) { return HasOddColors(primitive); };
+    if (std::any_of(entity.lines().begin(), entity.lines().end(), is_odd) ||
+        std::any_of(entity.triangles().begin(), entity.triangles().end(), is_odd)) {
+      left_out_.emplace_back("colors that are not as many as their points");
+    }
   }
 
   Pieces Take() { return {std::move(pieces_), absl::StrJoin(left_out_, ", ")}; }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "daemon/usage/standard_output.h"
 #include "tools/ros/options.h"
 #include "tools/ros/ros_feed.h"
 #include "tools/voxelctl/cli/server_options.h"
@@ -80,11 +81,11 @@ int main(int argc, char** argv) {
         std::vector<std::string>(argv + 1, argv + argc), ros1::EnvironmentVariable);
     std::cout << parsed.out << std::flush;
     std::cerr << parsed.err;
-    if (!parsed.options) return parsed.exit_code;
+    if (!parsed.options) return usage::CheckedExit("voxeld-ros", parsed.exit_code);
     voxelctl::Interrupt interrupt(voxelctl::Interrupt::Watch::kSignals);
     voxelctl::Console console(std::cout, std::cerr, parsed.options->json,
                               ::isatty(STDERR_FILENO) == 1);
-    return ros1::Run(*parsed.options, interrupt, console);
+    return usage::CheckedExit("voxeld-ros", ros1::Run(*parsed.options, interrupt, console));
   } catch (const std::exception& error) {
     std::cerr << "voxeld-ros: " << error.what() << "\n";
     return ros1::kExitFailure;

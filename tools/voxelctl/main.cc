@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/text/printable.h"
+#include "daemon/usage/standard_output.h"
 #include "tools/voxelctl/cli/options.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/commands/console.h"
@@ -34,10 +35,11 @@ int main(int argc, char** argv) {
         ParseCommandLine(std::vector<std::string>(argv + 1, argv + argc));
     std::cout << parsed.out << std::flush;
     std::cerr << voxeld::EscapeLines(parsed.err);
-    if (!parsed.options) return parsed.exit_code;
+    if (!parsed.options) return voxeld::usage::CheckedExit("voxelctl", parsed.exit_code);
     Interrupt interrupt(Interrupt::Watch::kSignals);
     Console console(std::cout, std::cerr, parsed.options->json, ::isatty(STDERR_FILENO) == 1);
-    return Run(*parsed.options, EnvironmentVariable, interrupt, console);
+    return voxeld::usage::CheckedExit(
+        "voxelctl", Run(*parsed.options, EnvironmentVariable, interrupt, console));
   } catch (const std::exception& error) {
     std::cerr << "voxelctl: " << voxeld::EscapeLines(error.what()) << "\n";
     return kExitFailure;

@@ -332,5 +332,78 @@ TEST(Intake, AccountsForWhateverComes) {
   }
 }
 
+TEST(Intake, UniversesOf512ChannelsFollowOneAnother) {
+  // xLights' default: light 170 has its first two values in the first universe and its third in the second.
+  IntakeOptions options;
+  options.protocol = Protocol::kE131;
+  options.lights = 300;
+  options.universe_channels = 512;
+  EXPECT_EQ(UniversesOf(options), 2);
+  Intake intake(options);
+  const auto packet = [](uint8_t universe, const Bytes& values) {
+    // E1.31's layers by its table 4-1: sizes, vectors, the universe and the start code.
+    Bytes out(126 + values.size());
+    const size_t size = out.size();
+    const auto flags = [&](size_t at) {
+      out[at] = static_cast<uint8_t>(0x70 | (size - at) >> 8);
+      out[at + 1] = static_cast<uint8_t>(size - at);
+    };
+    out[1] = 0x10;
+    std::memcpy(&out[4], "ASC-E1.17\0\0", 12);
+    flags(16);
+    out[21] = 4;
+    flags(38);
+    out[43] = 2;
+    out[108] = 100;
+    out[114] = universe;
+    flags(115);
+    out[117] = 2;
+    out[118] = 0xa1;
+    out[122] = 1;
+    out[123] = static_cast<uint8_t>((values.size() + 1) >> 8);
+    out[124] = static_cast<uint8_t>(values.size() + 1);
+    std::copy(values.begin(), values.end(), out.begin() + 126);
+    return out;
+  };
+  Bytes first(512), second(388);
+  for (size_t i = 0; i < first.size(); ++i) first[i] = static_cast<uint8_t>(i % 251);
+  for (size_t i = 0; i < second.size(); ++i) second[i] = static_cast<uint8_t>((512 + i) % 251);
+  ASSERT_TRUE(intake.AddDatagram(packet(1, first), 0).ok());
+  ASSERT_TRUE(intake.AddDatagram(packet(2, second), 0).ok());
+  intake.Tick(10 * kMs);
+  const auto picture = intake.Take();
+  ASSERT_TRUE(picture.has_value());
+  for (size_t i = 0; i < 900; ++i) EXPECT_EQ((*picture)[i], i % 251) << i;
+  EXPECT_EQ(intake.tally().unused, 0u);
+  // With 170 lights a universe the last two values are told of, unless they are 0.
+  options.universe_channels = 510;
+  Intake plain(options);
+  ASSERT_TRUE(plain.AddDatagram(packet(1, first), 0).ok());
+  EXPECT_EQ(plain.tally().unused, 1u);
+  first[510] = first[511] = 0;
+  ASSERT_TRUE(plain.AddDatagram(packet(1, first), 0).ok());
+  EXPECT_EQ(plain.tally().unused, 1u);
+}
+
+TEST(Intake, OpcValuesThatAreNotUsedAreCounted) {
+  IntakeOptions options;
+  options.lights = 4;
+  Intake intake(options);
+  intake.AddMessage(Opc(0, Bytes(12, 1)), 0);
+  EXPECT_EQ(intake.tally().split + intake.tally().beyond + intake.tally().unmapped, 0u);
+  intake.AddMessage(Opc(0, Bytes(7, 1)), 0);  // two lights and a third of one
+  EXPECT_EQ(intake.tally().split, 1u);
+  intake.AddMessage(Opc(1, Bytes(15, 1)), 0);
+  EXPECT_EQ(intake.tally().beyond, 1u);
+  intake.AddMessage(Opc(2, Bytes(12, 1)), 0);
+  EXPECT_EQ(intake.tally().unmapped, 1u);
+  options.a_channel = 2;
+  Intake apart(options);
+  apart.AddMessage(Opc(2, Bytes(6, 1)), 0);
+  EXPECT_EQ(apart.tally().unmapped + apart.tally().beyond, 0u);
+  apart.AddMessage(Opc(2, Bytes(9, 1)), 0);  // a channel has two
+  EXPECT_EQ(apart.tally().beyond, 1u);
+}
+
 }  // namespace
 }  // namespace voxeld::lights

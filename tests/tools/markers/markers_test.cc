@@ -107,7 +107,7 @@ TEST(Markers, EachKindIsItsShape) {
 
   const Pieces made = PiecesOf(entity);
   ASSERT_EQ(made.pieces.size(), 6u);
-  EXPECT_EQ(made.left_out, "");
+  EXPECT_EQ(made.left_out, "colors that are not as many as their points") << "of the triangles";
   for (const Piece& piece : made.pieces) EXPECT_EQ(piece.look.lifetime.count(), 2'000'000'005);
   const auto& drawn_arrow = std::get<client::Arrow>(made.pieces[0].shape);
   EXPECT_EQ(drawn_arrow.end.x, 4);
@@ -145,6 +145,29 @@ TEST(Markers, WhatIsEmptyIsNoPieceAndModelsAreTold) {
   const Pieces made = PiecesOf(entity);
   EXPECT_THAT(made.pieces, IsEmpty());
   EXPECT_EQ(made.left_out, "models");
+}
+
+TEST(Markers, ColoursOfAWrongCountAreTold) {
+  const auto colored = [](int points, int colors) {
+    foxglove::SceneEntity entity;
+    foxglove::LinePrimitive* line = entity.add_lines();
+    for (int i = 0; i < points; ++i) line->add_points()->set_x(i);
+    for (int i = 0; i < colors; ++i) line->add_colors()->set_r(1);
+    line->mutable_color()->set_g(1);
+    line->mutable_color()->set_a(1);
+    return PiecesOf(entity);
+  };
+  for (const int colors : {1, 2, 4}) {
+    const Pieces made = colored(3, colors);
+    EXPECT_EQ(made.left_out, "colors that are not as many as their points") << colors;
+    ASSERT_EQ(made.pieces.size(), 1u);
+    const auto& segments = std::get<client::Segments>(made.pieces[0].shape);
+    EXPECT_THAT(segments.vertices.colors.view(), IsEmpty());
+    EXPECT_EQ(made.pieces[0].look.color.g, 255) << "one for all";
+    EXPECT_EQ(made.pieces[0].look.color.r, 0);
+  }
+  EXPECT_EQ(colored(3, 3).left_out, "");
+  EXPECT_EQ(colored(3, 0).left_out, "");
 }
 
 TEST(Markers, ColoursBeyondTheirRangeAreItsEnds) {

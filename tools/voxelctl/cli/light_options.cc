@@ -81,9 +81,14 @@ void InputArguments::Add(CLI::App* command) {
       ->type_name("HOST:PORT");
   lights_.Add(command);
   AddPlainNumber(command, "--universe", &universe_, 0, network::e131::kMostUniverse,
-                 "e131, artnet: the universe of the first 170 lights; without it 1 and 0", "N");
+                 "e131, artnet: the universe of the first lights; without it 1 and 0", "N");
+  AddPlainNumber(
+      command, "--universe-channels", &universe_channels_, 1, 512,
+      "e131, artnet: channels of a universe that are used; without it 510, which are 170 "
+      "whole lights; 512 for senders that fill universes, as xLights does",
+      "N");
   AddPlainNumber(command, "--per-channel", &a_channel_, 0, 21845,
-                 "opc: lights of a channel, 1's first; without it every channel has them all", "N");
+                 "opc: lights of a channel, 1's first; without it channel 1 has them all", "N");
   AddPlainNumber(
       command, "--gather", &options_.gather_ms, 0, 1000,
       "Milliseconds that parts of a picture wait for the rest, where nothing says that it is "
@@ -103,6 +108,10 @@ InputOptions InputArguments::Read() const {
   options.first_universe = universe_ >= 0                          ? Whole("--universe", universe_)
                            : options.protocol == Protocol::kArtNet ? 0
                                                                    : 1;
+  if (universe_channels_ > 0 && !universes)
+    throw UsageError{"--universe-channels is for e131 and artnet"};
+  if (universe_channels_ > 0)
+    options.universe_channels = Whole("--universe-channels", universe_channels_);
   const int32_t least = options.protocol == Protocol::kE131 ? 1 : 0;
   const int32_t most = options.protocol == Protocol::kArtNet ? network::artnet::kMostUniverse
                                                              : network::e131::kMostUniverse;

@@ -32,7 +32,7 @@ class InputArguments {
   LightArguments lights_;
   InputOptions options_;
   std::string protocol_;
-  double universe_ = -1, a_channel_ = 0;
+  double universe_ = -1, universe_channels_ = 0, a_channel_ = 0;
 };
 
 class PipeArguments {

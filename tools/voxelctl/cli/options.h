@@ -204,9 +204,10 @@ struct LightsOptions {
 struct InputOptions {
   lights::Protocol protocol = lights::Protocol::kOpc;
   LightsOptions lights;
-  std::string listen;          // HOST:PORT
-  int32_t first_universe = 1;  // E1.31, Art-Net
-  int32_t a_channel = 0;       // lights of a channel of Open Pixel Control; 0: as many as there are
+  std::string listen;               // HOST:PORT
+  int32_t first_universe = 1;       // E1.31, Art-Net
+  int32_t universe_channels = 510;  // of each that are lights'; as above
+  int32_t a_channel = 0;  // lights of a channel of Open Pixel Control; 0: as many as there are
   double gather_ms = 4;
   bool multicast = false;  // E1.31
 };

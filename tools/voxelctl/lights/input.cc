@@ -54,6 +54,10 @@ nlohmann::ordered_json TallyJson(const lights::Intake& intake, const lights::Rec
           {"stale", in.stale},
           {"malformed", in.malformed},
           {"malformed_last", std::string(intake.malformed().message())},
+          {"split", in.split},
+          {"beyond", in.beyond},
+          {"unused", in.unused},
+          {"unmapped", in.unmapped},
           {"lost", in.lost},
           {"bytes", in.bytes},
           {"pictures", in.pictures},
@@ -76,7 +80,12 @@ std::string TallyText(const lights::Intake& intake) {
   for (const auto& [count, what] :
        {std::pair{in.lost, "lost"}, std::pair{in.malformed, kMalformed},
         std::pair{in.outside, "for lights that are not there"},
-        std::pair{in.outranked, "of lower priority"}, std::pair{in.stale, "late"}}) {
+        std::pair{in.outranked, "of lower priority"}, std::pair{in.stale, "late"},
+        std::pair{in.beyond, "with values for lights that are not there"},
+        std::pair{in.split, "that end within a light"},
+        std::pair{in.unused,
+                  "with values behind the universe's channels (--universe-channels 512?)"},
+        std::pair{in.unmapped, "for channels from 2 on (--per-channel N?)"}}) {
     if (count > 0) absl::StrAppend(&text, ", ", count, " ", what);
     if (count > 0 && what == kMalformed) {
       absl::StrAppend(&text, count == 1 ? " (" : " (the last: ",
@@ -100,6 +109,7 @@ absl::Status Input(const InputOptions& options, const Connector& connect, Interr
   wanted.protocol = options.protocol;
   wanted.lights = map->lights;
   wanted.first_universe = options.first_universe;
+  wanted.universe_channels = static_cast<size_t>(options.universe_channels);
   wanted.a_channel = static_cast<size_t>(options.a_channel);
   wanted.gather_ns = static_cast<sync::TimeNs>(options.gather_ms * sync::kMillisecond);
   lights::Intake intake(wanted);
