@@ -85,6 +85,33 @@ class Layers(unittest.TestCase):
         self.assertNotIn("others", self.does("boss", "gallery", str(self.folder / "gallery.png")))
         self.assertEqual(self.scene(), ([], 0))
 
+    def test_draw_names_what_cannot_be_seen_and_why(self) -> None:
+        said = self.does("painter", "draw", "sphere radius=0.3", "sphere radius=0.1 at=9,9,9", "box size=0.4 color=black")
+        self.assertNotIn('nothing of "draw 1"', said)
+        self.assertRegex(said, r'nothing of "draw 2" can be seen on display sim: .*outside')
+        self.assertRegex(said, r'nothing of "draw 3" can be seen on display sim: .*black')
+        told = json.loads(self.run_as("painter", "--json", "draw", "sphere radius=0.1 at=9,9,9").stdout)
+        self.assertEqual(len(told["unseen"]), 1)
+
+    def test_a_recording_of_an_empty_scene_is_warned_of(self) -> None:
+        preset = str(self.folder / "empty.mcap")
+        self.assertIn("warning: the scene was empty", self.does("boss", "record", "--still", preset))
+        self.does("painter", "draw", "sphere radius=0.5")
+        self.assertNotIn("warning", self.does("boss", "record", "--still", str(self.folder / "full.mcap")))
+        playlist = self.folder / "list.toml"
+        playlist.write_text(f'[[item]]\nfile = "{preset}"\nseconds = 0.2\n', encoding="utf-8")
+        shown = subprocess.Popen([VOXELCTL, "--server", self.server, "playlist", str(playlist)], stderr=subprocess.PIPE, text=True,
+                                 env={**os.environ, "VOXELD_TOKEN": self.tokens["boss"]})
+        assert shown.stderr
+        for line in shown.stderr:
+            if "shows nothing: its scene is empty" in line:
+                break
+        else:
+            self.fail("it ended without a warning")
+        shown.terminate()
+        shown.stderr.close()
+        shown.wait(LONG)
+
     def test_what_replay_and_pipe_leave_is_cleared_and_a_second_replay_replaces(self) -> None:
         preset = str(self.folder / "logo.mcap")
         self.does("other", "draw", "sphere radius=0.5")

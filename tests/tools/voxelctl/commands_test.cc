@@ -160,7 +160,7 @@ TEST_F(CommandsTest, PlayPutsUpObjectsAndInstancesThatStay) {
   EXPECT_EQ(log.opens[0].on_disconnect(), v1::DISCONNECT_POLICY_KEEP);
   EXPECT_TRUE(log.opens[0].strict());
   ASSERT_EQ(log.entities.size(), 2u);
-  EXPECT_EQ(log.entities.at("1").label(), "points.ply");
+  EXPECT_EQ(log.entities.at("play 1").label(), "points.ply");
   for (const auto& [id, entity] : log.entities) {
     const std::string& object = entity.primitive().instance().object();
     ASSERT_TRUE(log.objects.contains(object));
@@ -185,11 +185,11 @@ TEST_F(CommandsTest, WhatADrawingPaintsLaterHasAHigherPriority) {
   EXPECT_THAT(result.err, HasSubstr("4 entities"));
   const FakeServer::Log log = server_.log();
   ASSERT_EQ(log.entities.size(), 4u);
-  EXPECT_EQ(log.entities.at("1").priority(), 0u);
-  EXPECT_EQ(log.entities.at("1/over1").priority(), 1u);
-  EXPECT_EQ(log.entities.at("1/over2").priority(), 2u);
-  EXPECT_EQ(log.entities.at("1/over2").primitive().instance().object(), "voxelctl/1/over2");
-  EXPECT_EQ(log.entities.at("2").priority(), 0u);
+  EXPECT_EQ(log.entities.at("play 1").priority(), 0u);
+  EXPECT_EQ(log.entities.at("play 1/over1").priority(), 1u);
+  EXPECT_EQ(log.entities.at("play 1/over2").priority(), 2u);
+  EXPECT_EQ(log.entities.at("play 1/over2").primitive().instance().object(), "voxelctl/1/over2");
+  EXPECT_EQ(log.entities.at("play 2").priority(), 0u);
 }
 
 TEST_F(CommandsTest, PlayEndsATestPatternThatIsUp) {
@@ -259,7 +259,7 @@ TEST_F(CommandsTest, VolumesAreOneMessageEach) {
               HasSubstr("more than the server takes"));
   FakeServer::Log log = server_.log();
   EXPECT_LE(log.largest_message, 256u << 10);
-  const std::string root = log.entities.at("1").primitive().instance().object();
+  const std::string root = log.entities.at("play 1").primitive().instance().object();
   const auto shape = [&log](const std::string& object) -> const v1::Primitive& {
     return log.objects.at(object).parts(0).primitive();
   };
@@ -288,7 +288,7 @@ TEST_F(CommandsTest, ASequenceReplacesEachByTheNext) {
   EXPECT_TRUE(summary["still_up"]);
   const FakeServer::Log log = server_.log();
   ASSERT_EQ(log.entities.size(), 1u);
-  EXPECT_EQ(log.entities.at("1").label(), "f_3.xyz");
+  EXPECT_EQ(log.entities.at("play 1").label(), "f_3.xyz");
   const json looped =
       RunJson({"play", "--sequence", folder_.Path("f_2.xyz"), folder_.Path("f_3.xyz"), "--loop",
                "--fps", "50", "--duration", "1"});
@@ -317,7 +317,7 @@ TEST_F(CommandsTest, CtrlCEndsASpinCleanlyAndTheSceneStays) {
   player.join();
   EXPECT_EQ(result.code, 0) << result.err;
   EXPECT_THAT(result.err, HasSubstr("it is up and spins until Ctrl-C\n"));
-  EXPECT_THAT(result.err, HasSubstr("stays up in the layer voxelctl, called \"1\", until"));
+  EXPECT_THAT(result.err, HasSubstr("stays up in the layer voxelctl, called \"play 1\", until"));
   EXPECT_FALSE(server_.log().deleted_all_mine);
 }
 

@@ -1,5 +1,7 @@
 #include "tools/voxelctl/commands/not_showing.h"
 
+#include <algorithm>
+
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
@@ -18,6 +20,34 @@ std::vector<std::string> NotShowing(const v1::ListDisplaysResponse& displays) {
                      display.state_reason().empty() || display.state_reason() == state
                          ? ""
                          : absl::StrCat(" (", display.state_reason(), ")"))));
+  }
+  return sentences;
+}
+
+std::vector<std::string> Unseen(uint64_t owner, const std::string& layer,
+                                const std::vector<std::string>& ids, Connection& connection) {
+  constexpr size_t kMost = 8;
+  const absl::StatusOr<v1::ListDisplaysResponse> displays = connection.ListDisplays();
+  std::vector<std::string> sentences;
+  if (!displays.ok()) return sentences;
+  for (size_t i = 0; i < std::min(ids.size(), kMost); ++i) {
+    std::string why;
+    bool seen = displays->displays().empty();
+    for (const v1::DisplayDescription& display : displays->displays()) {
+      v1::ExplainEntityRequest request;
+      request.mutable_key()->set_owner(owner);
+      request.mutable_key()->set_layer(layer);
+      request.mutable_key()->set_id(ids[i]);
+      request.set_display(display.name());
+      const absl::StatusOr<v1::ExplainEntityResponse> answer = connection.ExplainEntity(request);
+      seen |= !answer.ok() || answer->visibility() == v1::VISIBILITY_SEEN ||
+              answer->visibility() == v1::VISIBILITY_ERASES;
+      if (seen) break;
+      if (why.empty()) why = absl::StrCat("on display ", display.name(), ": ", answer->text());
+    }
+    if (seen) continue;
+    sentences.push_back(
+        EscapeForTerminal(absl::StrCat("nothing of \"", ids[i], "\" can be seen ", why)));
   }
   return sentences;
 }

@@ -412,8 +412,10 @@ class Player {
     return absl::OkStatus();
   }
 
+  // "play 1", as draw's are "draw 1".
   static std::string Id(size_t file, size_t level) {
-    return level == 0 ? absl::StrCat(file + 1) : absl::StrCat(file + 1, "/over", level);
+    return level == 0 ? absl::StrCat("play ", file + 1)
+                      : absl::StrCat("play ", file + 1, "/over", level);
   }
   static std::string Object(size_t file) { return absl::StrCat("voxelctl/", file + 1); }
 

@@ -146,8 +146,8 @@ void Report(PlaySummary summary, Console& console) {
     console.Say(absl::StrCat(issue.applied ? "note: " : "issue: ", IssueForTerminal(issue)));
   if (summary.still_up) {
     const size_t files = summary.files.size();  // each is called by its number
-    console.Say(absl::StrCat("it stays up in the layer ", summary.layer, ", called \"1\"",
-                             files > 1 ? absl::StrCat(" to \"", files, "\"") : "",
+    console.Say(absl::StrCat("it stays up in the layer ", summary.layer, ", called \"play 1\"",
+                             files > 1 ? absl::StrCat(" to \"play ", files, "\"") : "",
                              ", until `voxelctl clear`"));
   }
 }

@@ -70,7 +70,7 @@ absl::StatusOr<ShapesPut> PutShapes(const v1::ApplyUpdateRequest& request, bool 
   // A test pattern would hide them.
   const absl::StatusOr<EndedPatterns> patterns = EndPatterns(connection);
   if (!patterns.ok()) return patterns.status();
-  ShapesPut put{.snapshot = applied->snapshot()};
+  ShapesPut put{.snapshot = applied->snapshot(), .owner = applied->owner()};
   for (const v1::Issue& issue : applied->issues()) {
     put.notes.push_back(EscapeForTerminal(absl::StrCat("\"", issue.id(), "\": ", issue.message())));
   }

@@ -12,6 +12,7 @@ namespace voxeld::voxelctl {
 
 struct ShapesPut {
   uint64_t snapshot = 0;
+  uint64_t owner = 0;
   std::vector<std::string> notes;  // of shapes that are drawn otherwise than asked; for a terminal
   std::vector<std::string> stay;   // of what others have up that was not to be; for a terminal
   std::vector<std::string> not_showing;  // of displays that show nothing now; for a terminal

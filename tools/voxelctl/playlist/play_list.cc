@@ -132,6 +132,10 @@ class Player {
       console_.Say(
           absl::StrFormat("%s, %.1f s", EscapeForTerminal(item.file), (*showing)->seconds()));
     }
+    if ((*showing)->empty()) {
+      console_.Say(absl::StrCat("warning: ", EscapeForTerminal(item.file),
+                                " shows nothing: its scene is empty"));
+    }
     return FadeTo(*std::move(showing));
   }
 

@@ -12,14 +12,24 @@ namespace {
 constexpr double kLeastLength = 0.1;  // seconds; what is shorter is not played over and over
 constexpr double kMostWait = 1e8;     // seconds
 
-// Whether the file has more than one state; what is wrong with it.
-absl::StatusOr<bool> HasChanges(recording::McapReader& reader) {
+// What a file has.
+struct Contents {
+  bool changes = false;   // more than one state
+  bool entities = false;  // in any of them
+};
+
+// Reads as far as it takes to know. Errors: what is wrong with the file.
+absl::StatusOr<Contents> ContentsOf(recording::McapReader& reader) {
   int sets = 0;
-  absl::Status status =
-      recording::ReadScene(reader, [&sets](const recording::ChangeSet&) { return ++sets < 2; });
+  Contents contents;
+  absl::Status status = recording::ReadScene(reader, [&](const recording::ChangeSet& set) {
+    contents.changes = ++sets > 1;
+    contents.entities |= set.changes.entities_size() > 0;
+    return !contents.changes || !contents.entities;
+  });
   reader.Rewind();
   if (!status.ok()) return status;
-  return sets > 1;
+  return contents;
 }
 
 // An item's file, opened, and what it takes to play it.
@@ -28,6 +38,7 @@ struct Opened {
   uint64_t start_ns = 0;
   double seconds = 0;
   bool still = false;
+  bool empty = false;
 };
 
 absl::StatusOr<Opened> OpenItem(const PlaylistItem& item) {
@@ -39,9 +50,10 @@ absl::StatusOr<Opened> OpenItem(const PlaylistItem& item) {
   const double length =
       static_cast<double>(summary->end_ns - summary->start_ns) / sync::kSecond / item.speed;
   opened.start_ns = summary->start_ns;
-  const absl::StatusOr<bool> changes = HasChanges(*opened.reader);
-  if (!changes.ok()) return changes.status();
-  opened.still = !*changes || length < kLeastLength;
+  const absl::StatusOr<Contents> contents = ContentsOf(*opened.reader);
+  if (!contents.ok()) return contents.status();
+  opened.still = !contents->changes || length < kLeastLength;
+  opened.empty = !contents->entities;
   if (opened.still && !item.seconds.has_value()) {
     return absl::InvalidArgumentError(
         absl::StrCat(item.file, " is one state of a scene; give its item seconds"));
@@ -67,6 +79,7 @@ absl::StatusOr<std::unique_ptr<Showing>> Showing::Begin(const PlaylistItem& item
   showing->reader_ = std::move(opened->reader);
   showing->start_ns_ = opened->start_ns;
   showing->still_ = opened->still;
+  showing->empty_ = opened->empty;
   showing->seconds_ = opened->seconds;
   showing->thread_ = std::thread([it = showing.get()] { it->Run(); });
   return showing;

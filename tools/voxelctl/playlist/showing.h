@@ -39,6 +39,8 @@ class Showing {
   bool up() const;
   // A state of the scene, and nothing that changes.
   bool still() const { return still_; }
+  // No entity is in any of its states.
+  bool empty() const { return empty_; }
   // Why it does not play any more; OK: it does.
   absl::Status status() const;
 
@@ -55,6 +57,7 @@ class Showing {
   uint64_t start_ns_ = 0;
   double seconds_ = 0;
   bool still_ = false;
+  bool empty_ = false;
 
   mutable sync::Mutex mutex_;
   sync::CondVar changed_;

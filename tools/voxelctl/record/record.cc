@@ -103,8 +103,10 @@ absl::Status Record(const RecordOptions& options, const Connector& connect, Inte
   v1::WatchSceneRequest request;
   request.set_contents(true);
   absl::Status wrong;
+  uint64_t entities = 0;  // that came, new or changed
   absl::Status status = connection.WatchScene(request, [&](const v1::WatchSceneResponse& message) {
     wrong = taping.Add(message);
+    entities += static_cast<uint64_t>(message.entities_size());
     if (message.in_sync() == 0) return wrong.ok();
     console.Progress(absl::StrCat("recording  ", taping.Figures()));
     return wrong.ok() && !options.still;  // the first change set is the whole scene
@@ -123,6 +125,8 @@ absl::Status Record(const RecordOptions& options, const Connector& connect, Inte
   } else {
     console.Say(absl::StrCat(EscapeForTerminal(options.file), ": ", taping.Figures()));
   }
+  if (entities == 0 && status.ok())
+    console.Say("warning: the scene was empty; the recording shows nothing");
   return status;
 }
 
