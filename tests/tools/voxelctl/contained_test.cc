@@ -243,6 +243,18 @@ TEST_F(SandboxTest, NothingIsWrittenRemovedOrStarted) {
   EXPECT_EQ(ErrorOf(file_, [&] { return ::kill(parent, 0) == 0; }), EPERM);
 }
 
+TEST_F(SandboxTest, ThreadsAreStartedAndAreAsConfined) {
+  EXPECT_EQ(ErrorOf(file_,
+                    [&] {
+                      int error = 0;
+                      std::thread([&] { error = Opens(outside_) ? 0 : errno; }).join();
+                      errno = error;
+                      return error == 0;
+                    }),
+            EACCES);
+  EXPECT_EQ(ErrorOf(file_, [] { return ::vfork() >= 0; }), EPERM);
+}
+
 TEST_F(SandboxTest, TheReaderHasNoDescriptorOfThisProcess) {
   const int mine = ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 10);
   ASSERT_GE(mine, 0);
