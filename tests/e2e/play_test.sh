@@ -53,7 +53,7 @@ play brain /usr/share/mricron/templates/ch2better.nii.gz
   { echo "a large volume is reduced: $(cat "$work/play.json")" >&2; exit 1; }
 "$voxelctl" --json assets >"$work/assets.json"
 [ "$(field "$work/assets.json" 'len(d["assets"])')" = 1 ]
-# Drawings one after another, with more levels and with fewer.
+# Drawings one after another.
 for i in 1 2 3 4 5 6; do
   {
     echo "<svg xmlns='http://www.w3.org/2000/svg'>"
@@ -63,7 +63,7 @@ for i in 1 2 3 4 5 6; do
     echo "</svg>"
   } >"$work/frame$i.svg"
 done
-play levels "$work/frame#.svg" --fps 10
+play drawings "$work/frame#.svg" --fps 10
 play turning "$models/OBJ/spider.obj" --spin --duration 2 --fps 10
 
 "$voxelctl" --json stats >"$work/stats.json"

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "tools/import/read_any.h"
+#include "tools/import/rsvg_drawing.h"
 #include "tools/voxelctl/import/frames.h"
 #include "tools/voxelctl/import/import_options.h"
 #include "tools/voxelctl/import/reader_process.h"
@@ -85,8 +87,13 @@ absl::Status Parse(int argc, char** argv, Wanted* wanted) {
   return absl::OkStatus();
 }
 
+// Folders to read from, besides that of the first file. Loads what drawings need.
 std::vector<std::string> FoldersOf(const Wanted& wanted) {
   std::vector<std::string> folders;
+  if (std::any_of(wanted.files.begin(), wanted.files.end(),
+                  [](const std::string& file) { return IsDrawing(ExtensionOf(file)); })) {
+    folders = PrepareDrawings();
+  }
   if (!wanted.sequence || wanted.options.other_files == OtherFiles::kNone) return folders;
   for (const std::string& file : wanted.files) {
     const std::string folder = std::filesystem::path(file).parent_path().string();

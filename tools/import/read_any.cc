@@ -14,7 +14,7 @@
 #include "tools/import/nifti_volume.h"
 #include "tools/import/nrrd_volume.h"
 #include "tools/import/pcd_points.h"
-#include "tools/import/svg_drawing.h"
+#include "tools/import/rsvg_drawing.h"
 #include "tools/voxelctl/import/importer.h"
 
 namespace voxeld::voxelctl {
@@ -49,7 +49,7 @@ absl::StatusOr<Model> ReadAny(const SourceFile& file, const ImportOptions& optio
   if (extension == "nrrd" || extension == "nhdr") return ReadNrrdVolume(file);
   if (extension == "raw") return ReadRawVolume(file, options.raw);
   if (extension == "pdb" || extension == "ent") return ReadPdbMolecule(file, options.style);
-  if (extension == "svg") return ReadSvgDrawing(file);
+  if (IsDrawing(extension)) return ReadSvgDrawing(file, options.pixels);
   // Slices often have no extension, or what looks like one.
   if (extension == "dcm" || LooksLikeDicom(file)) return ReadDicomVolume(file);
   if (AssimpReads(extension)) return ReadMesh(file);
@@ -62,7 +62,7 @@ absl::StatusOr<Model> ReadAny(const SourceFile& file, const ImportOptions& optio
       ".blend, .ifc, .bvh and more), voxels (.vox), points (.ply, .pcd, "
       ".las, .xyz, .txt, .asc, .pts, .csv), maps (.geojson, .topojson, .json), volumes (.nii, "
       ".nii.gz, .hdr with .img, .nrrd, .nhdr, .raw, .dcm), molecules (.pdb, .ent) and drawings "
-      "(.svg)");
+      "(.svg, .svgz)");
 }
 
 absl::StatusOr<Model> ReadFolder(const std::string& path) { return ReadDicomFolder(path); }

@@ -4,10 +4,10 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/fuzz/import/check_model.h"
+#include "tools/import/pdb_molecule.h"
+#include "tools/import/rsvg_drawing.h"
 #include "tools/voxelctl/import/geojson.h"
 #include "tools/voxelctl/import/json_text.h"
-#include "tools/import/pdb_molecule.h"
-#include "tools/import/svg_drawing.h"
 #include "tools/voxelctl/import/text_points.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
@@ -40,7 +40,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       voxeld::fuzz::CheckModel(ReadPdbMolecule(file, MoleculeStyle::kBalls));
       break;
     default:
-      voxeld::fuzz::CheckModel(ReadSvgDrawing(file));
+      voxeld::fuzz::CheckModel(ReadSvgDrawing(file, 16));
       break;
   }
   return 0;

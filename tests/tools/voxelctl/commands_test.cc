@@ -173,23 +173,22 @@ TEST_F(CommandsTest, PlayPutsUpObjectsAndInstancesThatStay) {
   EXPECT_EQ(log.clears[0].layer(), "voxelctl");
 }
 
-TEST_F(CommandsTest, WhatADrawingPaintsLaterHasAHigherPriority) {
+TEST_F(CommandsTest, ADrawingIsAVolumeOfColours) {
   if (const absl::Status importers = CheckImporters("play"); !importers.ok())
     GTEST_SKIP() << importers.message();
   const std::string file = folder_.Write(
       "a.svg",
-      "<svg xmlns='http://www.w3.org/2000/svg'><rect width='9' height='9' fill='red'/>"
-      "<circle cx='4' cy='4' r='2' fill='blue' stroke='gold'/></svg>");
+      "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 20 10'><rect width='9' height='9' "
+      "fill='red'/><script/></svg>");
   const Result result = RunTool({"play", file, DataFile("points.ply")});
   EXPECT_EQ(result.code, 0) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("4 entities"));
+  EXPECT_THAT(result.err, HasSubstr("2 entities"));
+  EXPECT_THAT(result.err, HasSubstr("left out: scripts (1)"));
   const FakeServer::Log log = server_.log();
-  ASSERT_EQ(log.entities.size(), 4u);
-  EXPECT_EQ(log.entities.at("play 1").priority(), 0u);
-  EXPECT_EQ(log.entities.at("play 1/over1").priority(), 1u);
-  EXPECT_EQ(log.entities.at("play 1/over2").priority(), 2u);
-  EXPECT_EQ(log.entities.at("play 1/over2").primitive().instance().object(), "voxelctl/1/over2");
-  EXPECT_EQ(log.entities.at("play 2").priority(), 0u);
+  ASSERT_EQ(log.entities.size(), 2u);
+  const v1::Grid& grid = log.objects.at("voxelctl/1/0").parts(0).primitive().volume().grid();
+  EXPECT_EQ(grid.size_a(), 2 * grid.size_b());
+  EXPECT_EQ(grid.size_c(), 1u);
 }
 
 TEST_F(CommandsTest, PlayEndsATestPatternThatIsUp) {

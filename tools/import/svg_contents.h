@@ -1,0 +1,25 @@
+// What an SVG file contains, before librsvg draws it.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "tools/voxelctl/import/model.h"
+#include "tools/voxelctl/import/source_file.h"
+
+namespace voxeld::voxelctl {
+
+struct SvgContents {
+  std::vector<LeftOut> left_out;  // elements and rules that librsvg ignores
+  uint64_t texts = 0;
+};
+
+// Parses `xml`, the text of `file`, without loading anything that it names.
+// Errors: InvalidArgument: it is not well-formed, has another root than <svg>, or its elements are within each other, or use each
+// other, so deep or so often that drawing them would need too much stack or time.
+absl::StatusOr<SvgContents> ScanSvg(const SourceFile& file, absl::string_view xml);
+
+}  // namespace voxeld::voxelctl
