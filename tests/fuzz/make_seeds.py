@@ -270,7 +270,7 @@ def texts():
         '[[certificate]]\nname = "b"\nsubject = "b.example"\nscopes = ["view"]\n[[user]]\nname = "0"\nscopes = ["control"]\n'.encode())
     put("layout", b'[{"point": [0, 0, 0]}, null, {"point": [1, 0.5, -2]}, {}]')
     put("layout", str([{"point": [x, y, z]} for x in range(2) for y in range(2) for z in range(2)]).replace("'", '"').encode())
-    formats = {"import_binary": ["pcd", "las", "ply", "vox"], "import_text": ["geojson", "topojson", "xyz", "csv", "pdb", "svg"],
+    formats = {"import_binary": ["pcd", "las", "ply", "vox"], "import_text": ["geojson", "topojson", "xyz", "csv", "pdb", "svg", "cif"],
                "import_volumes": ["nrrd", "raw", "dcm", "nii"], "import_meshes": ["obj", "stl", "gltf", "glb", "off", "3mf", "fbx", "dae"]}
     for target, extensions in formats.items():
         for number, extension in enumerate(extensions):
@@ -285,7 +285,9 @@ def texts():
                 put(target, bytes([number]) + block.encode(), 8192)
     put("import_text", b"\x05" + b'<svg viewBox="0 0 9 9"><path d="M1 1 L2 2 C3 3 4 4 5 5 Z" stroke="red"/><circle r="2"/><rect width="3" height="2"/></svg>')
     put("import_text", b"\x04" + b"ATOM      1  CA  ALA A   1      11.104   6.134  -6.504  1.00  0.00           C  \n" * 3)
+    put("import_text", b"\x06" + b"data_a\nloop_\n_atom_site.type_symbol\n_atom_site.Cartn_x\n_atom_site.Cartn_y\n_atom_site.Cartn_z\nC 0 0 0\n'N' 1.4(2) 0 0\n")
     put("import_text", b"\x02" + b"1 2 3\n4 5 6 255 0 0\n")
+    put("import_text", b"\x02" + b"2\nwater\nO 0 0 0\nH 1 0 0\n")
     put("import_text", b"\x03" + b"x,y,z,r,g,b\n1,2,3,4,5,6\n")
     put("import_binary", b"\x00" + b"VERSION .7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA ascii\n1 2 3 4\n5 6 7 8\n")
     put("import_binary", b"\x03" + b"VOX \x96\x00\x00\x00MAIN\x00\x00\x00\x00\x38\x00\x00\x00SIZE\x0c\x00\x00\x00\x00\x00\x00\x00" + struct.pack("<III", 2, 2, 2) +

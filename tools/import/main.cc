@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "tools/import/gdal_map.h"
 #include "tools/import/read_any.h"
 #include "tools/import/rsvg_drawing.h"
 #include "tools/voxelctl/import/frames.h"
@@ -93,6 +94,10 @@ std::vector<std::string> FoldersOf(const Wanted& wanted) {
   if (std::any_of(wanted.files.begin(), wanted.files.end(),
                   [](const std::string& file) { return IsDrawing(ExtensionOf(file)); })) {
     folders = PrepareDrawings();
+  }
+  if (std::any_of(wanted.files.begin(), wanted.files.end(),
+                  [](const std::string& file) { return IsGdalMap(ExtensionOf(file)); })) {
+    for (const std::string& folder : MapDataFolders()) folders.push_back(folder);
   }
   if (!wanted.sequence || wanted.options.other_files == OtherFiles::kNone) return folders;
   for (const std::string& file : wanted.files) {

@@ -1,5 +1,7 @@
 #include "tools/import/read_any.h"
 
+#include <algorithm>
+#include <array>
 #include <assimp/Importer.hpp>
 
 #include "absl/strings/match.h"
@@ -8,6 +10,8 @@
 #include "tools/import/assimp_scene.h"
 #include "tools/import/dicom_check.h"
 #include "tools/import/dicom_volume.h"
+#include "tools/import/gdal_map.h"
+#include "tools/import/gemmi_molecule.h"
 #include "tools/import/las_points.h"
 #include "tools/import/mesh_beginning.h"
 #include "tools/import/mesh_checks.h"
@@ -26,6 +30,13 @@ absl::StatusOr<Model> ReadMesh(const SourceFile& file) {
   const absl::StatusOr<const aiScene*> scene = LoadScene(file, false, &importer);
   if (!scene.ok()) return scene.status();
   return ModelOf(file, **scene, nullptr);
+}
+
+bool IsMoleculeName(const SourceFile& file) {
+  return std::ranges::any_of(std::array{".pdb", ".ent", ".cif", ".mmcif"}, [&](const char* name) {
+    return absl::EndsWithIgnoreCase(file.path, name) ||
+           absl::EndsWithIgnoreCase(file.path, absl::StrCat(name, ".gz"));
+  });
 }
 
 }  // namespace
@@ -48,7 +59,8 @@ absl::StatusOr<Model> ReadAny(const SourceFile& file, const ImportOptions& optio
   if (extension == "hdr" || extension == "img") return ReadNiftiVolume(file);
   if (extension == "nrrd" || extension == "nhdr") return ReadNrrdVolume(file);
   if (extension == "raw") return ReadRawVolume(file, options.raw);
-  if (extension == "pdb" || extension == "ent") return ReadPdbMolecule(file, options.style);
+  if (IsMoleculeName(file)) return ReadMolecule(file, options.style, options.attributes);
+  if (IsGdalMap(extension)) return ReadGdalMap(file, options.globe, options.attributes);
   if (IsDrawing(extension)) return ReadSvgDrawing(file, options.pixels);
   // Slices often have no extension, or what looks like one.
   if (extension == "dcm" || LooksLikeDicom(file)) return ReadDicomVolume(file);
@@ -60,8 +72,10 @@ absl::StatusOr<Model> ReadAny(const SourceFile& file, const ImportOptions& optio
           : absl::StrCat("files of type .", EscapeForTerminal(extension), " are not read"),
       "play reads meshes (.obj, .stl, .ply, .gltf, .glb, .off, .fbx, .3mf, .dae, "
       ".blend, .ifc, .bvh and more), voxels (.vox), points (.ply, .pcd, "
-      ".las, .xyz, .txt, .asc, .pts, .csv), maps (.geojson, .topojson, .json), volumes (.nii, "
-      ".nii.gz, .hdr with .img, .nrrd, .nhdr, .raw, .dcm), molecules (.pdb, .ent) and drawings "
+      ".las, .xyz, .txt, .asc, .pts, .csv), maps (.geojson, .topojson, .json, .shp, .gpx, .kml), "
+      "volumes (.nii, "
+      ".nii.gz, .hdr with .img, .nrrd, .nhdr, .raw, .dcm), molecules (.pdb, .ent, .cif, .mmcif, "
+      "also with .gz, and .xyz) and drawings "
       "(.svg, .svgz)");
 }
 

@@ -4,17 +4,19 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/fuzz/import/check_model.h"
-#include "tools/import/pdb_molecule.h"
+#include "tools/import/gemmi_molecule.h"
 #include "tools/import/rsvg_drawing.h"
 #include "tools/voxelctl/import/geojson.h"
 #include "tools/voxelctl/import/json_text.h"
+#include "tools/voxelctl/import/molecule.h"
 #include "tools/voxelctl/import/text_points.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace voxeld::voxelctl;  // NOLINT(google-build-using-namespace)
-  static constexpr const char* kExtensions[] = {"geojson", "topojson", "xyz", "csv", "pdb", "svg"};
+  static constexpr const char* kExtensions[] = {"geojson", "topojson", "xyz", "csv",
+                                                "pdb",     "svg",      "cif"};
   size_t which = 0;
-  const SourceFile file = voxeld::fuzz::FileOf(data, size, kExtensions, 6, &which);
+  const SourceFile file = voxeld::fuzz::FileOf(data, size, kExtensions, 7, &which);
   switch (which) {
     case 0:
     case 1: {
@@ -34,10 +36,13 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     }
     case 2:
     case 3:
-      voxeld::fuzz::CheckModel(ReadTextPoints(file));
+      voxeld::fuzz::CheckModel(IsXyzMolecule(file.bytes)
+                                   ? ReadXyzMolecule(file, MoleculeStyle::kBalls)
+                                   : ReadTextPoints(file));
       break;
     case 4:
-      voxeld::fuzz::CheckModel(ReadPdbMolecule(file, MoleculeStyle::kBalls));
+    case 6:
+      voxeld::fuzz::CheckModel(ReadMolecule(file, MoleculeStyle::kBalls));
       break;
     default:
       voxeld::fuzz::CheckModel(ReadSvgDrawing(file, 16));

@@ -112,14 +112,6 @@ TEST_F(Clouds, TextWhoseCommentNamesTheColumns) {
   EXPECT_THAT(Points("a.txt", "# x y z\n0 0 0 10 20 30\n").colors, ElementsAre(Rgb{10, 20, 30}));
 }
 
-TEST_F(Clouds, MoleculesInXyzFilesAreToldApart) {
-  for (const char* comment : {"water", "", "1 2 3"}) {
-    EXPECT_THAT(Error("a.xyz", absl::StrCat("2\n", comment, "\nO 0 0 0.1\r\nH 0 0.7 -0.4\n")),
-                HasSubstr("is a molecule (chemistry's XYZ format)"))
-        << comment;
-  }
-}
-
 TEST_F(Clouds, TextThatIsWrong) {
   EXPECT_THAT(Error("a.xyz", "1 2\n"), HasSubstr("line 1 is text that begins with \"1 2\""));
   EXPECT_THAT(Error("a.xyz", "1 2 3\n4 five 6\n"),

@@ -181,6 +181,10 @@ std::vector<Sample> Samples() {
       {"g.dcm", Real(dicoms + "MR_small_expb.dcm")},
       {"h.dcm", Real(dicoms + "image_dfl.dcm")},
       {"a.pdb", molecule},
+      {"a.cif",
+       "data_a\nloop_\n_atom_site.type_symbol\n_atom_site.label_atom_id\n_atom_site.Cartn_x\n"
+       "_atom_site.Cartn_y\n_atom_site.Cartn_z\nN N 0 0 0\nC 'CA' 1.4 0 0\n"},
+      {"b.xyz", "2\n\nC 0 0 0 1\nN 1 0 0 2\n"},
       {"a.svg",
        "<svg xmlns='http://www.w3.org/2000/svg'><style>.a{fill:red;opacity:.5}</style>"
        "<linearGradient id='g'><stop stop-color='blue'/></linearGradient><g transform='rotate(5 1 "

@@ -7,7 +7,10 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include "tests/tools/import/read_here.h"
+#include "tests/tools/import/volume_files.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
 #include "tools/voxelctl/import/importer.h"
@@ -19,6 +22,7 @@ namespace molecule_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsNan;
 
 std::string Atom(int serial, const std::string& name, double x, double y, double z,
                  const std::string& element = "", char location = ' ') {
@@ -26,11 +30,40 @@ std::string Atom(int serial, const std::string& name, double x, double y, double
                          serial, name, location, x, y, z, element);
 }
 
+size_t AtomsOf(const Model& model) {
+  size_t atoms = 0;
+  for (const Part& part : model.parts)
+    atoms += part.kind == Kind::kPoints ? part.positions.size() : 0;
+  return atoms;
+}
+
+// The values of an attribute of all atoms, part by part.
+std::vector<float> ValuesOf(const Model& model, const std::string& name) {
+  std::vector<float> values;
+  for (const Part& part : model.parts) {
+    for (const Attribute& one : part.attributes) {
+      if (part.kind == Kind::kPoints && one.name == name)
+        values.insert(values.end(), one.values.begin(), one.values.end());
+    }
+  }
+  return values;
+}
+
+// A table _atom_site, of which `rows` have: element, name, alternate location, residue, chain, residue number, x, y, z, model.
+std::string Cif(const std::string& rows) {
+  return absl::StrCat(
+      "data_X\nloop_\n_atom_site.type_symbol\n_atom_site.label_atom_id\n_atom_site.label_alt_id\n"
+      "_atom_site.label_comp_id\n_atom_site.auth_asym_id\n_atom_site.auth_seq_id\n"
+      "_atom_site.Cartn_x\n_atom_site.Cartn_y\n_atom_site.Cartn_z\n"
+      "_atom_site.pdbx_PDB_model_num\n",
+      rows);
+}
+
 class Molecules : public testing::Test {
  protected:
   absl::StatusOr<Model> Import(const std::string& bytes,
                                MoleculeStyle style = MoleculeStyle::kBalls) {
-    return ReadHere(folder_.Write("a.pdb", bytes), {.style = style});
+    return ReadHere(folder_.Write("a.pdb", bytes), {.style = style, .attributes = true});
   }
   // Of the first part, which are the rods, if there are any.
   size_t Bonds(const std::string& bytes) {
@@ -42,6 +75,12 @@ class Molecules : public testing::Test {
   }
   std::string Error(const std::string& bytes) {
     return std::string(Import(bytes).status().message());
+  }
+  absl::StatusOr<Model> ImportAs(const std::string& name, const std::string& bytes) {
+    return ReadHere(folder_.Write(name, bytes), {.attributes = true});
+  }
+  std::string ErrorOf(const std::string& name, const std::string& bytes) {
+    return std::string(ImportAs(name, bytes).status().message());
   }
 
   TempFolder folder_;
@@ -91,7 +130,7 @@ TEST_F(Molecules, OneModelAndOneLocation) {
                             "ENDMDL\nMODEL        2\n" + atom + "ENDMDL\n");
   ASSERT_THAT(model, IsOk());
   EXPECT_EQ(model->parts.at(0).positions.size(), 1u);
-  EXPECT_THAT(model->note, HasSubstr("the first of its models"));
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"further models", 1}}));
 }
 
 TEST_F(Molecules, FramesThatEndDivides) {
@@ -100,7 +139,7 @@ TEST_F(Molecules, FramesThatEndDivides) {
         absl::StrCat(Atom(1, " C  ", 0, 0, 0, "C"), end, Atom(1, " C  ", 5, 0, 0, "C"), end));
     ASSERT_THAT(model, IsOk());
     EXPECT_EQ(model->parts.at(0).positions.size(), 1u) << end;
-    EXPECT_THAT(model->note, HasSubstr("the first of its models is shown"));
+    EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"further models", 1}}));
   }
 }
 
@@ -108,21 +147,16 @@ TEST_F(Molecules, AResidueHasOneLocationWhateverItsLetter) {
   const auto model = Import(Atom(1, " N  ", 0, 0, 0, "N") + Atom(2, " CA ", 9, 0, 0, "C", 'B') +
                             Atom(3, " CA ", 9, 1, 0, "C", 'C') + Atom(4, " C  ", 20, 0, 0, "C"));
   ASSERT_THAT(model, IsOk());
-  size_t atoms = 0;
-  for (const Part& part : model->parts)
-    atoms += part.kind == Kind::kPoints ? part.positions.size() : 0;
-  EXPECT_EQ(atoms, 3u);
-  EXPECT_THAT(model->note, HasSubstr("atoms at alternate locations, not shown: 1"));
+  EXPECT_EQ(AtomsOf(*model), 3u);
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"atoms at alternate locations", 1}}));
 }
 
 TEST_F(Molecules, RealProteins) {
   const auto model = ReadHere("/usr/share/pymol/data/tut/1hpv.pdb", {});
   ASSERT_THAT(model, IsOk()) << "tools/setup --import installs pymol-data";
-  size_t atoms = 0;
-  for (const Part& part : model->parts) {
-    if (part.kind == Kind::kPoints) atoms += part.positions.size();
-  }
-  EXPECT_EQ(atoms, 1631u);
+  EXPECT_EQ(AtomsOf(*model), 1631u);  // grep -cE '^(ATOM|HETATM)'
+  // grep -c '^HELIX', '^SHEET'
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"helices", 2}, {"strands of sheets", 19}}));
   // A chain of amino acids has about as many bonds as atoms, and a few for rings.
   EXPECT_GT(model->parts[0].indices.size() / 4, 1500u);
   EXPECT_LT(model->parts[0].indices.size() / 4, 1800u);
@@ -138,19 +172,289 @@ TEST_F(Molecules, ThatAreWrong) {
   EXPECT_THAT(Error(bad), HasSubstr("line 1 has \"1e300\" in column 31"));
   std::string crowd;
   for (int i = 0; i < 1002; ++i) crowd += good;
-  EXPECT_THAT(Error(crowd), HasSubstr("more than 100 atoms near (0, 0, 0)"));
+  EXPECT_THAT(Error(crowd), HasSubstr("more than 32 atoms near (0, 0, 0)"));
 }
 
 TEST_F(Molecules, DamagedOnesEndWell) {
-  const std::string good =
+  const std::string pdb =
+      "HELIX    1   1 ALA A    1  ALA A    2  1                                   2\n"
+      "SHEET    1   A 2 ALA A   1  ALA A   2  0\n"
+      "REMARK 350   BIOMT1   1  1.000000  0.000000  0.000000        0.00000\n"
+      "SSBOND   1 CYS A    1    CYS A    2                          1555   1555  2.03\n" +
       Atom(1, " C  ", 0, 0, 0, "C") + Atom(2, " N  ", 1.4, 0, 0, "N") + "CONECT    1    2\nEND\n";
+  const std::string cif =
+      Cif("N N . ALA A 1 0 0 0 1\nC 'CA' B ALA A 1 1.4 0 0 1\n;C\n; C . LIG A 3 53 0 0 1\n") +
+      "_struct_conn.conn_type_id covale\n_struct_conn.ptnr1_auth_asym_id A\n"
+      "data_n\n_cell_length_a 5\nloop_\n_atom_site_label\n_atom_site_fract_x\nC1 0.5\n";
+  const std::string xyz =
+      "2\nProperties=species:S:1:pos:R:3:q:R:1\nC 0 0 0 1\nN 1 0 0 2\n1\n\nH 0 0 0\n";
   std::mt19937 random(5);
-  for (int i = 0; i < 500; ++i) {
-    std::string bytes = good;
-    bytes[random() % bytes.size()] = static_cast<char>(random());
-    if (i % 4 == 0) bytes.resize(1 + random() % bytes.size());
-    (void)Import(bytes);
+  for (const auto& [name, good] : std::vector<std::pair<std::string, std::string>>{
+           {"a.pdb", pdb}, {"a.cif", cif}, {"a.xyz", xyz}, {"a.cif.gz", Gzip(cif)}}) {
+    ASSERT_THAT(ImportAs(name, good), IsOk()) << name;
+    for (int i = 0; i < 500; ++i) {
+      std::string bytes = good;
+      for (uint32_t k = 1 + random() % 4; k > 0; --k)
+        bytes[random() % bytes.size()] = static_cast<char>(random());
+      if (i % 4 == 0) bytes.resize(1 + random() % bytes.size());
+      const auto model = ImportAs(name, bytes);
+      if (!model.ok()) EXPECT_THAT(model.status().message(), HasSubstr(name));
+    }
   }
+}
+
+TEST_F(Molecules, SerialNumbersOfAnyKind) {
+  // Hexadecimal, hybrid-36 and stars: the atoms of CONECT are found by the text, and stars are not one atom.
+  const auto bonds = [this](const std::string& first, const std::string& second) {
+    std::string a = Atom(1, " C  ", 0, 0, 0, "C"), b = Atom(2, " C  ", 5, 0, 0, "C");
+    a.replace(6, 5, first);
+    b.replace(6, 5, second);
+    return Bonds(a + b + "CONECT" + first + second + "\n");
+  };
+  EXPECT_EQ(bonds("186a0", "186a1"), 1u);
+  EXPECT_EQ(bonds("A0000", "A0001"), 1u);
+  EXPECT_EQ(bonds("99999", "A0000"), 1u);
+  EXPECT_EQ(bonds("*****", "*****"), 0u);
+  // After 99,999 some programs begin again: which atom is meant is not clear, and that is said.
+  const auto model = Import(Atom(1, " C  ", 0, 0, 0, "C") + Atom(1, " C  ", 5, 0, 0, "C") +
+                            Atom(2, " C  ", 9, 0, 0, "C") + "CONECT    1    2\n");
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(model->left_out,
+            (std::vector<LeftOut>{{"bonds by serial numbers that several atoms have", 1}}));
+}
+
+TEST_F(Molecules, LinksAndWhatIsNotDrawn) {
+  std::string atoms = Atom(1, " SG ", 0, 0, 0, "S") + Atom(2, " SG ", 5, 0, 0, "S");
+  atoms.replace(atoms.find('\n') + 1 + 25, 1, "2");  // the second atom is in residue 2
+  // wwPDB's format 3.3: residues in columns 16 to 22 and 30 to 36, atoms in 13 to 16 and 43 to 46, symmetry from 60 and 67.
+  const std::string bridge =
+      "SSBOND   1 XXX A    1    XXX A    2                          1555   1555  2.03\n";
+  EXPECT_EQ(Bonds(bridge + atoms), 1u);
+  const std::string link =
+      "LINK         SG  XXX A   1                 SG  XXX A   2     1555   1555  5.00\n";
+  EXPECT_EQ(Bonds(link + atoms), 1u);
+  std::string other = link;
+  other.replace(other.rfind("1555"), 4, "2655");
+  const auto model =
+      Import(other +
+             "REMARK 350 BIOMOLECULE: 1\nREMARK 350 APPLY THE FOLLOWING TO CHAINS: A\n"
+             "REMARK 350   BIOMT1   1  1.000000  0.000000  0.000000        0.00000\n"
+             "REMARK 350   BIOMT2   1  0.000000  1.000000  0.000000        0.00000\n"
+             "REMARK 350   BIOMT3   1  0.000000  0.000000  1.000000        0.00000\n"
+             "REMARK 350   BIOMT1   2 -1.000000  0.000000  0.000000        0.00000\n"
+             "REMARK 350   BIOMT2   2  0.000000 -1.000000  0.000000        0.00000\n"
+             "REMARK 350   BIOMT3   2  0.000000  0.000000  1.000000        0.00000\n" +
+             atoms);
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"copies by assembly operators", 1},
+                                                   {"bonds to symmetry copies", 1}}));
+}
+
+TEST_F(Molecules, NumbersOfAtomsAreAttributes) {
+  const auto model = Import(
+      "ATOM      1  N   ALA A   7      11.104   6.134  -6.504  0.50 12.25           N1+\n"
+      "ATOM      2  O   ALA B   8      21.639   6.071  -5.147                       O\n");
+  ASSERT_THAT(model, IsOk());
+  EXPECT_THAT(ValuesOf(*model, "b_factor"), ElementsAre(IsNan(), 12.25f));  // oxygen first
+  EXPECT_THAT(ValuesOf(*model, "occupancy"), ElementsAre(IsNan(), 0.5f));
+  EXPECT_THAT(ValuesOf(*model, "charge"), ElementsAre(IsNan(), 1.f));
+  EXPECT_THAT(ValuesOf(*model, "chain"), ElementsAre(2.f, 1.f));
+  EXPECT_THAT(ValuesOf(*model, "residue"), ElementsAre(8.f, 7.f));
+  EXPECT_THAT(ValuesOf(*model, "element"), ElementsAre(8.f, 7.f));
+}
+
+TEST_F(Molecules, NamesThatStandToTheLeftInProteins) {
+  const auto color = [this](const std::string& name, const std::string& residue) {
+    return Import(absl::StrFormat("ATOM      1 %-4s %3s A   1       0.000   0.000   0.000\n", name,
+                                  residue))
+        ->parts.back()
+        .colors[0];
+  };
+  EXPECT_EQ(color("CE", "LYS"), color(" CE", "LYS")) << "carbon, not cerium";
+  EXPECT_EQ(color("CD1", "HIE"), (Rgb{144, 144, 144}));
+  EXPECT_EQ(color("CA", "CA"), (Rgb{61, 255, 0})) << "an ion";
+}
+
+TEST_F(Molecules, CompressedOnes) {
+  const std::string water = Atom(1, " O  ", 0, 0, 0, "O");
+  EXPECT_THAT(ImportAs("a.pdb.gz", Gzip(water)), IsOk());
+  EXPECT_THAT(ImportAs("a.ent.gz", Gzip(water)), IsOk());
+  EXPECT_THAT(ImportAs("a.cif.gz", Gzip(Cif("O O . HOH A 1 0 0 0 1\n"))), IsOk());
+  EXPECT_THAT(ErrorOf("a.cif.gz", Gzip(water)), HasSubstr("a CIF file begins with data_"));
+  EXPECT_THAT(ErrorOf("a.pdb.gz", Gzip(water).substr(0, 30)), HasSubstr("cut off"));
+}
+
+TEST_F(Molecules, MmCif) {
+  const auto model = ImportAs(
+      "a.cif",
+      Cif("N N . ALA A 1 0 0 0 1\n# a comment\nC \"CA\" B ALA A 1 1.4 0 0 1\n"
+          "C CA C ALA A 1 1.5 0 0 1\nO 'O5'x y' . ALA \"A\" 1 9 0 0(3) 1\nZN ZN . ZN A 2 50 0 0 1\n"
+          "C\n;C1\n;\n. LIG A 3 53 0 0 1\nC X . LIG A 4 ? ? ? 1\nN N . ALA A 1 0 0 0 2\n"
+          "loop_\n_struct_conn.conn_type_id\n_struct_conn.ptnr1_auth_asym_id\n"
+          "_struct_conn.ptnr1_auth_seq_id\n_struct_conn.ptnr1_label_atom_id\n"
+          "_struct_conn.ptnr1_symmetry\n_struct_conn.ptnr2_auth_asym_id\n"
+          "_struct_conn.ptnr2_auth_seq_id\n_struct_conn.ptnr2_label_atom_id\n"
+          "_struct_conn.ptnr2_symmetry\n"
+          "metalc A 2 ZN 1_555 A 3 C1 1_555\nhydrog A 1 N 1_555 A 3 C1 1_555\n"
+          "covale A 1 N 1_555 A 3 C1 2_655\n"
+          "_struct_conf.conf_type_id HELX_P\ndata_next\n_cell_length_a 3\n"));
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(model->format, "mmCIF molecule");
+  EXPECT_EQ(AtomsOf(*model), 5u);
+  // N-CA by their distance, Zn-C1 because the file says so.
+  EXPECT_EQ(model->parts[0].indices.size() / 4, 2u);
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"further models", 1},
+                                                   {"atoms without coordinates", 1},
+                                                   {"hydrogen bonds", 1},
+                                                   {"bonds to symmetry copies", 1},
+                                                   {"helices", 1},
+                                                   {"atoms at alternate locations", 1}}));
+}
+
+TEST_F(Molecules, MmCifOfOneAtomWithoutALoop) {
+  const auto model = ImportAs("a.mmcif",
+                              "data_a\n_atom_site.Cartn_x 1\n_atom_site.Cartn_y 2\n"
+                              "_atom_site.Cartn_z 3\n_atom_site.type_symbol K\n");
+  ASSERT_THAT(model, IsOk());
+  EXPECT_THAT(model->parts.at(0).positions, ElementsAre(Point3{1, 2, 3}));
+  EXPECT_EQ(ValuesOf(*model, "element").at(0), 19);
+}
+
+TEST_F(Molecules, ChemicalComponents) {
+  const std::string component =
+      "data_comp_list\n_chem_comp.id HOH\ndata_comp_HOH\nloop_\n_chem_comp_atom.comp_id\n"
+      "_chem_comp_atom.atom_id\n_chem_comp_atom.type_symbol\n_chem_comp_atom.charge\n"
+      "_chem_comp_atom.model_Cartn_x\n_chem_comp_atom.model_Cartn_y\n"
+      "_chem_comp_atom.model_Cartn_z\n_chem_comp_atom.pdbx_model_Cartn_x_ideal\n"
+      "_chem_comp_atom.pdbx_model_Cartn_y_ideal\n_chem_comp_atom.pdbx_model_Cartn_z_ideal\n"
+      "HOH O O 0 0 0 0 1 1 1\nHOH H1 H 0 3 0 0 1 1 2\nloop_\n_chem_comp_bond.comp_id\n"
+      "_chem_comp_bond.atom_id_1\n_chem_comp_bond.atom_id_2\nHOH O H1\n";
+  const auto model = ImportAs("a.cif", component);
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(AtomsOf(*model), 2u);
+  EXPECT_EQ(model->parts[0].indices.size() / 4, 1u);
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"further models", 1}}));
+  // A deposited structure may carry the bonds of its components.
+  const auto whole = ImportAs(
+      "a.cif", Cif("O O . HOH A 1 0 0 0 1\nH H1 . HOH A 1 3 0 0 1\nO O . HOH A 2 9 0 0 1\n") +
+                   component.substr(component.rfind("loop_")));
+  ASSERT_THAT(whole, IsOk());
+  EXPECT_EQ(whole->parts[0].indices.size() / 4, 1u);
+}
+
+TEST_F(Molecules, CrystalsInFractions) {
+  // Sodium chloride: a cell of 5.62 Å, in the space group F m -3 m, which has 192 operators.
+  const std::string cell =
+      "data_nacl\n_cell_length_a 5.62(2)\n_cell_length_b 5.62\n_cell_length_c 5.62\n"
+      "_cell_angle_alpha 90\n_cell_angle_beta 90\n_cell_angle_gamma 90\n";
+  const std::string sites =
+      "loop_\n_atom_site_label\n_atom_site_type_symbol\n_atom_site_fract_x\n_atom_site_fract_y\n"
+      "_atom_site_fract_z\n_atom_site_disorder_group\nNa1 Na1+ 0 0 0 .\nCl1 Cl1- .5 0.50(1) +0.5 "
+      "1\n"
+      "Cl2 Cl1- .5 0.5 0.5 2\n";
+  const auto model =
+      ImportAs("a.cif", cell + "_symmetry_space_group_name_H-M 'F m -3 m'\n" + sites);
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(AtomsOf(*model), 2u);
+  EXPECT_EQ(ValuesOf(*model, "element"), (std::vector<float>{17, 11}));
+  EXPECT_EQ(ValuesOf(*model, "charge"), (std::vector<float>{-1, 1}));
+  EXPECT_NEAR(model->parts[0].positions[0].y, 2.81, 1e-9);
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"copies by crystal symmetry", 191},
+                                                   {"atoms at alternate locations", 1}}));
+  EXPECT_THAT(ErrorOf("a.cif", "data_a\n" + sites), HasSubstr("without a unit cell"));
+}
+
+TEST_F(Molecules, CifThatIsWrong) {
+  EXPECT_THAT(ErrorOf("a.cif", "hello"), HasSubstr("a CIF file begins with data_"));
+  EXPECT_THAT(ErrorOf("a.cif", "data_a\n_cell_length_a 3\n"), HasSubstr("without coordinates"));
+  EXPECT_THAT(ErrorOf("a.cif", "data_a\n_a.b\n_a.c 3\n"),
+              HasSubstr("line 3 follows the tag _a.b without a value"));
+  EXPECT_THAT(ErrorOf("a.cif", Cif("C C . ALA A 1 0 0 0\n")),
+              HasSubstr("the loop of line 2 has 9 values and 10 tags"));
+  EXPECT_THAT(ErrorOf("a.cif", Cif("C 'C . ALA A 1 0 0 0 1\n")),
+              HasSubstr("line 13 has a quotation mark that is not closed"));
+  EXPECT_THAT(ErrorOf("a.cif", Cif(";C\n")), HasSubstr("line 13 begins a text that does not end"));
+  EXPECT_THAT(ErrorOf("a.cif", Cif("C C . ALA A 1 x y z 1\n")),
+              HasSubstr("has no atom with coordinates"));
+  EXPECT_THAT(ErrorOf("a.cif", Cif("C C . ALA A 1 1e9 0 0 1\n")),
+              HasSubstr("has an atom with the coordinate 1e+09"));
+}
+
+// Chemistry's format: the number of atoms, a comment, an element with its coordinates on each line.
+TEST_F(Molecules, Xyz) {
+  for (const char* comment : {"water", "", "1 2 3", "-76.4"}) {
+    for (const char* name : {"a.xyz", "a.txt"}) {
+      const auto model = ImportAs(
+          name, absl::StrCat(" 3\r\n", comment, "\r\nO 0 0 0.117\r\nH 0 .757 -0.469\r\nH 0 -.757 ",
+                             "-4.69D-01\r\n"));
+      ASSERT_THAT(model, IsOk()) << comment;
+      EXPECT_EQ(model->format, "XYZ molecule");
+      EXPECT_EQ(AtomsOf(*model), 3u);
+      EXPECT_EQ(model->parts[0].indices.size() / 4, 2u);
+      EXPECT_TRUE(model->left_out.empty());
+    }
+  }
+}
+
+TEST_F(Molecules, XyzOfSeveralFramesShowsTheFirst) {
+  const std::string frame = "2\nstep\nC1 0 0 0 0.5\nCl 1.7 0 0 -0.5\n";
+  const auto model = ImportAs("a.xyz", frame + frame + frame + "\ntotal energy\n");
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(AtomsOf(*model), 2u);
+  EXPECT_EQ(ValuesOf(*model, "element"), (std::vector<float>{6, 17}));
+  EXPECT_EQ(ValuesOf(*model, "column 5"), (std::vector<float>{0.5f, -0.5f}));
+  EXPECT_EQ(model->left_out,
+            (std::vector<LeftOut>{{"further models", 2}, {"lines after the last atom", 1}}));
+}
+
+TEST_F(Molecules, XyzByAtomicNumbersAndWithNamedColumns) {
+  const auto numbers = ImportAs("a.xyz", "2\nenergy\n8 0 0 0\n1 0.9 0 0\n");
+  ASSERT_THAT(numbers, IsOk());
+  EXPECT_EQ(ValuesOf(*numbers, "element"), (std::vector<float>{1, 8}));
+  const auto extended = ImportAs(
+      "a.xyz",
+      "1\nLattice=\"1 0 0 0 1 0 0 0 1\" Properties=id:I:1:species:S:1:pos:R:3:forces:R:3 pbc=T\n"
+      "7 Xx 1 2 3 0.1 0.2 0.3\n");
+  ASSERT_THAT(extended, IsOk());
+  EXPECT_THAT(extended->parts.at(0).positions, ElementsAre(Point3{1, 2, 3}));
+  EXPECT_EQ(ValuesOf(*extended, "id"), (std::vector<float>{7}));
+  EXPECT_EQ(ValuesOf(*extended, "forces_3"), (std::vector<float>{0.3f}));
+}
+
+TEST_F(Molecules, PointCloudsAreNotTakenForMolecules) {
+  for (const char* cloud : {"2\n1 2 3 4\n5 6 7 8\n", "1 2 3\n4 5 6\n", "x y z\n1 2 3\n",
+                            "3\n1 2 3 4\n5 6 7 8\n5 6 7 9\n"}) {
+    const auto model = ImportAs("a.xyz", cloud);
+    ASSERT_THAT(model, IsOk()) << cloud;
+    EXPECT_EQ(model->format, "XYZ points");
+  }
+}
+
+TEST_F(Molecules, XyzThatIsWrong) {
+  EXPECT_THAT(ErrorOf("a.xyz", "3\nwater\nO 0 0 0\nH 1 0 0\n"),
+              HasSubstr("announces 3 atoms and ends after 2"));
+  EXPECT_THAT(ErrorOf("a.xyz", "2\nwater\nO 0 0 0\nH 1 zero 0\n"),
+              HasSubstr("line 4 has \"zero\" in column 3"));
+  EXPECT_THAT(ErrorOf("a.xyz", "2\nwater\nO 0 0 0\nH 1 0\n"), HasSubstr("line 4 has 3 columns"));
+  EXPECT_THAT(ErrorOf("a.xyz", "2\nwater\nO 0 0 0\n? 1 0 0\n"),
+              HasSubstr("line 4 begins with \"?\""));
+  EXPECT_THAT(ErrorOf("a.xyz", "2\nwater\nO 0 0 0\nO nan 0 0\n"),
+              HasSubstr("line 4 has \"nan\" in column 2"));
+}
+
+// Bonds are found by a grid: 100,000 atoms take a fraction of a second.
+TEST_F(Molecules, LargeOnesAreQuick) {
+  std::string rows;
+  for (int i = 0; i < 100'000; ++i)
+    absl::StrAppend(&rows, "C C . LIG A ", i, " ", 1.5 * (i % 50), " ", 1.5 * (i / 50 % 50), " ",
+                    1.5 * (i / 2500), " 1\n");
+  const absl::Time begin = absl::Now();
+  const auto model = ImportAs("a.cif", Cif(rows));
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(AtomsOf(*model), 100'000u);
+  // A grid of 50 by 50 by 40 atoms: 49·50·40 + 50·49·40 + 50·50·39 edges.
+  EXPECT_EQ(model->parts[0].indices.size() / 4, 293'500u);
+  EXPECT_LT(absl::Now() - begin, absl::Seconds(10));
 }
 
 TEST_F(Molecules, BallsStayWithinTheDisplay) {

@@ -27,7 +27,7 @@ std::vector<std::pair<Point3, Point3>> Segments(const Part& part) {
 absl::StatusOr<Model> ImportText(const std::string& text, bool globe,
                                  const std::string& name = "map.geojson") {
   TempFolder folder;
-  return ReadHere(folder.Write(name, text), {.globe = globe});
+  return ReadHere(folder.Write(name, text), {.globe = globe, .attributes = true});
 }
 
 std::string Line(const std::string& coordinates) {
@@ -69,6 +69,88 @@ TEST(GeoJson, GeometriesWithoutCoordinatesAreCounted) {
   EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"geometries without coordinates", 7}}));
 }
 
+std::vector<float> ValuesOf(const Part& part, const std::string& name) {
+  for (const Attribute& one : part.attributes) {
+    if (one.name == name) return one.values;
+  }
+  return {};
+}
+
+std::string Feature(const std::string& properties, const std::string& geometry) {
+  return R"({"type":"Feature","properties":)" + properties + R"(,"geometry":)" + geometry + "}";
+}
+std::string Collection(const std::string& features) {
+  return R"({"type":"FeatureCollection","features":[)" + features + "]}";
+}
+
+// simplestyle 1.1.0: colours are #rgb or #rrggbb, also without the mark; opacities are 0 to 1.
+TEST(GeoJson, ColoursOfSimplestyle) {
+  const std::string point = R"({"type":"Point","coordinates":[1,2]})";
+  const std::string area = R"({"type":"Polygon","coordinates":[[[0,0],[4,0],[0,4],[0,0]]]})";
+  const absl::StatusOr<Model> model = ImportText(
+      Collection(Feature(R"({"stroke":"#f00"})", Line("[[0,0],[1,0]]")) + "," +
+                 Feature(R"({"stroke":"00ff00","stroke-opacity":0.5})", Line("[[0,1],[1,1]]")) +
+                 "," + Feature(R"({"stroke":"RebeccaPurple"})", Line("[[0,2],[1,2]]")) + "," +
+                 Feature("null", Line("[[0,3],[1,3]]")) + "," +
+                 Feature(R"({"stroke":"no colour"})", Line("[[0,4],[1,4]]")) + "," +
+                 Feature(R"({"fill":"blue","fill-opacity":0.2,"stroke":"#ffffff"})", area) + "," +
+                 Feature(R"({"fill":"blue"})", area) + "," +
+                 Feature(R"({"marker-color":"#123456","marker-symbol":"bus"})", point)),
+      false);
+  ASSERT_THAT(model, IsOk());
+  ASSERT_EQ(model->parts.size(), 2u);
+  const std::vector<Rgb>& colors = model->parts[0].colors;
+  const std::vector<Rgb> expected = {{255, 0, 0},     {0, 128, 0},     {0x66, 0x33, 0x99},
+                                     {255, 255, 255}, {255, 255, 255}, {255, 255, 255},
+                                     {255, 255, 255}, {0, 0, 255},     {0, 0, 255}};
+  ASSERT_EQ(colors.size(), 18u);  // 5 lines of two ends, two areas of four corners
+  for (size_t i = 0; i < 9; ++i) EXPECT_EQ(colors[2 * i], expected[i]) << i;
+  EXPECT_THAT(model->parts[1].colors, ElementsAre(Rgb{0x12, 0x34, 0x56}));
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"colours that are not colours", 1},
+                                                   {"fills of areas", 2},
+                                                   {"symbols of points", 1}}));
+}
+
+TEST(GeoJson, MapsWithoutColoursHaveNone) {
+  const absl::StatusOr<Model> model =
+      ImportText(Feature(R"({"name":"red"})", Line("[[0,0],[1,0]]")), false);
+  ASSERT_THAT(model, IsOk());
+  EXPECT_TRUE(model->parts.at(0).colors.empty());
+  EXPECT_TRUE(model->parts.at(0).attributes.empty());
+}
+
+TEST(GeoJson, NumbersOfFeaturesAreAttributes) {
+  const absl::StatusOr<Model> model = ImportText(
+      Collection(Feature(R"({"pop":5,"name":"a","mixed":1,"yes":true,"none":null})",
+                         Line("[[0,0],[1,0]]")) +
+                 "," + Feature(R"({"pop":7.5,"mixed":"two"})", Line("[[0,1],[1,1]]")) + "," +
+                 Feature(R"({"pop":1})", R"({"type":"Point","coordinates":[1,2,30]})")),
+      true);
+  ASSERT_THAT(model, IsOk());
+  EXPECT_THAT(ValuesOf(model->parts[0], "pop"), ElementsAre(5.f, 5.f, 7.5f, 7.5f));
+  EXPECT_THAT(ValuesOf(model->parts[0], "mixed"),
+              ElementsAre(1.f, 1.f, testing::IsNan(), testing::IsNan()));
+  EXPECT_TRUE(ValuesOf(model->parts[0], "name").empty());
+  EXPECT_TRUE(ValuesOf(model->parts[0], "yes").empty());
+  EXPECT_THAT(ValuesOf(model->parts[1], "pop"), ElementsAre(1.f));
+  EXPECT_THAT(ValuesOf(model->parts[1], "height"), ElementsAre(30.f));
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"heights", 1}}));
+}
+
+TEST(TopoJson, ColoursAndNumbersOfTheFirstThatHasAnArc) {
+  const absl::StatusOr<Model> model =
+      ImportText(R"({"type":"Topology","objects":{"a":{"type":"GeometryCollection","geometries":[)"
+                 R"({"type":"LineString","arcs":[0],"properties":{"stroke":"#f00","n":1}},)"
+                 R"({"type":"LineString","arcs":[0,1],"properties":{"stroke":"#0f0","n":2}},)"
+                 R"({"type":null}]}},"arcs":[[[0,0],[1,0]],[[1,0],[2,0]]]})",
+                 false, "map.topojson");
+  ASSERT_THAT(model, IsOk());
+  EXPECT_THAT(model->parts[0].colors,
+              ElementsAre(Rgb{255, 0, 0}, Rgb{255, 0, 0}, Rgb{0, 255, 0}, Rgb{0, 255, 0}));
+  EXPECT_THAT(ValuesOf(model->parts[0], "n"), ElementsAre(1.f, 1.f, 2.f, 2.f));
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"geometries without coordinates", 1}}));
+}
+
 TEST(TopoJson, AnArcOfOnePositionIsNotShown) {
   const absl::StatusOr<Model> model = ImportText(
       R"({"type":"Topology","objects":{"a":{"type":"MultiLineString","arcs":[[0],[1]]}},)"
@@ -93,6 +175,38 @@ TEST(GeoJson, FlatLineOverTheDateLineIsSplit) {
   EXPECT_THAT(Segments(model->parts[0]),
               ElementsAre(std::pair(Point3{170, 0, 0}, Point3{180, 5, 0}),
                           std::pair(Point3{-180, 5, 0}, Point3{-170, 10, 0})));
+}
+
+TEST(GeoJson, LinesOverTheDateLineOfOtherSpellings) {
+  const auto segments = [](const std::string& coordinates) {
+    const absl::StatusOr<Model> model = ImportText(Line(coordinates), false);
+    EXPECT_THAT(model, IsOk());
+    return model.ok() ? Segments(model->parts[0]) : std::vector<std::pair<Point3, Point3>>();
+  };
+  // Westward, through the cut itself, and along it.
+  EXPECT_THAT(segments("[[-170,10],[170,0]]"),
+              ElementsAre(std::pair(Point3{-170, 10, 0}, Point3{-180, 5, 0}),
+                          std::pair(Point3{180, 5, 0}, Point3{170, 0, 0})));
+  EXPECT_THAT(segments("[[170,0],[180,5],[-180,5],[-170,10]]"),
+              ElementsAre(std::pair(Point3{170, 0, 0}, Point3{180, 5, 0}),
+                          std::pair(Point3{-180, 5, 0}, Point3{-170, 10, 0})));
+  EXPECT_EQ(segments("[[180,-10],[180,10]]").size(), 1u);
+  // Longitudes from 0 to 360: the map is cut at Greenwich.
+  EXPECT_THAT(segments("[[350,0],[10,10],[190,10]]"),
+              ElementsAre(std::pair(Point3{350, 0, 0}, Point3{360, 5, 0}),
+                          std::pair(Point3{0, 5, 0}, Point3{10, 10, 0}),
+                          std::pair(Point3{10, 10, 0}, Point3{190, 10, 0})));
+  // Longitudes that count on beyond 180 say themselves which way they go.
+  EXPECT_EQ(segments("[[-10,0],[190,0]]").size(), 1u);
+}
+
+// The first line alone could be degrees.
+TEST(GeoJson, AProjectedMapIsKnownByAllItsLines) {
+  const absl::StatusOr<Model> model = ImportText(
+      R"({"type":"MultiLineString","coordinates":[[[-150,0],[150,10]],[[0,0],[500000,20]]]})",
+      false);
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(Segments(model->parts[0]).size(), 2u);
 }
 
 TEST(GeoJson, ProjectedMapsAreNotSplit) {

@@ -1,11 +1,14 @@
 #include "tools/voxelctl/import/geojson.h"
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
+#include "common/text/color_names.h"
 #include "common/text/printable.h"
 #include "tools/voxelctl/import/map_lines.h"
 
@@ -14,16 +17,16 @@ namespace {
 
 using nlohmann::json;
 
+constexpr char kNowhere[] = "geometries without coordinates";
+
 // Depth of what it walks is bounded by ParseJson.
 class GeoJsonReader {
  public:
-  GeoJsonReader(const SourceFile& file, bool globe) : file_(file), lines_(file, globe) {}
+  GeoJsonReader(const SourceFile& file, bool globe, bool attributes)
+      : file_(file), lines_(file, globe, attributes) {}
 
   absl::Status ReadObject(const json& object, const std::string& where);
-  absl::Status Finish(Model* model) && {
-    AddLeftOut("geometries without coordinates", nowhere_, model);
-    return std::move(lines_).Finish("GeoJSON", model);
-  }
+  absl::Status Finish(Model* model) && { return std::move(lines_).Finish("GeoJSON", model); }
 
  private:
   absl::Status Wrong(const std::string& where, absl::string_view expected) const {
@@ -37,7 +40,6 @@ class GeoJsonReader {
 
   const SourceFile& file_;
   MapLines lines_;
-  uint64_t nowhere_ = 0;  // geometries that are null or empty
 };
 
 absl::Status GeoJsonReader::ReadPosition(const json& position, const std::string& where,
@@ -47,6 +49,7 @@ absl::Status GeoJsonReader::ReadPosition(const json& position, const std::string
     return Wrong(where, "a position [longitude, latitude]");
   }
   *out = {position[0].get<double>(), position[1].get<double>()};
+  if (position.size() > 2 && position[2].is_number()) out->height = position[2].get<double>();
   return absl::OkStatus();
 }
 
@@ -110,8 +113,10 @@ absl::Status GeoJsonReader::ReadObject(const json& object, const std::string& wh
     const auto geometry = object.find("geometry");
     if (geometry == object.end())
       return Wrong(absl::StrCat(where, ".geometry"), "a geometry or null");
+    const auto properties = object.find("properties");
+    lines_.BeginFeature(FeatureOf(properties == object.end() ? nullptr : &*properties, &lines_));
     if (!geometry->is_null()) return ReadObject(*geometry, absl::StrCat(where, ".geometry"));
-    ++nowhere_;
+    lines_.LeaveOut(kNowhere);
     return absl::OkStatus();
   }
   for (const Shape& shape : kShapes) {
@@ -121,7 +126,7 @@ absl::Status GeoJsonReader::ReadObject(const json& object, const std::string& wh
     if (coordinates == object.end()) return Wrong(at, "an array");
     // RFC 7946, 3.1: an empty array means the same as null.
     if (coordinates->is_array() && coordinates->empty()) {
-      ++nowhere_;
+      lines_.LeaveOut(kNowhere);
       return absl::OkStatus();
     }
     return ReadCoordinates(*coordinates, at, shape.depth, shape.closed, shape.points);
@@ -133,8 +138,43 @@ absl::Status GeoJsonReader::ReadObject(const json& object, const std::string& wh
 
 }  // namespace
 
-absl::StatusOr<Model> ReadGeoJson(const SourceFile& file, const json& document, bool globe) {
-  GeoJsonReader reader(file, globe);
+MapFeature FeatureOf(const json* properties, MapLines* lines) {
+  MapFeature feature;
+  if (properties == nullptr || !properties->is_object()) return feature;
+  const auto color = [&](const char* key, const char* opacity) -> std::optional<Rgb> {
+    const auto found = properties->find(key);
+    if (found == properties->end() || !found->is_string()) return std::nullopt;
+    // simplestyle allows #rgb without its mark.
+    const std::string& text = found->get_ref<const std::string&>();
+    std::optional<uint32_t> parsed = ParseColor(text);
+    if (!parsed) parsed = ParseColor("#" + text);
+    if (!parsed) {
+      if (!text.empty()) lines->LeaveOut("colours that are not colours");
+      return std::nullopt;
+    }
+    const Rgb rgb = {static_cast<uint8_t>(*parsed >> 16), static_cast<uint8_t>(*parsed >> 8),
+                     static_cast<uint8_t>(*parsed)};
+    const auto share = properties->find(opacity);
+    return share != properties->end() && share->is_number() ? WithOpacity(rgb, share->get<double>())
+                                                            : rgb;
+  };
+  const std::optional<Rgb> fill = color("fill", "fill-opacity");
+  feature.line = color("stroke", "stroke-opacity");
+  if (!feature.line) feature.line = fill;
+  feature.point = color("marker-color", "marker-opacity");
+  if (fill) lines->LeaveOut("fills of areas");
+  const auto symbol = properties->find("marker-symbol");
+  if (symbol != properties->end() && symbol->is_string() && *symbol != "")
+    lines->LeaveOut("symbols of points");
+  for (const auto& [name, value] : properties->items()) {
+    if (value.is_number()) feature.numbers.emplace_back(name, value.get<double>());
+  }
+  return feature;
+}
+
+absl::StatusOr<Model> ReadGeoJson(const SourceFile& file, const json& document, bool globe,
+                                  bool attributes) {
+  GeoJsonReader reader(file, globe, attributes);
   absl::Status status = reader.ReadObject(document, "document");
   if (!status.ok()) return status;
   Model model;

@@ -13,6 +13,7 @@
 #include "tools/voxelctl/import/import_program.h"
 #include "tools/voxelctl/import/importer.h"
 #include "tools/voxelctl/import/json_text.h"
+#include "tools/voxelctl/import/molecule.h"
 #include "tools/voxelctl/import/ply_header.h"
 #include "tools/voxelctl/import/ply_mesh.h"
 #include "tools/voxelctl/import/ply_points.h"
@@ -25,15 +26,15 @@
 namespace voxeld::voxelctl {
 namespace {
 
-absl::StatusOr<Model> ReadMap(const SourceFile& file, bool globe) {
+absl::StatusOr<Model> ReadMap(const SourceFile& file, bool globe, bool attributes) {
   const absl::StatusOr<nlohmann::json> document = ParseJson(file, file.bytes);
   if (!document.ok()) return document.status();
   const auto type = document->is_object() ? document->find("type") : document->end();
   if (!document->is_object() || type == document->end() || !type->is_string()) {
     return FileError(file, "is JSON without a \"type\"", "GeoJSON or TopoJSON is expected");
   }
-  return *type == "Topology" ? ReadTopoJson(file, *document, globe)
-                             : ReadGeoJson(file, *document, globe);
+  return *type == "Topology" ? ReadTopoJson(file, *document, globe, attributes)
+                             : ReadGeoJson(file, *document, globe, attributes);
 }
 
 absl::StatusOr<Model> ReadPly(const SourceFile& file, bool attributes) {
@@ -165,7 +166,9 @@ absl::StatusOr<Model> ReadOwnFormat(const SourceFile& file, const ImportOptions&
   if (extension == "stl") return ReadStlMesh(file);
   if (extension == "vox") return ReadVoxModel(file);
   if (extension == "json" || extension == "geojson" || extension == "topojson")
-    return ReadMap(file, options.globe);
+    return ReadMap(file, options.globe, options.attributes);
+  // Chemistry and surveyors use the same extension.
+  if (IsXyzMolecule(file.bytes)) return ReadXyzMolecule(file, options.style, options.attributes);
   return ReadTextPoints(file, options.attributes);
 }
 

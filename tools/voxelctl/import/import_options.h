@@ -25,8 +25,8 @@ struct ImportOptions {
   bool globe = false;  // longitude and latitude of maps go on a sphere; other files ignore it
   std::optional<RawLayout> raw;
   MoleculeStyle style = MoleculeStyle::kBalls;
-  bool attributes =
-      false;  // clouds and meshes keep the numbers of their points that are neither place, normal nor colour
+  // Points, atoms and vertices keep their numbers that are neither place, normal nor colour.
+  bool attributes = false;
   uint32_t pixels = 512;  // of the longer side of drawings
   OtherFiles other_files = OtherFiles::kBelow;
 };

@@ -2,8 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
+#include <map>
+#include <optional>
 #include <span>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "tools/voxelctl/import/model.h"
@@ -14,8 +20,18 @@ namespace voxeld::voxelctl {
 // Degrees on a globe; any units on a flat map.
 struct LonLat {
   double lon = 0, lat = 0;
-  bool operator==(const LonLat&) const = default;
+  double height = std::numeric_limits<double>::quiet_NaN();  // none
+  bool operator==(const LonLat& other) const { return lon == other.lon && lat == other.lat; }
 };
+
+// What the lines and points of a feature have in common.
+struct MapFeature {
+  std::optional<Rgb> line, point;                       // colours
+  std::vector<std::pair<std::string, double>> numbers;  // properties by which it can be coloured
+};
+
+// Returns: `color`, as much darker as it is transparent: light cannot be seen through.
+Rgb WithOpacity(Rgb color, double opacity);
 
 // Collects the lines and points of one map.
 //
@@ -23,11 +39,16 @@ struct LonLat {
 // follow the sphere in steps of at most 2°; those that run along the cut at ±180° or lie in a pole
 // belong to the paper, not the Earth, and are left out. An edge longer than 180° in longitude goes
 // the short way round. Flat: x to the right, y up, in the map's own units. If the map is in
-// degrees, an edge longer than 180° is split at the cut.
+// degrees, an edge longer than 180° is split at the cut, which is at 360° if no longitude is negative and one is beyond 180°.
 class MapLines {
  public:
-  // `file` must outlive it.
-  MapLines(const SourceFile& file, bool globe) : file_(file), globe_(globe) {}
+  // `file` must outlive it. Without `attributes` the model has none.
+  MapLines(const SourceFile& file, bool globe, bool attributes)
+      : file_(file), globe_(globe), attributes_(attributes) {}
+
+  // What is added from here on belongs to `feature`. Returns: a number for ResumeFeature.
+  uint32_t BeginFeature(const MapFeature& feature);
+  void ResumeFeature(uint32_t number) { feature_ = number; }
 
   // One strip, or a loop if `closed`: its last point goes on to its first.
   // InvalidArgument if a coordinate is not finite, or no longitude and latitude on a globe,
@@ -35,19 +56,50 @@ class MapLines {
   absl::Status AddLine(std::span<const LonLat> line, bool closed);
   absl::Status AddPoint(LonLat point);
 
-  // InvalidArgument if nothing was added.
+  // Counts what the map has and the model does not show.
+  void LeaveOut(std::string_view kind, uint64_t count = 1) { AddLeftOut(kind, count, &counted_); }
+
+  // A colour for each vertex if any feature has one, white for the others; an attribute for each property that is a number in any
+  // feature, and "height" if any is not 0; the heights are counted, since no line is drawn above the map. InvalidArgument if nothing
+  // was added.
   absl::Status Finish(std::string format, Model* model) &&;
 
  private:
+  // Lines are drawn when all are known: where the map is cut depends on all.
+  struct Line {
+    size_t begin = 0, end = 0;  // of corners_
+    uint32_t feature = 0;
+    bool closed = false;
+  };
+
   absl::Status Check(std::span<const LonLat> points);
+  void Draw(const Line& line);
   void AddEdge(LonLat from, LonLat to);
   uint32_t AddVertex(LonLat point);
+  void AddFeatures(const std::vector<uint32_t>& features, std::vector<float> heights, bool points,
+                   Part* part);
 
   const SourceFile& file_;
-  bool globe_;
-  bool degrees_ = true;  // as long as every coordinate could be degrees
+  bool globe_, attributes_;
+  double least_lon_ = 0, most_lon_ = 0, most_lat_ = 0;  // the last without its sign
+  std::optional<double> cut_;                           // longitude of the map's right edge
+  std::vector<LonLat> corners_;
+  std::vector<Line> to_draw_;
+  struct Feature {
+    std::optional<Rgb> line, point;
+    size_t begin = 0, end = 0;  // of numbers_
+  };
+  std::vector<Feature> features_ = {Feature()};
+  std::vector<std::string> names_;                        // of properties
+  std::map<std::string, uint32_t> name_numbers_;          // indices of names_
+  std::vector<std::pair<uint32_t, float>> numbers_;       // name and value
+  std::vector<uint32_t> line_features_, point_features_;  // of each vertex
+  std::vector<float> line_heights_, point_heights_;       // of each vertex
+  uint64_t heights_ = 0;                                  // that are not 0
+  uint32_t feature_ = 0;
   Part lines_{.kind = Kind::kSegments};
   Part points_{.kind = Kind::kPoints};
+  Model counted_;
   LonLat last_;  // the vertex that ended the edge before
   bool has_last_ = false;
 };

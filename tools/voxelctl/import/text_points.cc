@@ -242,26 +242,9 @@ Columns ByComment(absl::string_view comment, char mark, size_t count) {
   return {};
 }
 
-// Returns true for chemistry's XYZ format: the number of atoms, a comment, then an element and its coordinates on each line.
-bool IsMolecule(absl::string_view text) {
-  const std::vector<absl::string_view> lines = absl::StrSplit(text, absl::MaxSplits('\n', 3));
-  if (lines.size() < 3) return false;
-  uint64_t count = 0;
-  if (!absl::SimpleAtoi(absl::StripAsciiWhitespace(lines[0]), &count)) return false;
-  const Words atom = SplitAt(absl::StripAsciiWhitespace(lines[2]), ' ');
-  return atom.size() >= 4 && atom[0].size() <= 2 &&
-         std::ranges::all_of(
-             atom[0], [](char c) { return absl::ascii_isalpha(static_cast<unsigned char>(c)); }) &&
-         Number(atom[1]) && Number(atom[2]) && Number(atom[3]);
-}
-
 // What the columns are, having read the lines that are no points yet; the first point's line is in `first`.
 absl::StatusOr<Columns> ReadHead(const SourceFile& file, char mark, Lines* lines,
                                  absl::string_view* first) {
-  if (IsMolecule(file.bytes)) {
-    return FileError(file, "is a molecule (chemistry's XYZ format)",
-                     "a .xyz file of points, or a molecule as .pdb, is expected");
-  }
   if (!lines->Next(first))
     return FileError(file, "holds no line of numbers", "x y z a line is expected");
   Words words = SplitAt(*first, mark);

@@ -14,9 +14,12 @@ namespace {
 
 using nlohmann::json;
 
+constexpr uint32_t kNobody = UINT32_MAX;
+
 class TopoJsonReader {
  public:
-  TopoJsonReader(const SourceFile& file, bool globe) : file_(file), lines_(file, globe) {}
+  TopoJsonReader(const SourceFile& file, bool globe, bool attributes)
+      : file_(file), lines_(file, globe, attributes) {}
 
   absl::StatusOr<Model> Read(const json& document);
 
@@ -28,7 +31,7 @@ class TopoJsonReader {
   absl::Status ReadPair(const json& value, const std::string& where,
                         std::array<double, 2>* out) const;
   absl::Status ReadTransform(const json& document);
-  absl::Status MarkArcs(const json& arcs, const std::string& where);
+  absl::Status MarkArcs(const json& arcs, const std::string& where, uint32_t feature);
   absl::Status ReadPoints(const json& coordinates, const std::string& where);
   absl::Status ReadGeometry(const json& geometry, const std::string& where);
   absl::Status DrawArc(const json& arc, const std::string& where);
@@ -39,10 +42,9 @@ class TopoJsonReader {
 
   const SourceFile& file_;
   MapLines lines_;
-  uint64_t collapsed_ = 0;  // arcs of one position
   bool quantized_ = false;  // has a transform, so arcs are deltas
   std::array<double, 2> scale_ = {1, 1}, translate_ = {0, 0};
-  std::vector<bool> used_;  // arcs that some object refers to
+  std::vector<uint32_t> users_;  // the feature that first refers to each arc, or kNobody
 };
 
 absl::Status TopoJsonReader::ReadPair(const json& value, const std::string& where,
@@ -69,10 +71,11 @@ absl::Status TopoJsonReader::ReadTransform(const json& document) {
 
 // Arcs nest to any depth: a line's are numbers, a polygon's are arrays of them, and so on. ~i is
 // arc i backwards.
-absl::Status TopoJsonReader::MarkArcs(const json& arcs, const std::string& where) {
+absl::Status TopoJsonReader::MarkArcs(const json& arcs, const std::string& where,
+                                      uint32_t feature) {
   if (arcs.is_array()) {
     for (const json& item : arcs) {
-      absl::Status status = MarkArcs(item, where);
+      absl::Status status = MarkArcs(item, where, feature);
       if (!status.ok()) return status;
     }
     return absl::OkStatus();
@@ -80,11 +83,12 @@ absl::Status TopoJsonReader::MarkArcs(const json& arcs, const std::string& where
   if (!arcs.is_number_integer()) return Wrong(where, "an array of arc numbers");
   const int64_t number = arcs.get<int64_t>();
   const int64_t index = number < 0 ? ~number : number;
-  if (index < 0 || static_cast<uint64_t>(index) >= used_.size()) {
+  if (index < 0 || static_cast<uint64_t>(index) >= users_.size()) {
     return FileError(file_, absl::StrCat(where, " refers to arc ", number),
-                     absl::StrCat("there are ", used_.size(), " arcs, counted from 0"));
+                     absl::StrCat("there are ", users_.size(), " arcs, counted from 0"));
   }
-  used_[static_cast<size_t>(index)] = true;
+  uint32_t& user = users_[static_cast<size_t>(index)];
+  if (user == kNobody) user = feature;
   return absl::OkStatus();
 }
 
@@ -106,7 +110,10 @@ absl::Status TopoJsonReader::ReadPoints(const json& coordinates, const std::stri
 absl::Status TopoJsonReader::ReadGeometry(const json& geometry, const std::string& where) {
   if (!geometry.is_object()) return Wrong(where, "an object");
   const auto type = geometry.find("type");
-  if (type == geometry.end() || type->is_null()) return absl::OkStatus();  // a null geometry
+  if (type == geometry.end() || type->is_null()) {
+    lines_.LeaveOut("geometries without coordinates");
+    return absl::OkStatus();
+  }
   const auto member = [&](const char* key) -> const json* {
     const auto it = geometry.find(key);
     return it == geometry.end() ? nullptr : &*it;
@@ -122,6 +129,7 @@ absl::Status TopoJsonReader::ReadGeometry(const json& geometry, const std::strin
     }
     return absl::OkStatus();
   }
+  const uint32_t feature = lines_.BeginFeature(FeatureOf(member("properties"), &lines_));
   if (*type == "Point" || *type == "MultiPoint") {
     const json* coordinates = member("coordinates");
     const std::string at = absl::StrCat(where, ".coordinates");
@@ -131,7 +139,8 @@ absl::Status TopoJsonReader::ReadGeometry(const json& geometry, const std::strin
       *type == "MultiPolygon") {
     const json* arcs = member("arcs");
     const std::string at = absl::StrCat(where, ".arcs");
-    return arcs == nullptr || !arcs->is_array() ? Wrong(at, "an array") : MarkArcs(*arcs, at);
+    return arcs == nullptr || !arcs->is_array() ? Wrong(at, "an array")
+                                                : MarkArcs(*arcs, at, feature);
   }
   return FileError(
       file_,
@@ -141,7 +150,7 @@ absl::Status TopoJsonReader::ReadGeometry(const json& geometry, const std::strin
 
 absl::Status TopoJsonReader::DrawArc(const json& arc, const std::string& where) {
   if (!arc.is_array() || arc.empty()) return Wrong(where, "an array of positions");
-  if (arc.size() == 1) ++collapsed_;  // Simplification leaves such arcs.
+  if (arc.size() == 1) lines_.LeaveOut("arcs of one position");  // simplification leaves such arcs
   std::vector<LonLat> line(arc.size());
   std::array<double, 2> at{};
   for (size_t i = 0; i < line.size(); ++i) {
@@ -161,18 +170,18 @@ absl::StatusOr<Model> TopoJsonReader::Read(const json& document) {
   if (objects == document.end() || !objects->is_object()) return Wrong("objects", "an object");
   absl::Status status = ReadTransform(document);
   if (!status.ok()) return status;
-  used_.assign(arcs->size(), false);
+  users_.assign(arcs->size(), kNobody);
   for (const auto& [name, geometry] : objects->items()) {
     status = ReadGeometry(geometry, absl::StrCat("objects.", EscapeForTerminal(name)));
     if (!status.ok()) return status;
   }
-  for (size_t i = 0; i < used_.size(); ++i) {
-    if (!used_[i]) continue;
+  for (size_t i = 0; i < users_.size(); ++i) {
+    if (users_[i] == kNobody) continue;
+    lines_.ResumeFeature(users_[i]);
     status = DrawArc((*arcs)[i], absl::StrCat("arcs[", i, "]"));
     if (!status.ok()) return status;
   }
   Model model;
-  AddLeftOut("arcs of one position", collapsed_, &model);
   status = std::move(lines_).Finish("TopoJSON", &model);
   if (!status.ok()) return status;
   return model;
@@ -180,8 +189,9 @@ absl::StatusOr<Model> TopoJsonReader::Read(const json& document) {
 
 }  // namespace
 
-absl::StatusOr<Model> ReadTopoJson(const SourceFile& file, const json& document, bool globe) {
-  return TopoJsonReader(file, globe).Read(document);
+absl::StatusOr<Model> ReadTopoJson(const SourceFile& file, const json& document, bool globe,
+                                   bool attributes) {
+  return TopoJsonReader(file, globe, attributes).Read(document);
 }
 
 }  // namespace voxeld::voxelctl

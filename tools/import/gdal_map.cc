@@ -1,0 +1,437 @@
+#include "tools/import/gdal_map.h"
+
+#include <cpl_conv.h>
+#include <cpl_error.h>
+#include <cpl_vsi.h>
+#include <ogr_featurestyle.h>
+#include <ogr_spatialref.h>
+#include <ogr_srs_api.h>
+#include <ogrsf_frmts.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
+#include <iterator>
+#include <memory>
+#include <new>
+#include <optional>
+#include <utility>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
+#include "tools/import/nesting.h"
+#include "tools/voxelctl/import/map_lines.h"
+
+namespace voxeld::voxelctl {
+namespace {
+
+constexpr char kProjFolder[] = "/usr/share/proj";
+constexpr char kFolder[] = "/vsimem/map/";
+constexpr int kDeepest = 100;
+// Fields that LIBKML makes of what is not data.
+constexpr absl::string_view kNoData[] = {"Name",       "description",  "timestamp",  "begin",
+                                         "end",        "altitudeMode", "tessellate", "extrude",
+                                         "visibility", "drawOrder",    "icon",       "snippet"};
+
+// Environment variables are GDAL's and PROJ's configuration, too.
+void ForgetEnvironment() {
+  std::vector<std::string> names;
+  for (char** one = environ; one != nullptr && *one != nullptr; ++one) {
+    const std::string name(*one, std::string(*one).find('='));
+    for (const char* prefix : {"GDAL_", "OGR_", "OSR_", "CPL_", "VSI", "PROJ_", "SHAPE_", "GPX_",
+                               "LIBKML_", "KML_", "DBF_"}) {
+      if (absl::StartsWith(name, prefix)) names.push_back(name);
+    }
+  }
+  for (const std::string& name : names) ::unsetenv(name.c_str());
+}
+
+// Once in a process.
+void PrepareGdal() {
+  static const bool kDone = [] {
+    ForgetEnvironment();
+    CPLSetConfigOption("GDAL_CONFIG_FILE", "");
+    CPLSetConfigOption("GDAL_DRIVER_PATH", "disable");
+    CPLSetConfigOption("GDAL_NUM_THREADS", "1");
+    CPLSetConfigOption("SHAPE_RESTORE_SHX", "YES");
+    CPLSetConfigOption("GPX_ELE_AS_25D", "YES");
+    CPLSetConfigOption("LIBKML_RESOLVE_STYLE", "YES");
+    RegisterOGRShape();
+    RegisterOGRGPX();
+    RegisterOGRLIBKML();
+    const char* const folders[] = {kProjFolder, nullptr};
+    OSRSetPROJSearchPaths(folders);
+    OSRSetPROJEnableNetwork(false);
+    return true;
+  }();
+  (void)kDone;
+}
+
+// While it lives, errors are kept for LastError and not printed.
+class QuietErrors {
+ public:
+  QuietErrors() {
+    CPLPushErrorHandler(CPLQuietErrorHandler);
+    CPLErrorReset();
+  }
+  ~QuietErrors() { CPLPopErrorHandler(); }
+  QuietErrors(const QuietErrors&) = delete;
+  QuietErrors& operator=(const QuietErrors&) = delete;
+};
+
+// What GDAL said last, without its names of files in memory.
+std::string LastError() {
+  std::string text = CPLGetLastErrorMsg();
+  for (size_t at; (at = text.find(kFolder)) != std::string::npos;)
+    text.erase(at, sizeof(kFolder) - 1);
+  absl::StripAsciiWhitespace(&text);
+  return EscapeForTerminal(text.substr(0, 200));
+}
+
+// Files in GDAL's memory, which lie there without a copy.
+class FilesInMemory {
+ public:
+  FilesInMemory() = default;
+  FilesInMemory(const FilesInMemory&) = delete;
+  FilesInMemory& operator=(const FilesInMemory&) = delete;
+  ~FilesInMemory() { VSIRmdirRecursive("/vsimem/map"); }
+
+  // `bytes` must outlive this.
+  std::string Add(const std::string& extension, const std::string& bytes) {
+    std::string name = absl::StrCat(kFolder, "map.", extension);
+    // GDAL opens it for reading only.
+    auto* const data = reinterpret_cast<GByte*>(const_cast<char*>(bytes.data()));
+    VSILFILE* const opened = VSIFileFromMemBuffer(name.c_str(), data, bytes.size(), FALSE);
+    if (opened != nullptr) VSIFCloseL(opened);
+    return name;
+  }
+};
+
+uint64_t CountElements(absl::string_view text, absl::string_view name) {
+  uint64_t count = 0;
+  const std::string begin = absl::StrCat("<", name);
+  for (size_t at = text.find(begin); at != absl::string_view::npos; at = text.find(begin, at + 1)) {
+    const size_t next = at + begin.size();
+    if (next < text.size() && (text[next] == '>' || text[next] == '/' ||
+                               absl::ascii_isspace(static_cast<unsigned char>(text[next]))))
+      ++count;
+  }
+  return count;
+}
+
+// Old files begin with a folder, document or placemark, which LIBKML expects within <kml>. Returns: the text in which it is; empty if
+// `text` begins otherwise.
+std::string WithRoot(absl::string_view text) {
+  size_t at = 0;
+  for (;;) {
+    at = text.find('<', at);
+    if (at == absl::string_view::npos) return "";
+    const absl::string_view rest = text.substr(at);
+    const char* const end = absl::StartsWith(rest, "<!--") ? "-->"
+                            : absl::StartsWith(rest, "<?") ? "?>"
+                                                           : nullptr;
+    if (end == nullptr) break;
+    at = text.find(end, at);
+    if (at == absl::string_view::npos) return "";
+  }
+  const absl::string_view root = text.substr(at);
+  for (const char* name : {"<Folder", "<Document", "<Placemark"}) {
+    if (absl::StartsWith(root, name)) {
+      return absl::StrCat(text.substr(0, at), "<kml xmlns=\"http://www.opengis.net/kml/2.2\">",
+                          root, "</kml>");
+    }
+  }
+  return "";
+}
+
+class GdalMapReader {
+ public:
+  GdalMapReader(const SourceFile& file, bool globe, bool attributes)
+      : file_(file), globe_(globe), lines_(file, globe, attributes) {}
+
+  absl::StatusOr<Model> Read();
+
+ private:
+  absl::Status ReadLayer(OGRLayer* layer);
+  absl::Status ReadFeature(const OGRFeature& feature);
+  absl::Status PrepareTransformation(OGRLayer* layer);
+  MapFeature StyleOf(const OGRFeature& feature);
+  void AddNumbers(const OGRFeature& feature, MapFeature* style) const;
+  absl::Status Draw(const OGRGeometry& geometry);
+  absl::Status DrawLine(const OGRSimpleCurve& line, bool closed);
+  void CountElementsOfKml();
+
+  const SourceFile& file_;
+  const bool globe_;
+  MapLines lines_;
+  std::vector<SourceFile> beside_;
+  std::unique_ptr<OGRCoordinateTransformation> to_degrees_;
+};
+
+bool IsHidden(const OGRFeature& feature) {
+  const int field = feature.GetFieldIndex("visibility");
+  return field >= 0 && feature.IsFieldSetAndNotNull(field) && feature.GetFieldAsInteger(field) == 0;
+}
+
+// A picture on the ground, of which LIBKML has the outline.
+bool IsOverlay(const OGRFeature& feature) {
+  const int field = feature.GetFieldIndex("icon");
+  return field >= 0 && feature.IsFieldSetAndNotNull(field) &&
+         *feature.GetFieldAsString(field) != '\0';
+}
+
+std::optional<Rgb> ColorOf(OGRStyleTool* tool, const char* text) {
+  int r = 0, g = 0, b = 0, a = 255;
+  if (text == nullptr || !tool->GetRGBFromString(text, r, g, b, a)) return std::nullopt;
+  const auto channel = [](int value) { return static_cast<uint8_t>(std::clamp(value, 0, 255)); };
+  return WithOpacity({channel(r), channel(g), channel(b)}, a / 255.0);
+}
+
+MapFeature GdalMapReader::StyleOf(const OGRFeature& feature) {
+  MapFeature style;
+  std::optional<Rgb> fill;
+  OGRStyleMgr styles;
+  styles.InitFromFeature(const_cast<OGRFeature*>(&feature));
+  const int parts = feature.GetStyleString() == nullptr ? 0 : styles.GetPartCount();
+  for (int i = 0; i < std::min(parts, 16); ++i) {
+    const std::unique_ptr<OGRStyleTool> tool(styles.GetPart(i));
+    if (tool == nullptr) continue;
+    GBool is_default = false;
+    if (auto* const pen = dynamic_cast<OGRStylePen*>(tool.get())) {
+      const char* const color = pen->Color(is_default);
+      if (!is_default) style.line = ColorOf(pen, color);
+    } else if (auto* const brush = dynamic_cast<OGRStyleBrush*>(tool.get())) {
+      const char* const color = brush->ForeColor(is_default);
+      if (!is_default) fill = ColorOf(brush, color);
+    } else if (auto* const symbol = dynamic_cast<OGRStyleSymbol*>(tool.get())) {
+      const char* const color = symbol->Color(is_default);
+      if (!is_default) style.point = ColorOf(symbol, color);
+    }
+  }
+  const OGRGeometry* const geometry = feature.GetGeometryRef();
+  if (fill && geometry != nullptr && geometry->getDimension() == 2)
+    lines_.LeaveOut("fills of areas");
+  if (!style.line) style.line = fill;
+  return style;
+}
+
+// KML's data have no type unless a schema gives one, so that texts which are numbers count as well.
+void GdalMapReader::AddNumbers(const OGRFeature& feature, MapFeature* style) const {
+  const bool is_kml = file_.extension == "kml";
+  for (int i = 0; i < feature.GetFieldCount(); ++i) {
+    const OGRFieldDefn& field = *feature.GetFieldDefnRef(i);
+    const absl::string_view name = field.GetNameRef();
+    if (!feature.IsFieldSetAndNotNull(i) ||
+        (is_kml && std::find(std::begin(kNoData), std::end(kNoData), name) != std::end(kNoData)))
+      continue;
+    const OGRFieldType type = field.GetType();
+    double value = 0;
+    if (type == OFTInteger || type == OFTInteger64 || type == OFTReal) {
+      style->numbers.emplace_back(name, feature.GetFieldAsDouble(i));
+    } else if (is_kml && type == OFTString &&
+               absl::SimpleAtod(feature.GetFieldAsString(i), &value)) {
+      style->numbers.emplace_back(name, value);
+    }
+  }
+}
+
+absl::Status GdalMapReader::DrawLine(const OGRSimpleCurve& line, bool closed) {
+  std::vector<LonLat> corners(static_cast<size_t>(line.getNumPoints()));
+  for (size_t i = 0; i < corners.size(); ++i) {
+    const int at = static_cast<int>(i);
+    corners[i] = {line.getX(at), line.getY(at)};
+    if (line.Is3D()) corners[i].height = line.getZ(at);
+  }
+  return lines_.AddLine(corners, closed);
+}
+
+// Its depth is that of the file's elements, which is bounded.
+absl::Status GdalMapReader::Draw(const OGRGeometry& geometry) {
+  if (geometry.IsEmpty()) {
+    lines_.LeaveOut("geometries without coordinates");
+    return absl::OkStatus();
+  }
+  if (geometry.IsMeasured()) lines_.LeaveOut("geometries' measures");
+  absl::Status status;
+  if (const auto* const point = dynamic_cast<const OGRPoint*>(&geometry)) {
+    LonLat at{point->getX(), point->getY()};
+    if (point->Is3D()) at.height = point->getZ();
+    return lines_.AddPoint(at);
+  }
+  if (const auto* const line = dynamic_cast<const OGRSimpleCurve*>(&geometry))
+    return DrawLine(*line, false);
+  if (const auto* const polygon = dynamic_cast<const OGRPolygon*>(&geometry)) {
+    for (const OGRLinearRing* ring : *polygon) {
+      if (status.ok()) status = DrawLine(*ring, true);
+    }
+    return status;
+  }
+  if (const auto* const surface = dynamic_cast<const OGRPolyhedralSurface*>(&geometry)) {
+    for (const OGRPolygon* part : *surface) {
+      if (status.ok()) status = Draw(*part);
+    }
+    return status;
+  }
+  if (const auto* const collection = dynamic_cast<const OGRGeometryCollection*>(&geometry)) {
+    for (const OGRGeometry* part : *collection) {
+      if (status.ok()) status = Draw(*part);
+    }
+    return status;
+  }
+  lines_.LeaveOut(absl::StrCat("geometries of type ", geometry.getGeometryName()));
+  return absl::OkStatus();
+}
+
+absl::Status GdalMapReader::ReadFeature(const OGRFeature& feature) {
+  if (IsOverlay(feature)) return absl::OkStatus();  // CountElementsOfKml has counted it
+  if (IsHidden(feature)) {
+    lines_.LeaveOut("hidden features");
+    return absl::OkStatus();
+  }
+  const OGRGeometry* const geometry = feature.GetGeometryRef();
+  if (geometry == nullptr) {
+    lines_.LeaveOut("features without a geometry");
+    return absl::OkStatus();
+  }
+  MapFeature style = StyleOf(feature);
+  AddNumbers(feature, &style);
+  lines_.BeginFeature(style);
+  const std::unique_ptr<OGRGeometry> linear(geometry->getLinearGeometry());
+  if (linear == nullptr) return absl::OkStatus();
+  if (to_degrees_ != nullptr && linear->transform(to_degrees_.get()) != OGRERR_NONE) {
+    return FileError(
+        file_,
+        absl::StrCat("has a position that has no longitude and latitude (", LastError(), ")"),
+        "play the map without --globe");
+  }
+  return Draw(*linear);
+}
+
+absl::Status GdalMapReader::PrepareTransformation(OGRLayer* layer) {
+  to_degrees_.reset();
+  const OGRSpatialReference* const system = layer->GetSpatialRef();
+  if (!globe_ || system == nullptr || system->IsGeographic()) return absl::OkStatus();
+  OGRSpatialReference degrees;
+  const bool good = degrees.SetWellKnownGeogCS("WGS84") == OGRERR_NONE;
+  degrees.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
+  if (good) to_degrees_.reset(OGRCreateCoordinateTransformation(system, &degrees));
+  if (to_degrees_ != nullptr) return absl::OkStatus();
+  const char* const name = system->GetName();
+  return FileError(file_,
+                   absl::StrCat("its coordinate system ",
+                                name == nullptr ? "without a name" : EscapeForTerminal(name),
+                                " cannot become longitude and latitude (", LastError(), ")"),
+                   "play the map without --globe");
+}
+
+absl::Status GdalMapReader::ReadLayer(OGRLayer* layer) {
+  // GPX: points of routes and tracks stand in layers of their own besides.
+  const absl::string_view name = layer->GetName();
+  if (file_.extension == "gpx" && (name == "route_points" || name == "track_points"))
+    return absl::OkStatus();
+  if (absl::Status status = PrepareTransformation(layer); !status.ok()) return status;
+  layer->ResetReading();
+  while (const OGRFeatureUniquePtr feature{layer->GetNextFeature()}) {
+    if (absl::Status status = ReadFeature(*feature); !status.ok()) return status;
+  }
+  if (CPLGetLastErrorType() == CE_Failure || CPLGetLastErrorType() == CE_Fatal) {
+    return FileError(file_, absl::StrCat("is damaged (", LastError(), ")"), "copy the file again");
+  }
+  return absl::OkStatus();
+}
+
+void GdalMapReader::CountElementsOfKml() {
+  const std::pair<const char*, const char*> kinds[] = {{"GroundOverlay", "ground overlays"},
+                                                       {"ScreenOverlay", "screen overlays"},
+                                                       {"PhotoOverlay", "photo overlays"},
+                                                       {"NetworkLink", "network links"},
+                                                       {"Model", "models"}};
+  for (const auto& [element, kind] : kinds) {
+    const uint64_t count = CountElements(file_.bytes, element);
+    if (count > 0) lines_.LeaveOut(kind, count);
+  }
+}
+
+absl::StatusOr<Model> GdalMapReader::Read() {
+  struct Format {
+    const char* extension;
+    const char* driver;
+    const char* name;
+  };
+  static constexpr Format kFormats[] = {
+      {"shp", "ESRI Shapefile", "Shapefile"}, {"gpx", "GPX", "GPX"}, {"kml", "LIBKML", "KML"}};
+  const Format& format =
+      *std::find_if(std::begin(kFormats), std::end(kFormats) - 1,
+                    [&](const Format& one) { return file_.extension == one.extension; });
+  const bool is_xml = file_.extension != "shp";
+  if (is_xml && ElementDepth(file_.bytes) > kDeepest) {
+    return FileError(file_, absl::StrCat("nests elements more than ", kDeepest, " deep"),
+                     "maps do not need that");
+  }
+  PrepareGdal();
+  const QuietErrors quiet;
+  const std::string with_root = file_.extension == "kml" ? WithRoot(file_.bytes) : "";
+  FilesInMemory memory;
+  if (!is_xml) {
+    const std::string path = std::filesystem::path(file_.path).filename().string();
+    const std::string stem = path.substr(0, path.size() - 4);
+    beside_.reserve(4);
+    for (const std::string extension : {"shx", "dbf", "prj", "cpg"}) {
+      absl::StatusOr<SourceFile> other = ReadOtherFile(file_, absl::StrCat(stem, ".", extension));
+      if (!other.ok())
+        other = ReadOtherFile(file_, absl::StrCat(stem, ".", absl::AsciiStrToUpper(extension)));
+      if (!other.ok()) continue;
+      beside_.push_back(*std::move(other));
+      memory.Add(extension, beside_.back().bytes);
+    }
+  }
+  const std::string name =
+      memory.Add(format.extension, with_root.empty() ? file_.bytes : with_root);
+  const char* const drivers[] = {format.driver, nullptr};
+  const GDALDatasetUniquePtr data(GDALDataset::Open(
+      name.c_str(), GDAL_OF_VECTOR | GDAL_OF_READONLY | GDAL_OF_VERBOSE_ERROR, drivers));
+  if (data == nullptr) {
+    return FileError(
+        file_,
+        absl::StrCat("is ", DescribeContents(file_.bytes), ", which GDAL does not read as ",
+                     format.name, " (", LastError(), ")"),
+        absl::StrCat("a map in the format ", format.name, " is expected"));
+  }
+  CPLErrorReset();
+  if (file_.extension == "kml") CountElementsOfKml();
+  for (OGRLayer* layer : data->GetLayers()) {
+    if (absl::Status status = ReadLayer(layer); !status.ok()) return status;
+  }
+  Model model;
+  if (absl::Status status = std::move(lines_).Finish(format.name, &model); !status.ok())
+    return status;
+  return model;
+}
+
+}  // namespace
+
+bool IsGdalMap(absl::string_view extension) {
+  return extension == "shp" || extension == "gpx" || extension == "kml";
+}
+
+std::vector<std::string> MapDataFolders() { return {kProjFolder}; }
+
+absl::StatusOr<Model> ReadGdalMap(const SourceFile& file, bool globe, bool attributes) {
+  try {
+    return GdalMapReader(file, globe, attributes).Read();
+  } catch (const std::bad_alloc&) {
+    throw;  // the process that reads answers for its memory
+  } catch (const std::exception& error) {
+    return FileError(file,
+                     absl::StrCat("GDAL cannot read it (", EscapeForTerminal(error.what()), ")"),
+                     "a map is expected");
+  }
+}
+
+}  // namespace voxeld::voxelctl
