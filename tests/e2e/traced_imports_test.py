@@ -24,7 +24,7 @@ OWN = re.compile(r"""
   | /sys/(devices/system/(cpu|node)|fs/cgroup)\S*
   | /dev/(null|urandom|shm/?\S*)
   | /usr/(lib|share)/locale\S* | /etc/localtime | /usr/share/zoneinfo\S* | /usr/lib/x86_64-linux-gnu/gconv/\S*
-  | (/etc|/usr/share|/var/cache|/root/\.cache|/home/\w+/\.cache)/fontconfig\S* | /etc/fonts\S* | /usr/(local/|X11R6/lib/X11/)?(share/)?fonts\S* | \S*/\.(local/share/)?fonts
+  | (/etc|/usr/share|/var/cache)/fontconfig\S* | \S*/\.(cache/)?fontconfig/\S* | /etc/fonts\S* | /usr/(local/|X11R6/lib/X11/)?(share/)?fonts\S* | \S*/\.(local/share/)?fonts
   | /proc/filesystems
   | /etc/ssl/openssl\.cnf | /usr/lib/ssl/openssl\.cnf
   | /etc/(resolv\.conf|hosts|nsswitch\.conf|host\.conf|gai\.conf)

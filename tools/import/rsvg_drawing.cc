@@ -153,7 +153,8 @@ class Drawing {
     model_.lit_already = true;
     for (const LeftOut& one : contents->left_out) AddLeftOut(one.kind, one.count, &model_);
     std::string style(kWithoutFilters);
-    if (contents->texts > 0 && !(CanStartThreads() && HasReadableFont())) {
+    if (contents->texts > 0 &&
+        !(contents->can_draw_texts && CanStartThreads() && HasReadableFont())) {
       absl::StrAppend(&style, kWithoutTexts);
       AddLeftOut("texts", contents->texts, &model_);
     }

@@ -29,8 +29,8 @@ std::vector<std::string> PrepareDrawings();
 
 // Returns: the drawing as a picture, one sample thick and with `pixels` (1 to kMostDrawingPixels, else the nearest of these) along its
 // longer side; upright, black where nothing is drawn. It is best to have as many pixels as voxels. Strokes that are thinner than a pixel
-// are as bright as if they filled it. Opens no files but fonts. Texts are left out where no font can be read or no thread can be
-// started. What the picture does not show is counted in the model.
+// are as bright as if they filled it. Opens no files but fonts. Texts are left out where no font can be read, no thread can be
+// started, or one of them is larger or longer than librsvg can draw. What the picture does not show is counted in the model.
 // Errors: InvalidArgument: `file` is not a valid drawing, is too large or nests too deep, or nothing of it can be seen.
 absl::StatusOr<Model> ReadSvgDrawing(const SourceFile& file, uint32_t pixels);
 

@@ -6,6 +6,7 @@
 #include <libxml/tree.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <memory>
@@ -16,7 +17,9 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/escaping.h"
 #include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
 #include "absl/strings/strip.h"
 #include "common/text/printable.h"
 #include "tools/import/nesting.h"
@@ -31,7 +34,9 @@ constexpr size_t kMostElements = 1'000'000;
 // Work, in bytes that are parsed or drawn: again wherever they are used, so that the file's size does not bound it.
 constexpr double kBytesOfAnElement = 128, kBytesOfAVertex = 4;
 constexpr double kMostWork = kMostElements * kBytesOfAnElement + (128 << 20);
-constexpr size_t kMostKinds = 20;  // of unknown elements that are named
+constexpr size_t kMostTextBytes = 2000;      // librsvg needs minutes for long ones
+constexpr double kMostFontPixels = 500'000;  // librsvg ends the process at two million
+constexpr size_t kMostKinds = 20;            // of unknown elements that are named
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 
 constexpr absl::string_view kSvgNamespace = "http://www.w3.org/2000/svg";
@@ -118,6 +123,51 @@ bool ArePoints(absl::string_view text) {
   }
 }
 
+// The greatest sizes of fonts that a text asks for.
+struct FontSizes {
+  double pixels = 64;  // of those in units of length, and by name
+  double times = 1;    // of those that multiply the size of the element around
+
+  void AddValue(absl::string_view text) {
+    // The size is among other words of "font".
+    for (const absl::string_view word :
+         absl::StrSplit(text, absl::ByAnyChar(" \t\r\n/;:}"), absl::SkipEmpty())) {
+      const size_t unit = std::min(word.find_first_not_of("0123456789+-.eE"), word.size());
+      double number = 0;
+      absl::string_view digits = word.substr(0, unit), rest = word.substr(unit);
+      // The e of a unit is not an exponent.
+      while (!digits.empty() && !absl::ascii_isdigit(digits.back())) digits.remove_suffix(1);
+      rest = word.substr(digits.size());
+      if (digits.empty()) continue;
+      if (!absl::SimpleAtod(digits, &number)) number = std::numeric_limits<double>::infinity();
+      number = std::abs(number);
+      constexpr double kPixelsPerInch = 96;
+      if (absl::StartsWith(rest, "%")) {
+        times = std::max(times, number / 100);
+      } else if (absl::StartsWith(rest, "e") || absl::StartsWith(rest, "r") ||
+                 absl::StartsWith(rest, "ch")) {
+        times = std::max(times, number);
+      } else {
+        pixels = std::max(pixels, rest.empty() || rest == "px" ? number : number * kPixelsPerInch);
+      }
+    }
+  }
+
+  // Declarations of a style.
+  void AddStyle(absl::string_view style) {
+    for (size_t at = style.find("font"); at != absl::string_view::npos;
+         at = style.find("font", at + 4)) {
+      absl::string_view rest = style.substr(at + 4);
+      absl::ConsumePrefix(&rest, "-size");
+      rest = absl::StripLeadingAsciiWhitespace(rest);
+      if (absl::ConsumePrefix(&rest, ":")) AddValue(rest.substr(0, rest.find_first_of(";}")));
+    }
+  }
+
+  // Of elements that are so deep within each other.
+  double Greatest(uint32_t depth) const { return pixels * std::pow(times, depth); }
+};
+
 // Calls `visit` with each id that stands in url(#…) in `text`.
 template <typename Visit>
 void ForEachUrl(absl::string_view text, Visit visit) {
@@ -200,6 +250,8 @@ class Scanner {
     if (absl::Status status = CheckWork(); !status.ok()) return status;
     for (const auto& [name, count] : unknown_)
       contents_.left_out.push_back({absl::StrCat("<", name, "> elements"), count});
+    contents_.can_draw_texts =
+        longest_text_ <= kMostTextBytes && fonts_.Greatest(elements_[0].depth) <= kMostFontPixels;
     return std::move(contents_);
   }
 
@@ -308,7 +360,9 @@ class Scanner {
       if (key == "points" && is_svg) wrong_points = !ArePoints(value);
       if (key == "requiredExtensions") needs_extension |= !value.empty();
       if (key == "filter") filtered |= absl::StripAsciiWhitespace(value) != "none";
+      if (key == "font-size" || key == "font") fonts_.AddValue(value);
       if (key == "style") {
+        fonts_.AddStyle(value);
         filtered |= SetsFilter(value);
         brackets_ = std::max(brackets_, BracketDepth(value, '"'));
       }
@@ -343,6 +397,8 @@ class Scanner {
       if (!fault.empty()) Count(fault);
     } else if (name == "text") {
       ++contents_.texts;
+      text_bytes_ = 0;
+      open_text_ = index;
     } else if (name == "style") {
       in_style_ = true;
     } else {
@@ -361,7 +417,9 @@ class Scanner {
   }
 
   void End() {
-    if (!open_.empty()) open_.pop_back();
+    if (open_.empty()) return;
+    if (open_text_ == open_.back()) open_text_ = kNone;
+    open_.pop_back();
     if (left_out_depth_ > 0) --left_out_depth_;
     if (in_style_) ReadStyleSheet();
     in_style_ = false;
@@ -371,6 +429,7 @@ class Scanner {
   void Text(absl::string_view text) {
     if (!open_.empty()) elements_[open_.back()].work += static_cast<double>(text.size());
     if (in_style_) absl::StrAppend(&style_, text);
+    if (open_text_ != kNone) longest_text_ = std::max(longest_text_, text_bytes_ += text.size());
   }
 
   static bool SetsFilter(absl::string_view style) {
@@ -388,6 +447,7 @@ class Scanner {
 
   void ReadStyleSheet() {
     brackets_ = std::max(brackets_, BracketDepth(style_, '"'));
+    fonts_.AddStyle(style_);
     ForEachUrl(style_, [&](absl::string_view id) { style_targets_.emplace(id); });
     for (size_t at = style_.find('}'), from = 0; from < style_.size();
          from = at + 1, at = style_.find('}', from)) {
@@ -506,6 +566,9 @@ class Scanner {
   uint32_t left_out_depth_ = 0;
   int brackets_ = 0;
   bool in_style_ = false;
+  FontSizes fonts_;
+  uint32_t open_text_ = kNone;
+  size_t text_bytes_ = 0, longest_text_ = 0;  // of the text that is open, and of all
   std::string style_;
 };
 

@@ -15,6 +15,7 @@ namespace voxeld::voxelctl {
 struct SvgContents {
   std::vector<LeftOut> left_out;  // elements and rules that librsvg ignores
   uint64_t texts = 0;
+  bool can_draw_texts = true;  // by librsvg, which some large sizes and long texts would end
 };
 
 // Parses `xml`, the text of `file`, without loading anything that it names.

@@ -478,6 +478,33 @@ TEST_F(Drawings, TextsAreDrawnWithFonts) {
   EXPECT_THAT(error, HasSubstr("has nothing that is to be seen (left out: texts (1))"));
 }
 
+// librsvg would end the process, or need minutes.
+TEST_F(Drawings, TextsThatAreTooLargeOrTooLongAreCounted) {
+  const std::string area = "<rect width='100' height='100' fill='lime'/>";
+  for (const std::string& text :
+       {std::string("<text font-size='1e30'>H</text>"),
+        std::string("<text font-size='9999999'>H</text>"),
+        std::string("<text font-size='99999in'>H</text>"),
+        std::string("<text style='font-size : 99999920px'>H</text>"),
+        std::string("<text style='font:bold 99999920px/1 serif'>H</text>"),
+        std::string("<style>text{font-size:3000000}</style><text>H</text>"),
+        Times("<g font-size='2em'>", 40) + "<text>H</text>" + Times("</g>", 40),
+        Times("<g style='font-size:300%'>", 40) + "<text>H</text>" + Times("</g>", 40),
+        "<text>" + Times("H", 20'000) + "</text>",
+        "<text>" + Times("<tspan>H </tspan>", 2000) + "</text>"}) {
+    const Model model = ReadAll(Svg(area + text));
+    EXPECT_EQ(Count(model, kGreen), 64 * 64) << text.substr(0, 80);
+    EXPECT_THAT(model.left_out, ElementsAre(LeftOut{"texts", 1})) << text.substr(0, 80);
+  }
+  for (const std::string& text :
+       {std::string("<text font-size='1e3'>H</text>"),
+        std::string("<text font-size='2in' style='font:italic 1.2em/2 serif'>H</text>"),
+        Times("<g font-size='90%'>", 40) + "<text>H</text>" + Times("</g>", 40),
+        "<text>" + Times("H ", 500) + "</text><desc>" + Times("H", 20'000) + "</desc>"}) {
+    EXPECT_THAT(ReadAll(Svg(area + text)).left_out, IsEmpty()) << text.substr(0, 80);
+  }
+}
+
 // The program that reads untrusted files reads fonts, and nothing else.
 TEST_F(Drawings, TextsAreDrawnInTheSandbox) {
   for (const OtherFiles others : {OtherFiles::kBelow, OtherFiles::kNone}) {
