@@ -76,6 +76,10 @@ def nrrd(name: str) -> bytes:
     return f"NRRD0004\ntype: uchar\ndimension: 3\nsizes: 2 2 2\nencoding: raw\ndata file: {name}\n".encode()
 
 
+def mhd(name: str) -> bytes:
+    return f"NDims = 3\nDimSize = 2 2 2\nElementType = MET_UCHAR\nElementDataFile = {name}\n".encode()
+
+
 def amf(name: str) -> bytes:
     return (f"{XML}<!DOCTYPE amf [<!ENTITY bait SYSTEM \"{name}\">]><amf unit='millimeter'><object id='0'><mesh><vertices>&bait;</vertices></mesh>"
             f"</object><texture id='1' width='1' height='1' depth='1' tiled='1' type='{name}'/></amf>").encode()
@@ -102,7 +106,7 @@ def step(name: str) -> bytes:
 
 
 FORMATS: "dict[str, Callable[[str], bytes]]" = {
-    "gltf": gltf, "glb": glb, "obj": obj, "dae": collada, "svg": svg, "ply": ply, "nhdr": nhdr, "nrrd": nrrd, "amf": amf, "x": directx, "3mf": threemf,
+    "gltf": gltf, "glb": glb, "obj": obj, "dae": collada, "svg": svg, "ply": ply, "nhdr": nhdr, "nrrd": nrrd, "mhd": mhd, "amf": amf, "x": directx, "3mf": threemf,
     "ifc": step}
 
 
@@ -158,7 +162,7 @@ class TracedImports(unittest.TestCase):
 
     def test_trace_records_referenced_files(self) -> None:
         # The formats in which other files are read for a local user.
-        for extension in ("gltf", "obj", "nhdr"):
+        for extension in ("gltf", "obj", "nhdr", "mhd"):
             with self.subTest(extension):
                 (self.folder / f"a.{extension}").write_bytes(FORMATS[extension]("bait"))
                 found, played = self.opened(f"a.{extension}", "below")

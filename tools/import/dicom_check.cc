@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
@@ -44,7 +45,7 @@ class Walker {
     if (absl::Status status = Head(&at); !status.ok()) return status;
     const std::string& syntax = facts_.transfer_syntax;
     facts_.big_endian = syntax == kBigEndian;
-    explicit_ = syntax != "1.2.840.10008.1.2";
+    explicit_ = syntax.empty() ? SaysItsKind(at) : syntax != "1.2.840.10008.1.2";
     while (at < bytes_.size()) {
       if (absl::Status status = Element(&at, bytes_.size(), 0); !status.ok()) return status;
     }
@@ -60,6 +61,13 @@ class Walker {
       if (absl::Status status = Element(at, bytes_.size(), 0); !status.ok()) return status;
     }
     return absl::OkStatus();
+  }
+
+  // Whether two letters stand where the kind of the element at this place would.
+  bool SaysItsKind(size_t at) const {
+    return at + 8 <= bytes_.size() &&
+           absl::ascii_isupper(static_cast<unsigned char>(bytes_[at + 4])) &&
+           absl::ascii_isupper(static_cast<unsigned char>(bytes_[at + 5]));
   }
 
   uint16_t U16(size_t at) const {
@@ -179,6 +187,8 @@ class Walker {
                                   : tag == 0x00281050 ? &facts_.window_center
                                   : tag == 0x00281051 ? &facts_.window_width
                                                       : nullptr;
+    if (!top && tag == 0x00281052) facts_.intercepts.push_back(Text(value));
+    if (!top && tag == 0x00281053) facts_.slopes.push_back(Text(value));
     if (anywhere != nullptr) {
       if (top || anywhere->empty()) *anywhere = Text(value);
       return;
@@ -188,6 +198,13 @@ class Walker {
       return;
     }
     if (!top) return;
+    static constexpr std::array<uint32_t, 6> kTimes = {0x00200100, 0x00080032, 0x00181060,
+                                                       0x00200012, 0x00180086, 0x00200013};
+    const auto time = std::find(kTimes.begin(), kTimes.end(), tag);
+    if (time != kTimes.end()) {
+      facts_.times[static_cast<size_t>(time - kTimes.begin())] = Text(value);
+      return;
+    }
     if (tag >= 0x00281101 && tag <= 0x00281103) {
       DicomFacts::Palette& palette = facts_.palette[tag - 0x00281101];
       palette.descriptor.clear();
@@ -391,11 +408,31 @@ class Walker {
 
 bool IsGrey(const DicomFacts& facts) { return absl::StartsWith(facts.photometric, "MONOCHROME"); }
 
-absl::StatusOr<std::optional<SourceFile>> InflateDicom(const SourceFile& file) {
+bool LacksPreamble(const SourceFile& file) {
+  const absl::string_view bytes = file.bytes;
+  if (LooksLikeDicom(file) || bytes.size() < 12) return false;
+  // The length of the second group, or an identifier of the first: "UI", or eight bytes that fit without it.
+  if (absl::StartsWith(bytes, absl::string_view("\2\0\0\0UL\4\0", 8))) return true;
+  if (bytes.substr(0, 2) != absl::string_view("\x08\0", 2) || bytes[3] != 0) return false;
+  static constexpr absl::string_view kKinds[] = {"UI", "CS", "UL", "DA", "TM", "LO"};
+  for (const absl::string_view kind : kKinds) {
+    if (bytes.substr(4, 2) == kind) return true;
+  }
+  uint32_t length;
+  std::memcpy(&length, bytes.data() + 4, sizeof(length));
+  return length > 0 && length <= 64 && length % 2 == 0;
+}
+
+absl::StatusOr<std::optional<SourceFile>> PlainDicom(const SourceFile& given) {
+  SourceFile headed{.path = given.path, .extension = given.extension, .bytes = {}};
+  const bool lacks_preamble = LacksPreamble(given);
+  if (lacks_preamble)
+    headed.bytes = absl::StrCat(std::string(kPreamble, '\0'), "DICM", given.bytes);
+  const SourceFile& file = lacks_preamble ? headed : given;
   if (!LooksLikeDicom(file)) return std::nullopt;
   const absl::StatusOr<size_t> head = Walker(file).DeflatedFrom();
   if (!head.ok()) return head.status();
-  if (*head == 0) return std::nullopt;
+  if (*head == 0) return lacks_preamble ? std::optional(std::move(headed)) : std::nullopt;
   const absl::StatusOr<std::string> rest =
       Inflate(file, absl::string_view(file.bytes).substr(*head), kMaxDeflated + 1, Deflated::kRaw);
   if (!rest.ok()) return rest.status();

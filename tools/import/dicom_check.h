@@ -1,4 +1,4 @@
-// A DICOM file's elements, walked before the library that decodes them (DICOM PS3.5, PS3.10).
+// A DICOM file's elements, walked before the library that decodes its pixels (DICOM PS3.5, PS3.10).
 #pragma once
 
 #include <array>
@@ -9,7 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "tools/voxelctl/import/model.h"
 #include "tools/voxelctl/import/source_file.h"
 
 namespace voxeld::voxelctl {
@@ -21,6 +23,11 @@ struct DicomFacts {
       window_width;
   std::string frame_offsets;           // of the frames of a dose, along the normal
   std::vector<std::string> positions;  // of the image, or of its frames in their order
+  std::vector<std::string> slopes,
+      intercepts;  // in sequences: of the frames in their order, or one of all
+  // Slices at one place differ in these, of which the first ones count most: TemporalPositionIdentifier, AcquisitionTime, TriggerTime,
+  // AcquisitionNumber, EchoNumbers and InstanceNumber.
+  std::array<std::string, 6> times;
   uint64_t rows = 0, columns = 0, frames = 1, samples_per_pixel = 1;
   uint16_t bits_allocated = 0, bits_stored = 0, high_bit = 0;
   bool is_signed = false;
@@ -53,9 +60,17 @@ bool LooksLikeDicom(const SourceFile& file);
 // compressed pictures (JPEG, JPEG-LS, JPEG 2000) are of the size that the elements say.
 absl::StatusOr<DicomFacts> CheckDicom(const SourceFile& file);
 
-// The file as it is without compression, if all of it but its head is compressed ("deflated"; at most kMaxDeflated bytes);
-// otherwise nothing.
+// Whether it begins with an element of DICOM, without the preamble and "DICM" before it.
+bool LacksPreamble(const SourceFile& file);
+
+// The file with the preamble, if it lacks it, and without compression, if all of it but its head is compressed ("deflated"; at most
+// kMaxDeflated bytes); otherwise nothing.
 inline constexpr uint64_t kMaxDeflated = uint64_t{512} << 20;
-absl::StatusOr<std::optional<SourceFile>> InflateDicom(const SourceFile& file);
+absl::StatusOr<std::optional<SourceFile>> PlainDicom(const SourceFile& file);
+
+// Appends the samples, and colours if they are, of all frames of a file that has passed its checks. What is compressed is decoded by
+// gdcm. InvalidArgument if it cannot be.
+absl::Status DecodeDicomPixels(const SourceFile& file, const DicomFacts& facts,
+                               SampledVolume* volume);
 
 }  // namespace voxeld::voxelctl

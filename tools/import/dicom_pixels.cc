@@ -1,5 +1,4 @@
 // DICOM's pixels, what is compressed through gdcm.
-#include "tools/import/dicom_pixels.h"
 
 #include <gdcmImageReader.h>
 #include <gdcmTrace.h>
@@ -17,6 +16,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/string_view.h"
+#include "tools/import/dicom_check.h"
 #include "tools/import/volume_samples.h"
 
 namespace voxeld::voxelctl {
@@ -201,6 +201,12 @@ void DecodeBits(absl::string_view bytes, uint64_t count, std::vector<float>* out
     out->push_back(static_cast<float>(static_cast<uint8_t>(bytes[i / 8]) >> i % 8 & 1));
 }
 
+// A frame's own text, or that of all.
+const std::string& OfFrame(const DicomFacts& facts, size_t frame,
+                           const std::vector<std::string>& each, const std::string& all) {
+  return each.size() == facts.frames ? each[frame] : all;
+}
+
 absl::Status Decode(const SourceFile& file, const DicomFacts& facts, SampledVolume* volume) {
   const uint64_t pixels = facts.columns * facts.rows * facts.frames;
   const bool colors = facts.samples_per_pixel == 3;
@@ -239,11 +245,15 @@ absl::Status Decode(const SourceFile& file, const DicomFacts& facts, SampledVolu
     DecodeColors(FromPalette(file, facts, places), 3, volume);
     return absl::OkStatus();
   }
-  const std::vector<double> slope = DicomNumbers(facts.slope),
-                            intercept = DicomNumbers(facts.intercept);
-  if (!slope.empty() && slope[0] != 0) code.slope = slope[0];
-  if (!intercept.empty()) code.intercept = intercept[0];
-  DecodeSamples(bytes, code, &volume->samples);
+  const size_t frame = bytes.size() / facts.frames;
+  for (size_t i = 0; i < facts.frames; ++i) {
+    const std::vector<double> slope = DicomNumbers(OfFrame(facts, i, facts.slopes, facts.slope)),
+                              intercept = DicomNumbers(
+                                  OfFrame(facts, i, facts.intercepts, facts.intercept));
+    code.slope = !slope.empty() && slope[0] != 0 ? slope[0] : 1;
+    code.intercept = !intercept.empty() ? intercept[0] : 0;
+    DecodeSamples(bytes.substr(i * frame, frame), code, &volume->samples);
+  }
   return absl::OkStatus();
 }
 

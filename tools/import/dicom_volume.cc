@@ -1,46 +1,58 @@
 // DICOM: which slices there are, and where they lie.
-#include "tools/import/dicom_volume.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <map>
 #include <optional>
+#include <string>
 #include <system_error>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
-#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_split.h"
 #include "tools/import/dicom_check.h"
-#include "tools/import/dicom_pixels.h"
 #include "tools/import/volume_samples.h"
+#include "tools/import/volumes.h"
 
 namespace voxeld::voxelctl {
 namespace {
 
 constexpr size_t kMostFiles = 20'000;
-constexpr double kEven = 0.1;  // by how much of their distance slices may be out of place, unsaid
-
-struct Slice {
-  std::array<uint64_t, 3> size = {1, 1, 1};
-  std::array<double, 2> spacing = {1, 1};
-  double between = 1;  // frames
-  Point3 origin, right = {1, 0, 0}, down = {0, 1, 0};
-};
+constexpr double kEven = 0.1;    // by how much of their distance slices may be out of place, unsaid
+constexpr double kAlike = 1e-3;  // of the mean distance: slices that are as near are at one place
+constexpr double kSameDirection = 0.999;  // the least cosine between them
 
 Point3 Cross(const Point3& a, const Point3& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 double Dot(const Point3& a, const Point3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 Point3 Times(const Point3& p, double by) { return {p.x * by, p.y * by, p.z * by}; }
+Point3 Less(const Point3& a, const Point3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+
+std::optional<Point3> PlaceOf(const std::string& text) {
+  const std::vector<double> p = DicomNumbers(text);
+  if (p.size() != 3) return std::nullopt;
+  return Point3{p[0], p[1], p[2]};
+}
 
 // Where a file's pixels lie.
+struct Slice {
+  std::array<uint64_t, 3> size = {1, 1, 1};
+  uint64_t channels = 1;
+  std::array<double, 2> spacing = {1, 1};
+  double between = 1;  // frames
+  Point3 right = {1, 0, 0}, down = {0, 1, 0};
+  std::vector<Point3> places;  // of the frames; empty if they are not known
+
+  Point3 Normal() const { return Cross(right, down); }
+};
+
 Slice Locate(const DicomFacts& facts) {
   Slice slice;
   slice.size = {facts.columns, facts.rows, facts.frames};
+  slice.channels = facts.samples_per_pixel;
   const std::vector<double> spacing = DicomNumbers(facts.spacing),
                             o = DicomNumbers(facts.orientation),
                             thickness = DicomNumbers(facts.slice_thickness),
@@ -50,37 +62,112 @@ Slice Locate(const DicomFacts& facts) {
   if (spacing.size() == 2) slice.spacing = {spacing[1], spacing[0]};
   if (!thickness.empty()) slice.between = thickness[0];
   if (!apart.empty()) slice.between = apart[0];
-  if (offsets.size() > 1) slice.between = offsets[1] - offsets[0];
+  if (offsets.size() > 1)
+    slice.between = (offsets.back() - offsets[0]) / static_cast<double>(offsets.size() - 1);
   if (o.size() == 6) slice.right = {o[0], o[1], o[2]}, slice.down = {o[3], o[4], o[5]};
-  const auto place = [&facts](size_t i) {
-    return i < facts.positions.size() ? DicomNumbers(facts.positions[i]) : std::vector<double>();
-  };
-  const std::vector<double> p = place(0), q = place(1);
-  if (p.size() == 3) slice.origin = {p[0], p[1], p[2]};
-  if (p.size() == 3 && q.size() == 3 && facts.frames > 1) {
-    const double along =
-        Dot(Cross(slice.right, slice.down), {q[0] - p[0], q[1] - p[1], q[2] - p[2]});
-    if (along != 0) slice.between = along;
+  // Those of the frames are the last ones in the file; some programs write one of all before them.
+  const size_t before = facts.frames > 1 && facts.positions.size() > facts.frames
+                            ? facts.positions.size() - facts.frames
+                            : 0;
+  for (size_t i = before; i < facts.positions.size(); ++i) {
+    const std::optional<Point3> place = PlaceOf(facts.positions[i]);
+    if (!place) break;
+    slice.places.push_back(*place);
   }
+  if (slice.places.size() < facts.frames)
+    slice.places.resize(std::min<size_t>(slice.places.size(), 1));
   return slice;
 }
 
+// A place along the normal; 0 if it is too far away for a number.
+double Along(const Slice& slice, const Point3& place) {
+  const double along = Dot(slice.Normal(), place);
+  return std::isfinite(along) ? along : 0;
+}
+
+// One layer of a volume: a frame, or the slice of a file.
+struct Layer {
+  size_t number = 0;  // of the frame or file
+  Point3 place;
+  double along = 0;  // its place along the normal
+  std::vector<double> time;
+};
+
+// Puts layers into the order in which they lie. Of those at one place the first in time stays.
+// Returns: how many times there are, less one.
+size_t SortLayers(std::vector<Layer>* layers) {
+  const auto [least, most] =
+      std::minmax_element(layers->begin(), layers->end(),
+                          [](const Layer& a, const Layer& b) { return a.along < b.along; });
+  const double alike = kAlike * (most->along - least->along) / static_cast<double>(layers->size());
+  std::stable_sort(layers->begin(), layers->end(),
+                   [](const Layer& a, const Layer& b) { return a.along < b.along; });
+  std::vector<Layer> kept;
+  size_t most_times = 1;
+  for (auto from = layers->begin(); from != layers->end();) {
+    auto end = from + 1;
+    while (end != layers->end() && end->along - from->along <= alike) ++end;
+    kept.push_back(*std::min_element(from, end, [](const Layer& a, const Layer& b) {
+      return a.time != b.time ? a.time < b.time : a.number < b.number;
+    }));
+    most_times = std::max(most_times, static_cast<size_t>(end - from));
+    from = end;
+  }
+  *layers = std::move(kept);
+  return most_times - 1;
+}
+
+// Returns: the step from one layer to the next, which a tilted gantry shears. Sets `note` if they are not evenly apart.
+Point3 StepOf(const std::vector<Layer>& layers, const Slice& first, std::string* note) {
+  const double count = static_cast<double>(layers.size() - 1);
+  if (layers.size() > 1) {
+    const double between = (layers.back().along - layers.front().along) / count;
+    double nearest = between, farthest = between;
+    for (size_t i = 1; i < layers.size(); ++i) {
+      const double apart = layers[i].along - layers[i - 1].along;
+      nearest = std::min(nearest, apart);
+      farthest = std::max(farthest, apart);
+    }
+    if (farthest - nearest > kEven * std::abs(between))
+      *note = absl::StrCat("its slices are unevenly apart (", nearest, " to ", farthest,
+                           "); shown as if they were even");
+    const Point3 step = Times(Less(layers.back().place, layers.front().place), 1 / count);
+    if (std::abs(Dot(step, first.Normal())) > 1e-6 * std::sqrt(Dot(step, step))) return step;
+  }
+  const double between = first.between != 0 && std::isfinite(first.between) ? first.between : 1;
+  return Times(first.Normal(), between);
+}
+
+// In MONOCHROME1 the least number is white. Turns numbers round within the window, or else within their range.
+void TurnRound(SampledVolume* volume) {
+  double sum = 0;
+  if (volume->window) {
+    sum = (*volume->window)[0] + (*volume->window)[1];
+  } else {
+    const auto [least, most] = std::minmax_element(volume->samples.begin(), volume->samples.end());
+    if (least == volume->samples.end()) return;
+    sum = double{*least} + double{*most};
+  }
+  for (float& sample : volume->samples) sample = static_cast<float>(sum - double{sample});
+}
+
 absl::StatusOr<Model> Finish(const SourceFile& file, const DicomFacts& facts, const Slice& first,
-                             uint64_t depth, double between, SampledVolume volume) {
+                             const Point3& origin, uint64_t depth, const Point3& step,
+                             SampledVolume volume) {
   volume.size = {static_cast<uint32_t>(first.size[0]), static_cast<uint32_t>(first.size[1]),
                  static_cast<uint32_t>(depth)};
   const auto length = [](double given) { return given != 0 && std::isfinite(given) ? given : 1; };
-  const absl::Status status = PlaceVolume(
-      file, first.origin,
-      {Times(first.right, length(first.spacing[0])), Times(first.down, length(first.spacing[1])),
-       Times(Cross(first.right, first.down), length(between))},
-      &volume);
+  const absl::Status status = PlaceVolume(file, origin,
+                                          {Times(first.right, length(first.spacing[0])),
+                                           Times(first.down, length(first.spacing[1])), step},
+                                          &volume);
   if (!status.ok()) return status;
   const std::vector<double> center = DicomNumbers(facts.window_center),
                             width = DicomNumbers(facts.window_width);
   if (!center.empty() && !width.empty() && width[0] > 0) {
     volume.window = {center[0] - width[0] / 2, center[0] + width[0] / 2};
   }
+  if (facts.photometric == "MONOCHROME1") TurnRound(&volume);
   Model model;
   model.path = file.path;
   model.format = "DICOM";
@@ -89,45 +176,156 @@ absl::StatusOr<Model> Finish(const SourceFile& file, const DicomFacts& facts, co
   return model;
 }
 
-// A file of a series.
-struct Found {
-  std::string path;
-  double along = 0;  // its place along the normal
-  Point3 right = {1, 0, 0}, down = {0, 1, 0};
-};
+// The frames that `layers` names, in their order.
+void PickFrames(const std::vector<Layer>& layers, size_t frame, SampledVolume* volume) {
+  const auto pick = [&](auto* values) {
+    std::remove_reference_t<decltype(*values)> picked;
+    if (values->empty()) return;
+    picked.reserve(layers.size() * frame);
+    for (const Layer& layer : layers) {
+      const auto from = values->begin() + static_cast<std::ptrdiff_t>(layer.number * frame);
+      picked.insert(picked.end(), from, from + static_cast<std::ptrdiff_t>(frame));
+    }
+    *values = std::move(picked);
+  };
+  pick(&volume->samples);
+  pick(&volume->colors);
+}
 
-// The file, without compression of the whole.
+// The file with its preamble, and without compression of the whole.
 absl::StatusOr<SourceFile> ReadPlain(const std::string& path) {
   absl::StatusOr<SourceFile> file = ReadSourceFile(path);
   if (!file.ok()) return file;
-  absl::StatusOr<std::optional<SourceFile>> inflated = InflateDicom(*file);
-  if (!inflated.ok()) return inflated.status();
-  return *inflated ? **std::move(inflated) : file;
+  absl::StatusOr<std::optional<SourceFile>> plain = PlainDicom(*file);
+  if (!plain.ok()) return plain.status();
+  return *plain ? **std::move(plain) : file;
 }
 
-Found LocateSlice(const std::string& path, const DicomFacts& facts, size_t number) {
-  Found found{.path = path, .along = static_cast<double>(number)};
-  const std::vector<double> o = DicomNumbers(facts.orientation),
-                            p = DicomNumbers(facts.positions.empty() ? "" : facts.positions[0]);
-  if (o.size() == 6) found.right = {o[0], o[1], o[2]}, found.down = {o[3], o[4], o[5]};
-  if (o.size() == 6 && p.size() == 3) {
-    found.along = Dot(Cross(found.right, found.down), {p[0], p[1], p[2]});
+// The slices of one series that are alike in size and direction, or one file of several frames.
+struct Stack {
+  std::string series;
+  Slice first;
+  std::vector<std::string> paths;
+  std::vector<Layer> layers;
+
+  uint64_t Slices() const { return first.size[2] > 1 ? first.size[2] : layers.size(); }
+  bool Takes(const std::string& other_series, const Slice& other) const {
+    return series == other_series && first.size[2] == 1 && first.size == other.size &&
+           first.channels == other.channels && first.places.empty() == other.places.empty() &&
+           Dot(first.right, other.right) > kSameDirection &&
+           Dot(first.down, other.down) > kSameDirection;
   }
-  return found;
+};
+
+void AddSlice(const std::string& path, const DicomFacts& facts, std::vector<Stack>* stacks) {
+  const Slice slice = Locate(facts);
+  auto stack = std::find_if(stacks->begin(), stacks->end(),
+                            [&](const Stack& one) { return one.Takes(facts.series, slice); });
+  if (stack == stacks->end()) {
+    stacks->push_back({.series = facts.series, .first = slice, .paths = {}, .layers = {}});
+    stack = stacks->end() - 1;
+  }
+  Layer layer{.number = stack->paths.size(), .place = {}, .along = 0, .time = {}};
+  for (const std::string& text : facts.times) {
+    const std::vector<double> number = DicomNumbers(text);
+    layer.time.push_back(number.empty() ? 0 : number[0]);
+  }
+  // Without places the numbers of the instances order them, or else their names.
+  layer.along = static_cast<double>(layer.number);
+  if (slice.places.empty()) {
+    layer.place = Times(stack->first.Normal(), layer.along * slice.between);
+  } else {
+    layer.place = slice.places[0];
+    layer.along = Along(stack->first, layer.place);
+  }
+  stack->paths.push_back(path);
+  stack->layers.push_back(std::move(layer));
+}
+
+// Numbers of instances order slices that have no places.
+void OrderByInstance(Stack* stack) {
+  if (!stack->first.places.empty()) return;
+  std::stable_sort(stack->layers.begin(), stack->layers.end(),
+                   [](const Layer& a, const Layer& b) { return a.time.back() < b.time.back(); });
+  for (size_t i = 0; i < stack->layers.size(); ++i) {
+    Layer& layer = stack->layers[i];
+    layer.along = static_cast<double>(i);
+    layer.place = Times(stack->first.Normal(), layer.along * stack->first.between);
+  }
+}
+
+absl::StatusOr<Model> ReadStack(const SourceFile& folder, Stack* stack) {
+  if (stack->paths.size() == 1) {
+    const absl::StatusOr<SourceFile> file = ReadSourceFile(stack->paths[0]);
+    return file.ok() ? ReadDicomVolume(*file) : file.status();
+  }
+  OrderByInstance(stack);
+  const size_t further_times = SortLayers(&stack->layers);
+  const std::vector<Layer>& layers = stack->layers;
+  const Slice& first = stack->first;
+  const absl::Status status =
+      CheckVolumeSize(folder, {first.size[0], first.size[1], layers.size()});
+  if (!status.ok()) return status;
+  SampledVolume volume;
+  volume.samples.reserve(first.size[0] * first.size[1] * layers.size());
+  DicomFacts first_facts;
+  for (const Layer& layer : layers) {
+    const absl::StatusOr<SourceFile> file = ReadPlain(stack->paths[layer.number]);
+    if (!file.ok()) return file.status();
+    const absl::StatusOr<DicomFacts> facts = CheckDicom(*file);
+    if (!facts.ok()) return facts.status();
+    // It was read before; someone may have changed it since.
+    if (!stack->Takes(facts->series, Locate(*facts)))
+      return FileError(*file, "has changed since it was read first", "read it again");
+    if (&layer == &layers[0]) first_facts = *facts;
+    if (absl::Status decoded = DecodeDicomPixels(*file, *facts, &volume); !decoded.ok())
+      return decoded;
+  }
+  std::string note;
+  const Point3 step = StepOf(layers, first, &note);
+  absl::StatusOr<Model> model =
+      Finish(folder, first_facts, first, layers[0].place, layers.size(), step, std::move(volume));
+  if (!model.ok()) return model;
+  AddLeftOut("further times", further_times, &*model);
+  if (!note.empty()) model->note = absl::StrCat(folder.path, ": ", note);
+  return model;
 }
 
 }  // namespace
 
 absl::StatusOr<Model> ReadDicomVolume(const SourceFile& file) {
-  const absl::StatusOr<std::optional<SourceFile>> inflated = InflateDicom(file);
-  if (!inflated.ok()) return inflated.status();
-  const SourceFile& plain = *inflated ? **inflated : file;
+  const absl::StatusOr<std::optional<SourceFile>> changed = PlainDicom(file);
+  if (!changed.ok()) return changed.status();
+  const SourceFile& plain = *changed ? **changed : file;
   const absl::StatusOr<DicomFacts> facts = CheckDicom(plain);
   if (!facts.ok()) return facts.status();
   SampledVolume volume;
   if (absl::Status status = DecodeDicomPixels(plain, *facts, &volume); !status.ok()) return status;
   const Slice slice = Locate(*facts);
-  return Finish(plain, *facts, slice, slice.size[2], slice.between, std::move(volume));
+  uint64_t depth = slice.size[2];
+  Point3 origin = slice.places.empty() ? Point3{} : slice.places[0];
+  Point3 step = StepOf({}, slice, nullptr);
+  size_t further_times = 0;
+  std::string note;
+  if (depth > 1 && slice.places.size() >= depth) {
+    std::vector<Layer> layers;
+    for (size_t i = 0; i < depth; ++i)
+      layers.push_back({.number = i,
+                        .place = slice.places[i],
+                        .along = Along(slice, slice.places[i]),
+                        .time = {}});
+    further_times = SortLayers(&layers);
+    step = StepOf(layers, slice, &note);
+    origin = layers[0].place;
+    depth = layers.size();
+    PickFrames(layers, slice.size[0] * slice.size[1], &volume);
+  }
+  absl::StatusOr<Model> model =
+      Finish(plain, *facts, slice, origin, depth, step, std::move(volume));
+  if (!model.ok()) return model;
+  AddLeftOut("further times", further_times, &*model);
+  if (!note.empty()) model->note = absl::StrCat(file.path, ": ", note);
+  return model;
 }
 
 absl::StatusOr<Model> ReadDicomFolder(const std::string& path) {
@@ -146,11 +344,11 @@ absl::StatusOr<Model> ReadDicomFolder(const std::string& path) {
   if (error) return FileError(folder, error.message(), "a folder that can be read is expected");
   std::sort(paths.begin(), paths.end());
 
-  std::map<std::string, std::vector<Found>> series;
+  std::vector<Stack> stacks;
   size_t others = 0;
   absl::Status refused;
-  for (size_t i = 0; i < paths.size(); ++i) {
-    const absl::StatusOr<SourceFile> file = ReadPlain(paths[i]);
+  for (const std::string& one : paths) {
+    const absl::StatusOr<SourceFile> file = ReadPlain(one);
     if (!file.ok() || !LooksLikeDicom(*file)) {
       ++others;
       continue;
@@ -161,69 +359,28 @@ absl::StatusOr<Model> ReadDicomFolder(const std::string& path) {
       ++others;
       continue;
     }
-    series[facts->series].push_back(LocateSlice(paths[i], *facts, i));
+    AddSlice(one, *facts, &stacks);
   }
-  if (series.empty()) {
+  if (stacks.empty()) {
     if (!refused.ok()) return refused;
     return FileError(folder,
                      absl::StrCat("is a folder; none of its ", paths.size(), " files is DICOM"),
                      "a file, or a folder of DICOM slices, is expected");
   }
-  std::vector<Found>& slices =
-      std::max_element(series.begin(), series.end(), [](const auto& a, const auto& b) {
-        return a.second.size() < b.second.size();
-      })->second;
-  std::stable_sort(slices.begin(), slices.end(),
-                   [](const Found& a, const Found& b) { return a.along < b.along; });
-
-  if (slices.size() == 1) {
-    const absl::StatusOr<SourceFile> file = ReadSourceFile(slices[0].path);
-    return file.ok() ? ReadDicomVolume(*file) : file.status();
+  const auto shown =
+      std::max_element(stacks.begin(), stacks.end(),
+                       [](const Stack& a, const Stack& b) { return a.Slices() < b.Slices(); });
+  Model left;
+  for (const Stack& stack : stacks) {
+    if (&stack == &*shown) continue;
+    AddLeftOut(stack.series == shown->series ? "slices of another size or direction"
+                                             : "slices of other series",
+               stack.Slices(), &left);
   }
-  SampledVolume volume;
-  Slice first;
-  DicomFacts first_facts;
-  for (size_t i = 0; i < slices.size(); ++i) {
-    const absl::StatusOr<SourceFile> file = ReadPlain(slices[i].path);
-    if (!file.ok()) return file.status();
-    const absl::StatusOr<DicomFacts> facts = CheckDicom(*file);
-    if (!facts.ok()) return facts.status();
-    if (i == 0) {
-      const std::array<uint64_t, 3> size = {facts->columns, facts->rows, slices.size()};
-      if (absl::Status status = CheckVolumeSize(folder, size); !status.ok()) return status;
-    }
-    const Slice slice = Locate(*facts);
-    if (i == 0) first = slice, first_facts = *facts;
-    if (slice.size != first.size || slice.size[2] != 1 ||
-        Dot(slices[i].right, slices[0].right) < 0.999 ||
-        Dot(slices[i].down, slices[0].down) < 0.999) {
-      return FileError(*file,
-                       absl::StrCat("has ", slice.size[0], " by ", slice.size[1], " by ",
-                                    slice.size[2], " pixels, or is turned against the others"),
-                       absl::StrCat("single slices of ", first.size[0], " by ", first.size[1],
-                                    " pixels, all alike, are expected"));
-    }
-    if (absl::Status status = DecodeDicomPixels(*file, *facts, &volume); !status.ok())
-      return status;
-  }
-  std::string note;
-  const double between =
-      (slices.back().along - slices.front().along) / static_cast<double>(slices.size() - 1);
-  for (size_t i = 1; i < slices.size() && note.empty(); ++i) {
-    if (std::abs(slices[i].along - slices[i - 1].along - between) > kEven * between) {
-      note = absl::StrCat(path, ": its slices are unevenly apart; shown as if they were even");
-    }
-  }
-  const auto say = [&note, &path](const std::string& what) {
-    note = note.empty() ? absl::StrCat(path, ": ", what) : absl::StrCat(note, "; ", what);
-  };
-  if (series.size() > 1)
-    say(absl::StrCat("of its ", series.size(), " series the one with the most slices, ",
-                     slices.size(), ", is shown"));
-  if (others > 0) say(absl::StrCat(others, " files that hold no image are left out"));
-  absl::StatusOr<Model> model =
-      Finish(folder, first_facts, first, slices.size(), between, std::move(volume));
-  if (model.ok()) model->note = note;
+  AddLeftOut("files without an image", others, &left);
+  absl::StatusOr<Model> model = ReadStack(folder, &*shown);
+  if (!model.ok()) return model;
+  for (const LeftOut& one : left.left_out) AddLeftOut(one.kind, one.count, &*model);
   return model;
 }
 

@@ -10,37 +10,38 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// zlib's words for: the largest window; a header of gzip, or none.
-constexpr int kGzipAlone = 15 + 16, kNoHeader = -15;
+// zlib's words for: the largest window; a header of gzip, of gzip or zlib, or none.
+constexpr int kGzipAlone = 15 + 16, kGzipOrZlib = 15 + 32, kNoHeader = -15;
 constexpr uint64_t kStep = 1 << 20;
 
 }  // namespace
 
-absl::StatusOr<std::string> Inflate(const SourceFile& file, absl::string_view packed, uint64_t most,
-                                    Deflated kind) {
+absl::Status InflatePieces(const SourceFile& file, absl::string_view packed, uint64_t most,
+                           Deflated kind, const std::function<void(absl::string_view)>& take) {
   z_stream stream = {};
-  if (inflateInit2(&stream, kind == Deflated::kGzip ? kGzipAlone : kNoHeader) != Z_OK) {
+  const int window = kind == Deflated::kGzip     ? kGzipAlone
+                     : kind == Deflated::kEither ? kGzipOrZlib
+                                                 : kNoHeader;
+  if (inflateInit2(&stream, window) != Z_OK) {
     return absl::ResourceExhaustedError(absl::StrCat(file.path, ": no memory to decompress it"));
   }
   const std::unique_ptr<z_stream, int (*)(z_stream*)> end(&stream, inflateEnd);
-  std::string out;
+  const auto piece = std::make_unique_for_overwrite<char[]>(kStep);
   size_t read = 0;
-  uint64_t written = 0;  // of `out`, the rest of which is room
+  uint64_t written = 0;
   while (written < most) {
-    // Grows with what comes, so that a short file that promises much takes little; and only then, since streams may be many
-    // and empty.
-    if (written == out.size()) out.resize(std::min(most, written + std::max(kStep, written)));
-    const uint64_t before = written;
     const size_t given = std::min<size_t>(packed.size() - read, uint64_t{1} << 30);
-    const size_t room = std::min<size_t>(out.size() - before, uint64_t{1} << 30);
+    const size_t room = std::min(kStep, most - written);
     // zlib does not write there.
     stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data() + read));
     stream.avail_in = static_cast<uInt>(given);
-    stream.next_out = reinterpret_cast<Bytef*>(out.data() + before);
+    stream.next_out = reinterpret_cast<Bytef*>(piece.get());
     stream.avail_out = static_cast<uInt>(room);
     const int result = inflate(&stream, Z_NO_FLUSH);
+    const size_t made = room - stream.avail_out;
     read += given - stream.avail_in;
-    written = before + room - stream.avail_out;
+    written += made;
+    if (made > 0) take({piece.get(), made});
     if (result == Z_STREAM_END) {
       // Some programs write several streams, one after another.
       if (kind == Deflated::kRaw || packed.size() - read < 2 ||
@@ -49,7 +50,7 @@ absl::StatusOr<std::string> Inflate(const SourceFile& file, absl::string_view pa
       if (inflateReset(&stream) != Z_OK) break;
       continue;
     }
-    if (result != Z_OK || (written == before && read == packed.size())) {
+    if (result != Z_OK || (made == 0 && read == packed.size())) {
       return FileError(file,
                        absl::StrCat("its compressed data are ",
                                     read == packed.size() ? "cut off" : "damaged", " after byte ",
@@ -57,7 +58,19 @@ absl::StatusOr<std::string> Inflate(const SourceFile& file, absl::string_view pa
                        "copy the file again");
     }
   }
-  out.resize(written);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::string> Inflate(const SourceFile& file, absl::string_view packed, uint64_t most,
+                                    Deflated kind) {
+  std::string out;
+  const absl::Status status = InflatePieces(file, packed, most, kind, [&](absl::string_view piece) {
+    // Grows with what comes, so that a short file that promises much takes little.
+    const uint64_t size = out.size() + piece.size();
+    if (out.capacity() < size) out.reserve(std::max(size, std::min<uint64_t>(most, 2 * size)));
+    out.append(piece.data(), piece.size());
+  });
+  if (!status.ok()) return status;
   return out;
 }
 

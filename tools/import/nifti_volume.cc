@@ -1,5 +1,4 @@
-#include "tools/import/nifti_volume.h"
-
+// NIfTI, in one file or two.
 #include <nifti2_io.h>
 
 #include <algorithm>
@@ -19,6 +18,7 @@
 #include "common/text/printable.h"
 #include "tools/import/inflate.h"
 #include "tools/import/volume_samples.h"
+#include "tools/import/volumes.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -144,21 +144,62 @@ class NiftiReader {
       samples *= size_[axis];
     }
     const uint64_t bytes = samples * BytesEach();
-    std::string room;
-    const absl::StatusOr<absl::string_view> all = BeginningOf(file, from_ + bytes, &room);
-    if (!all.ok()) return all.status();
-    if (all->size() < from_ + bytes) {
-      return FileError(file,
-                       absl::StrCat("has ", all->size() - std::min<uint64_t>(from_, all->size()),
-                                    " bytes of samples; ", size_[0], " by ", size_[1], " by ",
-                                    size_[2], " of ", BytesEach(), " take ", bytes),
-                       "the file is truncated");
+    if (IsPacked(file)) {
+      if (absl::Status status = ReadPacked(file, bytes, &volume); !status.ok()) return status;
+      return Finish(IsPacked(file), std::move(volume));
     }
+    const absl::string_view all = file.bytes;
+    if (all.size() < from_ + bytes) return CutOff(file, all.size(), bytes);
+    Decode(all.substr(from_, bytes), &volume);
+    return Finish(IsPacked(file), std::move(volume));
+  }
+
+  absl::Status CutOff(const SourceFile& file, uint64_t there, uint64_t wanted) const {
+    return FileError(file,
+                     absl::StrCat("has ", there - std::min<uint64_t>(from_, there),
+                                  " bytes of samples; ", size_[0], " by ", size_[1], " by ",
+                                  size_[2], " of ", BytesEach(), " take ", wanted),
+                     "the file is truncated");
+  }
+
+  void Decode(absl::string_view bytes, SampledVolume* volume) const {
     if (channels_ > 0) {
-      DecodeColors(all->substr(from_, bytes), channels_, &volume);
+      DecodeColors(bytes, channels_, volume);
     } else {
-      DecodeSamples(all->substr(from_, bytes), code_, &volume.samples);
+      DecodeSamples(bytes, code_, &volume->samples);
     }
+  }
+
+  // Decodes what is compressed piece by piece, so that it is never in memory as a whole.
+  absl::Status ReadPacked(const SourceFile& file, uint64_t wanted, SampledVolume* volume) const {
+    const uint64_t each = BytesEach();
+    uint64_t there = 0;
+    std::string rest;  // of a sample that goes on in the next piece
+    // Memory is taken when it is filled.
+    volume->samples.reserve(wanted / each);
+    if (channels_ > 0) volume->colors.reserve(wanted / each);
+    const absl::Status status = InflatePieces(
+        file, file.bytes, from_ + wanted, Deflated::kGzip, [&](absl::string_view piece) {
+          const uint64_t skipped = std::min<uint64_t>(from_ - std::min(from_, there), piece.size());
+          there += piece.size();
+          piece.remove_prefix(skipped);
+          if (!rest.empty()) {
+            const size_t missing = std::min<size_t>(each - rest.size(), piece.size());
+            rest.append(piece.data(), missing);
+            piece.remove_prefix(missing);
+            if (rest.size() < each) return;
+            Decode(rest, volume);
+            rest.clear();
+          }
+          const size_t whole = piece.size() / each * each;
+          Decode(piece.substr(0, whole), volume);
+          rest.assign(piece.data() + whole, piece.size() - whole);
+        });
+    if (!status.ok()) return status;
+    return there < from_ + wanted ? CutOff(file, there, wanted) : absl::OkStatus();
+  }
+
+  absl::StatusOr<Model> Finish(bool packed, SampledVolume volume) const {
     if (absl::Status status = Place(&volume); !status.ok()) return status;
     if (head_.cal_max > head_.cal_min && std::isfinite(head_.cal_max - head_.cal_min)) {
       volume.window = {head_.cal_min, head_.cal_max};
@@ -166,11 +207,11 @@ class NiftiReader {
     Model model;
     model.path = file_.path;
     model.format = absl::StrCat(is_second_ ? "NIfTI-2" : "NIfTI", head_.apart ? ", two files" : "",
-                                IsPacked(file) ? ", compressed" : "");
+                                packed ? ", compressed" : "");
     model.up = Up::kZ;
-    if (volumes_ > 1) {
-      model.note = absl::StrCat(file_.path, ": the first of its ", volumes_, " volumes is shown");
-    }
+    const uint64_t times = head_.dim[0] >= 4 ? static_cast<uint64_t>(head_.dim[4]) : 1;
+    AddLeftOut("further times", times - 1, &model);
+    AddLeftOut("further components", volumes_ / times - 1, &model);
     model.volumes.push_back(std::move(volume));
     return model;
   }

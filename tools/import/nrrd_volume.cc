@@ -1,5 +1,4 @@
-#include "tools/import/nrrd_volume.h"
-
+// NRRD: lines "name: value", and samples.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -24,6 +23,7 @@
 #include "common/text/printable.h"
 #include "tools/import/inflate.h"
 #include "tools/import/volume_samples.h"
+#include "tools/import/volumes.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -109,11 +109,9 @@ class NrrdReader {
     model.path = file_.path;
     model.format = "NRRD";
     model.up = Up::kZ;
-    if (volume.colors.empty() && each_ > 1)
-      model.note = absl::StrCat(file_.path, ": the first of the ", each_,
-                                " numbers of each sample is shown");
-    if (volumes_ > 1)
-      model.note = absl::StrCat(file_.path, ": the first of its ", volumes_, " volumes is shown");
+    if (volume.colors.empty()) AddLeftOut("further components", each_ - 1, &model);
+    const bool colors = !volume.colors.empty();
+    AddLeftOut("further times", colors && AreColorPlanes() ? 0 : volumes_ - 1, &model);
     model.volumes.push_back(std::move(volume));
     return model;
   }
@@ -226,8 +224,8 @@ class NrrdReader {
     encoding_ = Plain(Field("encoding"));
     if (encoding_ == "gz") encoding_ = "gzip";
     if (encoding_ == "text" || encoding_ == "txt") encoding_ = "ascii";
-    if (encoding_ != "raw" && encoding_ != "gzip" && encoding_ != "ascii") {
-      return WrongField("encoding", "raw, gzip and ascii are read");
+    if (encoding_ != "raw" && encoding_ != "gzip" && encoding_ != "ascii" && encoding_ != "hex") {
+      return WrongField("encoding", "raw, gzip, hex and ascii are read");
     }
     if (encoding_ == "ascii" || SampleBytes(code_.type) == 1) return absl::OkStatus();
     const std::string endian = Plain(Field("endian"));
@@ -300,22 +298,73 @@ class NrrdReader {
     return Take(absl::string_view(*all).substr(skipped), wanted, volume);
   }
 
-  // Bytes of three or four, red, green and blue, whatever the axis is called, if it says something of colours.
+  static bool IsRgb(absl::string_view kind) {
+    return absl::StrContains(kind, "color") && !absl::StartsWith(kind, "hsv") &&
+           !absl::StartsWith(kind, "xyz");
+  }
+
+  // Three or four numbers, red, green and blue, whatever the axis is called, if it says something of colours.
   bool AreColors() const {
     const std::vector<absl::string_view> kinds = Words("kinds");
     const std::string kind = kinds.empty() ? "" : absl::AsciiStrToLower(kinds[0]);
-    return code_.type == SampleType::kU8 && encoding_ != "ascii" &&
-           absl::StrContains(kind, "color") && (each_ == 3 || each_ == 4);
+    return encoding_ != "ascii" && IsRgb(kind) && (each_ == 3 || each_ == 4);
+  }
+
+  // The same, with all of red before green.
+  bool AreColorPlanes() const {
+    const std::vector<absl::string_view> kinds = Words("kinds");
+    return encoding_ != "ascii" && each_ == 1 && (volumes_ == 3 || volumes_ == 4) &&
+           kinds.size() == axes_.size() + 1 && IsRgb(absl::AsciiStrToLower(kinds.back()));
+  }
+
+  // Numbers of three or four planes, side by side.
+  std::string Interleaved(absl::string_view planes) const {
+    const size_t bytes = SampleBytes(code_.type), plane = planes.size() / volumes_;
+    std::string out;
+    out.reserve(planes.size());
+    for (size_t at = 0; at < plane; at += bytes) {
+      for (size_t k = 0; k < volumes_; ++k)
+        absl::StrAppend(&out, planes.substr(k * plane + at, bytes));
+    }
+    return out;
+  }
+
+  // Two digits a byte.
+  absl::Status ReadHex(absl::string_view data, uint64_t wanted, SampledVolume* volume) const {
+    std::string bytes;
+    int high = -1;
+    for (const char c : data) {
+      if (bytes.size() == wanted) break;
+      if (absl::ascii_isspace(static_cast<unsigned char>(c))) continue;
+      if (!absl::ascii_isxdigit(static_cast<unsigned char>(c))) {
+        return FileError(file_,
+                         absl::StrCat("has \"", EscapeForTerminal(absl::string_view(&c, 1)),
+                                      "\" behind ", bytes.size(), " bytes of samples in hex"),
+                         "hexadecimal digits are expected");
+      }
+      const int digit = absl::ascii_isdigit(static_cast<unsigned char>(c))
+                            ? c - '0'
+                            : absl::ascii_tolower(static_cast<unsigned char>(c)) - 'a' + 10;
+      if (high < 0) {
+        high = digit;
+      } else {
+        bytes += static_cast<char>(high * 16 + digit);
+        high = -1;
+      }
+    }
+    return Take(bytes, wanted, volume);
   }
 
   absl::Status ReadSamples(absl::string_view data, SampledVolume* volume) const {
     std::vector<float>* const out = &volume->samples;
     // Of the first volume.
-    const uint64_t samples = size_[0] * size_[1] * size_[2] * each_;
+    const uint64_t samples = size_[0] * size_[1] * size_[2] * (AreColorPlanes() ? volumes_ : each_);
     const uint64_t wanted = samples * SampleBytes(code_.type);
     if (encoding_ == "gzip") return ReadCompressed(data, wanted, volume);
-    if (absl::Status status = Skip(&data, wanted * volumes_); !status.ok()) return status;
+    const uint64_t all = AreColorPlanes() ? wanted : wanted * volumes_;
+    if (absl::Status status = Skip(&data, all); !status.ok()) return status;
     if (encoding_ == "raw") return Take(data, wanted, volume);
+    if (encoding_ == "hex") return ReadHex(data, wanted, volume);
     while (out->size() < samples) {
       const size_t from = std::min(data.find_first_not_of(" \t\r\n,"), data.size());
       data.remove_prefix(from);
@@ -336,13 +385,8 @@ class NrrdReader {
       return FileError(file_, absl::StrCat("has ", out->size(), " samples of ", samples),
                        "the file is truncated");
     }
-    KeepFirstOfEach(out);
+    KeepFirstOfEach(each_, out);
     return absl::OkStatus();
-  }
-
-  void KeepFirstOfEach(std::vector<float>* samples) const {
-    for (size_t i = 0; i * each_ < samples->size(); ++i) (*samples)[i] = (*samples)[i * each_];
-    samples->resize(samples->size() / each_);
   }
 
   absl::Status Take(absl::string_view data, uint64_t wanted, SampledVolume* volume) const {
@@ -353,11 +397,15 @@ class NrrdReader {
                        "the file is truncated");
     }
     if (AreColors()) {
-      DecodeColors(data.substr(0, wanted), each_, volume);
+      DecodeColors(data.substr(0, wanted), code_, each_, volume);
+      return absl::OkStatus();
+    }
+    if (AreColorPlanes()) {
+      DecodeColors(Interleaved(data.substr(0, wanted)), code_, volumes_, volume);
       return absl::OkStatus();
     }
     DecodeSamples(data.substr(0, wanted), code_, &volume->samples);
-    KeepFirstOfEach(&volume->samples);
+    KeepFirstOfEach(each_, &volume->samples);
     return absl::OkStatus();
   }
 
@@ -379,7 +427,8 @@ class NrrdReader {
     std::array<Point3, 3> steps = {Point3{1, 0, 0}, Point3{0, 1, 0}, Point3{0, 0, 1}};
     Point3 first;
     const std::vector<absl::string_view> directions = Words("spacedirections"),
-                                         spacings = Words("spacings");
+                                         spacings = Words("spacings"), mins = Words("axismins"),
+                                         maxs = Words("axismaxs"), centers = Words("centers");
     for (size_t i = 0; i < axes_.size(); ++i) {
       if (!directions.empty()) {
         const std::optional<Point3> step =
@@ -394,6 +443,16 @@ class NrrdReader {
           return WrongField("spacings", "a number for each axis is expected");
         }
         // "nan": not known.
+        double* const lengths[] = {&steps[0].x, &steps[1].y, &steps[2].z};
+        if (std::isfinite(length) && length != 0) *lengths[i] = length;
+      } else if (axes_[i] < mins.size() && axes_[i] < maxs.size()) {
+        // The ends of the axis are those of its cells, or the middles of the first and the last one.
+        const bool nodes = axes_[i] < centers.size() && centers[axes_[i]] == "node";
+        const double steps_along = static_cast<double>(size_[i]) - (nodes ? 1 : 0);
+        double least = 0, most = 0;
+        if (!absl::SimpleAtod(mins[axes_[i]], &least) || !absl::SimpleAtod(maxs[axes_[i]], &most))
+          return WrongField("axismaxs", "a number for each axis is expected");
+        const double length = (most - least) / steps_along;
         double* const lengths[] = {&steps[0].x, &steps[1].y, &steps[2].z};
         if (std::isfinite(length) && length != 0) *lengths[i] = length;
       }

@@ -1,8 +1,9 @@
-#include "tools/import/raw_volume.h"
-
+// Nothing but samples.
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "tools/import/volume_samples.h"
+#include "tools/import/volumes.h"
 
 namespace voxeld::voxelctl {
 

@@ -9,16 +9,14 @@
 #include "common/text/printable.h"
 #include "tools/import/assimp_scene.h"
 #include "tools/import/dicom_check.h"
-#include "tools/import/dicom_volume.h"
 #include "tools/import/gdal_map.h"
 #include "tools/import/gemmi_molecule.h"
 #include "tools/import/las_points.h"
 #include "tools/import/mesh_beginning.h"
 #include "tools/import/mesh_checks.h"
-#include "tools/import/nifti_volume.h"
-#include "tools/import/nrrd_volume.h"
 #include "tools/import/pcd_points.h"
 #include "tools/import/rsvg_drawing.h"
+#include "tools/import/volumes.h"
 #include "tools/voxelctl/import/importer.h"
 
 namespace voxeld::voxelctl {
@@ -58,6 +56,9 @@ absl::StatusOr<Model> ReadAny(const SourceFile& file, const ImportOptions& optio
     return ReadNiftiVolume(file);
   if (extension == "hdr" || extension == "img") return ReadNiftiVolume(file);
   if (extension == "nrrd" || extension == "nhdr") return ReadNrrdVolume(file);
+  if (extension == "mha" || extension == "mhd") return ReadMetaVolume(file);
+  if (extension == "mrc" || extension == "rec" || extension == "map") return ReadMrcVolume(file);
+  if (extension == "tif" || extension == "tiff") return ReadTiffVolume(file);
   if (extension == "raw") return ReadRawVolume(file, options.raw);
   if (IsMoleculeName(file)) return ReadMolecule(file, options.style, options.attributes);
   if (IsGdalMap(extension)) return ReadGdalMap(file, options.globe, options.attributes);
@@ -74,7 +75,8 @@ absl::StatusOr<Model> ReadAny(const SourceFile& file, const ImportOptions& optio
       ".blend, .ifc, .bvh and more), voxels (.vox), points (.ply, .pcd, "
       ".las, .xyz, .txt, .asc, .pts, .csv), maps (.geojson, .topojson, .json, .shp, .gpx, .kml), "
       "volumes (.nii, "
-      ".nii.gz, .hdr with .img, .nrrd, .nhdr, .raw, .dcm), molecules (.pdb, .ent, .cif, .mmcif, "
+      ".nii.gz, .hdr with .img, .nrrd, .nhdr, .mha, .mhd, .mrc, .rec, .map, .tif, .tiff, .raw, "
+      ".dcm), molecules (.pdb, .ent, .cif, .mmcif, "
       "also with .gz, and .xyz) and drawings "
       "(.svg, .svgz)");
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <string>
 #include <type_traits>
 
 #include "absl/strings/str_cat.h"
@@ -15,28 +16,95 @@ namespace {
 static_assert(std::endian::native == std::endian::little);
 
 constexpr uint64_t kMostAlong = 65536;
-constexpr double kLeastSlab = 0.05;  // of a volume's greatest length
+constexpr size_t kColorsAtOnce = 65536;  // whose channels are numbers between
+constexpr double kLeastSlab = 0.05;      // of a volume's greatest length
+
+// For `more` behind what is there. Grows by its size, since samples come a slice or a row at a time.
+template <typename T>
+void MakeRoom(size_t more, std::vector<T>* values) {
+  if (values->capacity() - values->size() >= more) return;
+  values->reserve(values->empty() ? more : std::max(values->size() + more, 2 * values->size()));
+}
+
+// A float of 16 bits (IEEE 754 binary16).
+struct Half {
+  uint16_t bits = 0;
+  explicit operator double() const {
+    const int exponent = bits >> 10 & 31, fraction = bits & 1023;
+    const double size = exponent == 0    ? std::ldexp(fraction, -24)
+                        : exponent == 31 ? std::numeric_limits<double>::quiet_NaN()
+                                         : std::ldexp(1024 + fraction, exponent - 25);
+    return bits >> 15 != 0 ? -size : size;
+  }
+};
+
+template <typename T>
+T NumberAt(const char* bytes, bool big_endian) {
+  char raw[sizeof(T)];
+  std::memcpy(raw, bytes, sizeof(T));
+  if (big_endian) std::reverse(raw, raw + sizeof(T));
+  T value;
+  std::memcpy(&value, raw, sizeof(T));
+  return value;
+}
+
+float FiniteOrNot(float number) {
+  return std::isfinite(number) ? number : std::numeric_limits<float>::quiet_NaN();
+}
 
 template <typename T>
 void Decode(absl::string_view bytes, const SampleCode& code, std::vector<float>* out) {
-  const size_t count = bytes.size() / sizeof(T);
-  out->reserve(out->size() + count);
+  const size_t count = bytes.size() / sizeof(T), before = out->size();
+  MakeRoom(count, out);
+  out->resize(before + count);
+  float* const numbers = out->data() + before;
+  const char* const from = bytes.data();
+  // Most files, and most of the time of large ones.
+  if constexpr (std::is_integral_v<T>) {
+    if (!code.big_endian && code.spare_bits == 0 && code.slope == 1 && code.intercept == 0) {
+      for (size_t i = 0; i < count; ++i)
+        numbers[i] = static_cast<float>(NumberAt<T>(from + i * sizeof(T), false));
+      return;
+    }
+  }
   for (size_t i = 0; i < count; ++i) {
-    char raw[sizeof(T)];
-    std::memcpy(raw, bytes.data() + i * sizeof(T), sizeof(T));
-    if (code.big_endian) std::reverse(raw, raw + sizeof(T));
-    T value;
-    std::memcpy(&value, raw, sizeof(T));
+    T value = NumberAt<T>(from + i * sizeof(T), code.big_endian);
     if constexpr (std::is_integral_v<T>) {
       // Shifting right copies the sign bit if T is signed.
       value = static_cast<T>(
           static_cast<T>(static_cast<std::make_unsigned_t<T>>(value) << code.spare_bits) >>
           code.spare_bits);
     }
-    const auto number =
-        static_cast<float>(static_cast<double>(value) * code.slope + code.intercept);
-    out->push_back(std::isfinite(number) ? number : std::numeric_limits<float>::quiet_NaN());
+    numbers[i] =
+        FiniteOrNot(static_cast<float>(static_cast<double>(value) * code.slope + code.intercept));
   }
+}
+
+// Of a colour's channel.
+double GreatestOf(SampleType type) {
+  switch (type) {
+    case SampleType::kI8:
+      return std::numeric_limits<int8_t>::max();
+    case SampleType::kU8:
+      return std::numeric_limits<uint8_t>::max();
+    case SampleType::kI16:
+      return std::numeric_limits<int16_t>::max();
+    case SampleType::kU16:
+      return std::numeric_limits<uint16_t>::max();
+    case SampleType::kI32:
+      return std::numeric_limits<int32_t>::max();
+    case SampleType::kU32:
+      return std::numeric_limits<uint32_t>::max();
+    case SampleType::kI64:
+      return static_cast<double>(std::numeric_limits<int64_t>::max());
+    case SampleType::kU64:
+      return static_cast<double>(std::numeric_limits<uint64_t>::max());
+    case SampleType::kF16:
+    case SampleType::kF32:
+    case SampleType::kF64:
+      return 1;
+  }
+  return 1;
 }
 
 }  // namespace
@@ -48,6 +116,7 @@ size_t SampleBytes(SampleType type) {
       return 1;
     case SampleType::kI16:
     case SampleType::kU16:
+    case SampleType::kF16:
       return 2;
     case SampleType::kI32:
     case SampleType::kU32:
@@ -94,6 +163,8 @@ void DecodeSamples(absl::string_view bytes, const SampleCode& code, std::vector<
       return Decode<int64_t>(bytes, code, out);
     case SampleType::kU64:
       return Decode<uint64_t>(bytes, code, out);
+    case SampleType::kF16:
+      return Decode<Half>(bytes, code, out);
     case SampleType::kF32:
       return Decode<float>(bytes, code, out);
     case SampleType::kF64:
@@ -103,8 +174,8 @@ void DecodeSamples(absl::string_view bytes, const SampleCode& code, std::vector<
 
 void DecodeColors(absl::string_view bytes, size_t bytes_each, SampledVolume* volume) {
   const size_t count = bytes.size() / bytes_each;
-  volume->colors.reserve(volume->colors.size() + count);
-  volume->samples.reserve(volume->samples.size() + count);
+  MakeRoom(count, &volume->colors);
+  MakeRoom(count, &volume->samples);
   for (size_t i = 0; i < count; ++i) {
     const auto at = [&](size_t k) { return static_cast<uint8_t>(bytes[i * bytes_each + k]); };
     const int alpha = bytes_each == 4 ? at(3) : 255;
@@ -114,6 +185,43 @@ void DecodeColors(absl::string_view bytes, size_t bytes_each, SampledVolume* vol
     volume->samples.push_back(
         static_cast<float>(0.299 * color.r + 0.587 * color.g + 0.114 * color.b));
   }
+}
+
+void DecodeColors(absl::string_view bytes, const SampleCode& code, size_t channels,
+                  SampledVolume* volume) {
+  if (code.type == SampleType::kU8 && code.slope == 1 && code.intercept == 0)
+    return DecodeColors(bytes, channels, volume);
+  const double most = GreatestOf(code.type);
+  const size_t step = channels * SampleBytes(code.type) * kColorsAtOnce;
+  std::vector<float> numbers;
+  std::string colors;
+  for (size_t at = 0; at < bytes.size(); at += step) {
+    numbers.clear();
+    colors.clear();
+    DecodeSamples(bytes.substr(at, step), code, &numbers);
+    for (const float number : numbers) {
+      const double part = std::isfinite(number) ? std::clamp(number / most, 0.0, 1.0) : 0;
+      colors += static_cast<char>(std::lround(part * 255));
+    }
+    DecodeColors(colors, channels, volume);
+  }
+}
+
+absl::StatusOr<absl::string_view> TakeSamples(const SourceFile& file, absl::string_view all,
+                                              uint64_t from, uint64_t count, uint64_t bytes_each) {
+  const uint64_t there = all.size() - std::min<uint64_t>(from, all.size());
+  const uint64_t bytes = count * bytes_each;
+  if (there >= bytes) return all.substr(from, bytes);
+  return FileError(file,
+                   absl::StrCat("has ", there, " bytes of samples; ", count, " of ", bytes_each,
+                                " bytes take ", bytes),
+                   "the file is truncated");
+}
+
+void KeepFirstOfEach(size_t each, std::vector<float>* samples) {
+  if (each == 1) return;
+  for (size_t i = 0; i * each < samples->size(); ++i) (*samples)[i] = (*samples)[i * each];
+  samples->resize(samples->size() / each);
 }
 
 absl::Status PlaceVolume(const SourceFile& file, const Point3& first,

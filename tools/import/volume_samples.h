@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "tools/voxelctl/import/import_options.h"
 #include "tools/voxelctl/import/model.h"
@@ -35,6 +36,18 @@ void DecodeSamples(absl::string_view bytes, const SampleCode& code, std::vector<
 // Colours of 3 bytes each (r g b), or of 4, the last of which says how opaque it is, behind those of `volume`; their brightness (0 to
 // 255, by ITU-R BT.601) as samples.
 void DecodeColors(absl::string_view bytes, size_t bytes_each, SampledVolume* volume);
+
+// The same for channels of any type, `channels` (3 or 4) for each colour. Integers reach to the greatest of their type, floats to 1.
+void DecodeColors(absl::string_view bytes, const SampleCode& code, size_t channels,
+                  SampledVolume* volume);
+
+// Returns: the `count` times `bytes_each` bytes of samples in `all` from byte `from` on.
+// InvalidArgument if there are fewer. `count` is kMaxModelSamples at most.
+absl::StatusOr<absl::string_view> TakeSamples(const SourceFile& file, absl::string_view all,
+                                              uint64_t from, uint64_t count, uint64_t bytes_each);
+
+// Keeps the first of each `each` samples.
+void KeepFirstOfEach(size_t each, std::vector<float>* samples);
 
 // Where a volume lies: the centre of its first sample, and from one to the next along each axis. Few layers are made
 // thick enough to be seen, a twentieth of the greatest length together.

@@ -1,4 +1,4 @@
-// Volumes: NRRD, raw numbers; and of those that libraries read (NIfTI, DICOM) the checks before.
+// Volumes: NRRD, NIfTI, MetaImage, MRC, TIFF, raw numbers; and the checks before the library that reads DICOM.
 
 #include <cmath>
 #include <cstdint>
@@ -6,15 +6,13 @@
 
 #include "tests/fuzz/import/check_model.h"
 #include "tools/import/dicom_check.h"
-#include "tools/import/nifti_volume.h"
-#include "tools/import/nrrd_volume.h"
-#include "tools/import/raw_volume.h"
+#include "tools/import/volumes.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace voxeld::voxelctl;  // NOLINT(google-build-using-namespace)
-  static constexpr const char* kExtensions[] = {"nrrd", "raw", "dcm", "nii"};
+  static constexpr const char* kExtensions[] = {"nrrd", "raw", "dcm", "nii", "mha", "mrc", "tif"};
   size_t which = 0;
-  const SourceFile file = voxeld::fuzz::FileOf(data, size, kExtensions, 4, &which);
+  const SourceFile file = voxeld::fuzz::FileOf(data, size, kExtensions, 7, &which);
   switch (which) {
     case 0:
       // A header that names files beside it reads those.
@@ -30,7 +28,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       break;
     case 2: {
       LooksLikeDicom(file);
-      const absl::StatusOr<std::optional<SourceFile>> inflated = InflateDicom(file);
+      const absl::StatusOr<std::optional<SourceFile>> inflated = PlainDicom(file);
       voxeld::fuzz::ExpectSays(inflated.status());
       if (inflated.ok() && inflated->has_value()) {
         voxeld::fuzz::ExpectSays(CheckDicom(**inflated).status());
@@ -46,8 +44,19 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       }
       break;
     }
-    default:
+    case 3:
       voxeld::fuzz::CheckModel(ReadNiftiVolume(file));
+      break;
+    case 4:
+      // A header that names files beside it reads those.
+      if (file.bytes.find("LOCAL") == std::string::npos) break;
+      voxeld::fuzz::CheckModel(ReadMetaVolume(file));
+      break;
+    case 5:
+      voxeld::fuzz::CheckModel(ReadMrcVolume(file));
+      break;
+    default:
+      voxeld::fuzz::CheckModel(ReadTiffVolume(file));
       break;
   }
   return 0;

@@ -10,9 +10,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <initializer_list>
 #include <iterator>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/match.h"
@@ -100,6 +102,50 @@ std::string Nifti() {
   return out + "12345678";
 }
 
+std::string Mrc() {
+  std::string out(1024, '\0');
+  for (const size_t i : {0, 1, 2}) {
+    Put<int32_t>(&out, 4 * i, 2);
+    Put<int32_t>(&out, 28 + 4 * i, 2);
+    Put<float>(&out, 40 + 4 * i, 2);
+    Put<float>(&out, 52 + 4 * i, 90);
+    Put<int32_t>(&out, 64 + 4 * i, static_cast<int32_t>(i + 1));
+  }
+  out.replace(208, 4, "MAP ");
+  out.replace(212, 2, "\x44\x44");
+  return out + "12345678";
+}
+
+// Pages of 2 by 1 bytes.
+std::string Tiff(uint16_t pages, uint16_t width = 2) {
+  std::string out(
+      "II*\0\x0a\0\0\0"
+      "12",
+      10);
+  for (uint16_t page = 1; page <= pages; ++page) {
+    const size_t at = out.size();
+    Put<uint16_t>(&out, at, 7);
+    size_t tag = at + 2;
+    for (const auto& [number, value] :
+         std::initializer_list<std::pair<uint16_t, uint32_t>>{{256, width},
+                                                              {257, 1u * width / 2},
+                                                              {258, 8},
+                                                              {262, 1},
+                                                              {273, 8},
+                                                              {278, 1u * width / 2},
+                                                              {279, 2}}) {
+      Put<uint16_t>(&out, tag, number);
+      Put<uint16_t>(&out, tag + 2, 4);
+      if (number == 258 || number == 262) Put<uint16_t>(&out, tag + 2, 3);
+      Put<uint32_t>(&out, tag + 4, 1);
+      Put<uint32_t>(&out, tag + 8, value);
+      tag += 12;
+    }
+    Put<uint32_t>(&out, tag, page < pages ? static_cast<uint32_t>(tag + 4) : 0);
+  }
+  return out;
+}
+
 std::string Nifti2() {
   std::string out(544, '\0');
   Put<int32_t>(&out, 0, 540);
@@ -161,6 +207,16 @@ std::vector<Sample> Samples() {
       {.name = "c.hdr", .bytes = head, .beside = "c.img", .beside_bytes = "12345678"},
       {.name = "d.img", .bytes = "12345678", .beside = "d.hdr", .beside_bytes = head},
       {"a.raw", "12345678"},
+      {"a.mha",
+       "NDims = 3\nDimSize = 2 2 2\nElementSpacing = 1 2 3\nTransformMatrix = 1 0 0 0 1 0 0 0 1\n"
+       "ElementType = MET_UCHAR\nElementDataFile = LOCAL\n12345678"},
+      {.name = "b.mhd",
+       .bytes = "NDims = 3\nDimSize = 2 2 2\nElementType = MET_UCHAR\nHeaderSize = "
+                "1\nElementDataFile = a.bytes\n",
+       .beside = "a.bytes",
+       .beside_bytes = "123456789"},
+      {"a.mrc", Mrc()},
+      {"a.tif", Tiff(3)},
       {.name = "a.nhdr",
        .bytes = "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nbyte skip: "
                 "1\ndata file: a.bytes\n",
@@ -381,6 +437,8 @@ TEST_F(Damage, HugeOnesTakeLittleMemory) {
   };
   std::string wide = Nifti();
   for (const size_t i : {1, 2, 3}) wide = set16(wide, 40 + 2 * i, 640);
+  std::string wide_mrc = Mrc();
+  for (const size_t i : {0, 1, 2}) Put<int32_t>(&wide_mrc, 4 * i, 640);
   std::string las = Las();
   Put<uint32_t>(&las, 107, 0xfffffff0);
   std::string vox = Vox();
@@ -437,6 +495,15 @@ TEST_F(Damage, HugeOnesTakeLittleMemory) {
            Gzip("1")},
       {"b.nrrd",
        "NRRD0004\ntype: double\ndimension: 3\nsizes: 640 640 640\nencoding: ascii\n\n1 2 3"},
+      {"a.mha",
+       "NDims = 3\nDimSize = 640 640 640\nCompressedData = True\nElementType = "
+       "MET_DOUBLE\nElementDataFile = LOCAL\n" +
+           Gzip("1")},
+      {"b.mha",
+       "NDims = 3\nDimSize = 640 640 640\nBinaryData = False\nElementType = "
+       "MET_DOUBLE\nElementDataFile = LOCAL\n1 2 3"},
+      {"a.mrc", wide_mrc},
+      {"a.tif", Tiff(1, 16000)},
       {"b.pcd",
        "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 0 0 0\nWIDTH 30000000\nHEIGHT "
        "1\nPOINTS 30000000\nDATA binary\n"},

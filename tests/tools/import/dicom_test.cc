@@ -286,8 +286,160 @@ TEST_F(Volumes, AFolderOfSlicesInTheirOrder) {
   EXPECT_EQ(volume.corners[0], (Point3{0.875, 1.75, 0}));
   EXPECT_EQ(volume.corners[7], (Point3{1.625, 2.75, 12}));
   EXPECT_THAT(*volume.window, ElementsAre(-160, 240));
-  EXPECT_THAT(model->note, HasSubstr("of its 2 series the one with the most slices, 2"));
-  EXPECT_THAT(model->note, HasSubstr("1 files that hold no image"));
+  EXPECT_THAT(model->left_out, ElementsAre(LeftOut{"slices of other series", 1},
+                                           LeftOut{"files without an image", 1}));
+}
+
+// Two places at three times, one of which is missing at the second place; named so that the last time comes first.
+TEST_F(Volumes, OfSeveralTimesTheFirstIsShown) {
+  const auto slice = [](double z, const char* time, uint16_t fill) {
+    return Dicom("7", z, fill, Element(8, 0x32, "TM", time));
+  };
+  folder_.Write("1", slice(0, "120500", 900));
+  folder_.Write("2", slice(0, "120000.5", 500));
+  folder_.Write("3", slice(0, "120100", 700));
+  folder_.Write("4", slice(5, "120500", 1000));
+  folder_.Write("5", slice(5, "120000.5", 600));
+  const auto model = ReadHere(folder_.Path(""), {});
+  ASSERT_THAT(model, IsOk());
+  EXPECT_THAT(model->volumes.at(0).size, ElementsAre(3, 2, 2));
+  EXPECT_EQ(model->volumes[0].samples[0], 0) << "500 times 2 less 1000";
+  EXPECT_EQ(model->volumes[0].samples[6], 200);
+  EXPECT_THAT(model->left_out, ElementsAre(LeftOut{"further times", 2}));
+  EXPECT_EQ(model->note, "");
+}
+
+TEST_F(Volumes, SlicesOfAnotherDirectionAreCounted) {
+  folder_.Write("1", Dicom("7", 0, 500));
+  folder_.Write("2", Dicom("7", 3, 500));
+  std::string scout = Dicom("7", 1, 0);
+  const std::string straight = Element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0");
+  scout.replace(scout.find(straight), straight.size(),
+                Element(0x20, 0x37, "DS", "1\\0\\0\\0\\0\\1"));
+  folder_.Write("0", scout);
+  const auto model = ReadHere(folder_.Path(""), {});
+  ASSERT_THAT(model, IsOk());
+  EXPECT_THAT(model->volumes.at(0).size, ElementsAre(3, 2, 2));
+  EXPECT_THAT(model->left_out, ElementsAre(LeftOut{"slices of another size or direction", 1}));
+}
+
+TEST_F(Volumes, GapsBetweenSlicesAreSaid) {
+  for (const double z : {0.0, 3.0, 6.0, 12.0}) folder_.Write(absl::StrCat(z), Dicom("7", z, 500));
+  const auto model = ReadHere(folder_.Path(""), {});
+  ASSERT_THAT(model, IsOk());
+  EXPECT_THAT(model->note, HasSubstr("unevenly apart (3 to 6)"));
+}
+
+// A tilted gantry: each slice lies 1 farther along y than the one below, 2 above it.
+TEST_F(Volumes, ATiltedGantryShearsTheVolume) {
+  for (int i = 0; i < 3; ++i) {
+    std::string bytes = Dicom("7", 2 * i, 500);
+    const std::string place = Element(0x20, 0x32, "DS", absl::StrCat("1\\2\\", 2.0 * i));
+    bytes.replace(bytes.find(place), place.size(),
+                  Element(0x20, 0x32, "DS", absl::StrCat("1\\", 2 + i, "\\", 2 * i)));
+    folder_.Write(absl::StrCat(i), bytes);
+  }
+  const auto model = ReadHere(folder_.Path(""), {});
+  ASSERT_THAT(model, IsOk());
+  const auto& corners = model->volumes.at(0).corners;
+  EXPECT_NEAR(corners[4].y - corners[0].y, 3, 1e-9);
+  EXPECT_NEAR(corners[4].z - corners[0].z, 6, 1e-9);
+}
+
+TEST_F(Volumes, MonochromeOneIsTurnedRound) {
+  const std::string grey = Element(0x28, 4, "CS", "MONOCHROME2");
+  std::string bytes = Dicom("7", 0, 500);
+  const auto as_one = [&grey](std::string file) {
+    return file.replace(file.find(grey), grey.size(), Element(0x28, 4, "CS", "MONOCHROME1"));
+  };
+  // Numbers 0 to 10, and a window from -160 to 240: turned round in it they are 80 to 70.
+  EXPECT_THAT(Read("a.dcm", bytes).samples, ElementsAre(0, 2, 4, 6, 8, 10));
+  const SampledVolume turned = Read("a.dcm", as_one(bytes));
+  EXPECT_THAT(turned.samples, ElementsAre(80, 78, 76, 74, 72, 70));
+  EXPECT_THAT(*turned.window, ElementsAre(-160, 240));
+  const std::string width = Element(0x28, 0x1051, "DS", "400");
+  bytes.replace(bytes.find(width), width.size(), "");
+  EXPECT_THAT(Read("b.dcm", as_one(bytes)).samples, ElementsAre(10, 8, 6, 4, 2, 0))
+      << "without a window in their range";
+}
+
+TEST_F(Volumes, AFileWithoutThePreamble) {
+  const std::string whole = Dicom("7", 0, 500);
+  EXPECT_EQ(Read("a.dcm", whole.substr(132)).samples, Read("b.dcm", whole).samples);
+  // Without the second group, too: from (0008,0016) on, which says its kind.
+  const std::string first("\x08\0\x16\0UI", 6);
+  EXPECT_EQ(Read("c.dcm", whole.substr(whole.find(first))).samples, Read("b.dcm", whole).samples);
+  EXPECT_THAT(Error("d.dcm", whole.substr(100)), HasSubstr("DICOM is expected"));
+  folder_.Write("slices-1", whole.substr(132));
+}
+
+// Frames from the top down, the last one at the place of the first: a second time.
+TEST_F(Volumes, FramesInTheOrderInWhichTheyLie) {
+  const auto item = [](const std::string& content) {
+    std::string out("\xfe\xff\x00\xe0", 4);
+    Put(&out, 4, static_cast<uint32_t>(content.size()));
+    return out + content;
+  };
+  std::string frames;
+  for (const auto& [z, slope] : std::initializer_list<std::pair<int, const char*>>{
+           {0, "1"}, {8, "10"}, {4, "100"}, {0, "1000"}}) {
+    frames += item(
+        Element(0x20, 0x9113, "SQ", item(Element(0x20, 0x32, "DS", absl::StrCat("1\\2\\", z)))) +
+        Element(0x28, 0x9145, "SQ",
+                item(Element(0x28, 0x1052, "DS", "0") + Element(0x28, 0x1053, "DS", slope))));
+  }
+  std::string bytes =
+      Dicom("7", 0, 1, Element(0x28, 8, "IS", "4") + Element(0x5200, 0x9230, "SQ", frames), 24);
+  const std::string place = Element(0x20, 0x32, "DS", "1\\2\\0");
+  // What stands for all frames is not there.
+  bytes.replace(bytes.rfind(place), place.size(), "");
+  for (const char* value : {"-1000", "2"}) {
+    const std::string rescale = Element(0x28, value[0] == '2' ? 0x1053 : 0x1052, "DS", value);
+    bytes.replace(bytes.rfind(rescale), rescale.size(), "");
+  }
+  const auto model = Import("a.dcm", bytes);
+  ASSERT_THAT(model, IsOk());
+  const SampledVolume& volume = model->volumes.at(0);
+  EXPECT_THAT(volume.size, ElementsAre(3, 2, 3));
+  EXPECT_EQ(volume.samples[0], 1);
+  EXPECT_EQ(volume.samples[6], 1300) << "the third frame, whose first number is 13";
+  EXPECT_EQ(volume.samples[12], 70) << "the second frame";
+  EXPECT_EQ(volume.corners[4].z - volume.corners[0].z, 12);
+  EXPECT_THAT(model->left_out, ElementsAre(LeftOut{"further times", 1}));
+}
+
+TEST_F(Volumes, FramesWithAPlaceOfAllBeforeTheirs) {
+  const auto item = [](const std::string& content) {
+    std::string out("\xfe\xff\x00\xe0", 4);
+    Put(&out, 4, static_cast<uint32_t>(content.size()));
+    return out + content;
+  };
+  std::string frames;
+  for (const int z : {8, 4, 0})
+    frames += item(
+        Element(0x20, 0x9113, "SQ", item(Element(0x20, 0x32, "DS", absl::StrCat("1\\2\\", z)))));
+  std::string bytes = Dicom("7", 8, 500, Element(0x28, 8, "IS", "3"), 18);
+  const std::string pixels("\xe0\x7f\x10\0OW", 6);
+  bytes.insert(bytes.rfind(pixels), Element(0x5200, 0x9230, "SQ", frames));
+  const SampledVolume volume = Read("a.dcm", bytes);
+  EXPECT_THAT(volume.size, ElementsAre(3, 2, 3));
+  EXPECT_EQ(volume.samples[0], 24) << "the third frame lies lowest";
+  EXPECT_EQ(volume.samples[12], 0);
+}
+
+// Places along a normal that no number can say do not make the order endless.
+TEST_F(Volumes, SlicesTooFarAway) {
+  for (int i = 0; i < 3; ++i) {
+    std::string bytes = Dicom("7", i, 500);
+    const std::string place = Element(0x20, 0x32, "DS", absl::StrCat("1\\2\\", i * 1.0));
+    bytes.replace(bytes.find(place), place.size(),
+                  Element(0x20, 0x32, "DS", absl::StrCat("1e308\\-1e308\\", i, "e308")));
+    const std::string direction = Element(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0");
+    bytes.replace(bytes.find(direction), direction.size(),
+                  Element(0x20, 0x37, "DS", "9\\9\\9\\-9\\9\\5"));
+    folder_.Write(absl::StrCat(i), bytes);
+  }
+  EXPECT_THAT(ReadHere(folder_.Path(""), {}), IsOk());
 }
 
 // Elements that do not say their kind, in sequences that say their length.

@@ -157,6 +157,24 @@ TEST_F(Volumes, NiftiLiesWhereItsMatrixSays) {
   EXPECT_EQ(volume.corners[1], (Point3{-13, -18.5, 28}));
 }
 
+TEST_F(Volumes, NiftiOfSeveralVolumes) {
+  const auto model = Import("a.nii", Nifti({5, 2, 1, 1, 3, 2}, 2, "12abcdefghij"));
+  ASSERT_THAT(model, IsOk());
+  EXPECT_THAT(model->volumes[0].samples, ElementsAre('1', '2'));
+  EXPECT_THAT(model->left_out,
+              ElementsAre(LeftOut{"further times", 2}, LeftOut{"further components", 1}));
+}
+
+// A background of not-a-number stays one: 0 is a number like others here.
+TEST_F(Volumes, NiftiKeepsWhatIsNoNumber) {
+  std::string floats;
+  for (const float number : {-1.0f, NAN, 0.0f}) Put<float>(&floats, floats.size(), number);
+  const SampledVolume volume = Read("a.nii", Nifti({3, 3, 1, 1}, 16, floats));
+  EXPECT_EQ(volume.samples[0], -1);
+  EXPECT_TRUE(std::isnan(volume.samples[1]));
+  EXPECT_EQ(volume.samples[2], 0);
+}
+
 TEST_F(Volumes, NiftiThatIsWrong) {
   const std::string good = Nifti({3, 2, 2, 1}, 2, "1234");
   EXPECT_THAT(Error("a.nii", "hello"), HasSubstr("has 5 bytes; a NIfTI header of 348"));

@@ -66,12 +66,44 @@ TEST_F(Volumes, NrrdInItsWays) {
   EXPECT_EQ(placed.corners[1], (Point3{0.5, -4, 0.5}));
 }
 
+TEST_F(Volumes, NrrdInHexAndBetweenAxisEnds) {
+  const std::string head = "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 2 1 2\n";
+  EXPECT_THAT(Read("h.nrrd", head + "encoding: hex\n\n01 ff\n0A0b").samples,
+              ElementsAre(1, 255, 10, 11));
+  EXPECT_THAT(Error("h.nrrd", head + "encoding: hex\n\n01 fg"),
+              HasSubstr("has \"g\" behind 1 bytes of samples in hex"));
+  // Two cells from 0 to 4; two nodes, at 0 and 3.
+  const SampledVolume volume =
+      Read("m.nrrd", head +
+                         "axis mins: 0 0 0\naxis maxs: 4 1 3\ncenters: cell "
+                         "cell node\nencoding: ascii\n\n1 2 3 4");
+  EXPECT_EQ(volume.corners[7].x - volume.corners[0].x, 4);
+  EXPECT_EQ(volume.corners[7].z - volume.corners[0].z, 6);
+}
+
 TEST_F(Volumes, NrrdOfMoreThanOneNumber) {
   const std::string head = "NRRD0004\ntype: uchar\nencoding: raw\n";
   const SampledVolume colors =
       Read("a.nrrd", head + "dimension: 3\nsizes: 3 2 1\nkinds: RGB-color domain domain\n\n123456");
   EXPECT_THAT(colors.size, ElementsAre(2, 1, 1));
   EXPECT_THAT(colors.colors, ElementsAre(Rgb{'1', '2', '3'}, Rgb{'4', '5', '6'}));
+  // All of red, then green, then blue; and numbers of 16 bits.
+  EXPECT_THAT(
+      Read("p.nrrd",
+           head + "dimension: 3\nsizes: 2 1 3\nkinds: domain domain RGB-color\n\n" + "1a2b3c")
+          .colors,
+      ElementsAre(Rgb{'1', '2', '3'}, Rgb{'a', 'b', 'c'}));
+  EXPECT_THAT(
+      Read("w.nrrd", std::string("NRRD0004\ntype: ushort\nendian: big\nencoding: raw\n"
+                                 "dimension: 3\nsizes: 3 1 1\nkinds: RGB-color domain domain\n\n") +
+                         std::string("\xff\xff\x80\x80\0\0", 6))
+          .colors,
+      ElementsAre(Rgb{255, 128, 0}));
+  const auto hsv =
+      Import("h.nrrd", head + "dimension: 3\nsizes: 3 1 1\nkinds: HSV-color domain domain\n\n123");
+  ASSERT_THAT(hsv, IsOk());
+  EXPECT_TRUE(hsv->volumes[0].colors.empty());
+  EXPECT_THAT(hsv->left_out, ElementsAre(LeftOut{"further components", 2}));
   const auto vectors =
       Import("a.nrrd", head +
                            "dimension: 4\nsizes: 2 1 2 1\nspace: left-posterior-superior\n"
@@ -79,12 +111,12 @@ TEST_F(Volumes, NrrdOfMoreThanOneNumber) {
   ASSERT_THAT(vectors, IsOk());
   EXPECT_THAT(vectors->volumes[0].samples, ElementsAre('1', '2'));
   EXPECT_EQ(vectors->volumes[0].corners[7], (Point3{1, 4.5, 2}));
-  EXPECT_THAT(vectors->note, HasSubstr("the first of the 2 numbers of each sample"));
+  EXPECT_THAT(vectors->left_out, ElementsAre(LeftOut{"further components", 1}));
   const auto times =
       Import("a.nrrd", head + "dimension: 4\nsizes: 2 1 1 3\nbyteskip: -1\n\n__12ab34");
   ASSERT_THAT(times, IsOk());
   EXPECT_THAT(times->volumes[0].samples, ElementsAre('1', '2'));
-  EXPECT_THAT(times->note, HasSubstr("the first of its 3 volumes"));
+  EXPECT_THAT(times->left_out, ElementsAre(LeftOut{"further times", 2}));
   EXPECT_THAT(Error("a.nrrd", head + "dimension: 3\nsizes: 1 2 1\nkinds: space vector space\n\n12"),
               HasSubstr("one more at the most, the first or the last"));
   EXPECT_THAT(Error("a.nrrd", head + "dimension: 4\nsizes: 1 2 1 99999999999\n\n12"),
@@ -130,7 +162,7 @@ TEST_F(Volumes, RealNrrd) {
   ASSERT_THAT(four, IsOk());
   EXPECT_THAT(four->volumes[0].size, ElementsAre(4, 3, 2));
   EXPECT_EQ(four->volumes[0].samples[23], 24);
-  EXPECT_THAT(four->note, HasSubstr("the first of its 2 volumes"));
+  EXPECT_THAT(four->left_out, ElementsAre(LeftOut{"further times", 1}));
 }
 
 TEST_F(Volumes, NrrdThatIsWrong) {
@@ -139,7 +171,7 @@ TEST_F(Volumes, NrrdThatIsWrong) {
   EXPECT_THAT(Error("a.nrrd", head), HasSubstr("header that does not end"));
   EXPECT_THAT(Error("a.nrrd", head + "encoding: raw\n\n123"), HasSubstr("has 3 bytes of samples"));
   EXPECT_THAT(Error("a.nrrd", head + "encoding: bzip2\n\n123"),
-              HasSubstr("has \"bzip2\" for \"encoding\"; raw, gzip and ascii are read"));
+              HasSubstr("has \"bzip2\" for \"encoding\"; raw, gzip, hex and ascii are read"));
   EXPECT_THAT(Error("a.nrrd", head + "encoding: ascii\n\n1 2 x 4"), HasSubstr("sample 2 is \"x\""));
   EXPECT_THAT(Error("a.nrrd", head + "encoding: ascii\n\n1 2 3"), HasSubstr("has 3 samples of 4"));
   EXPECT_THAT(Error("a.nrrd", "NRRD0004\ntype: uchar\nencoding: raw\ndimension: 5\n\n"),

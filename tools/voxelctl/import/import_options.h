@@ -12,7 +12,7 @@ namespace voxeld::voxelctl {
 // Small balls with bonds between them, or balls as large as atoms are.
 enum class MoleculeStyle : uint8_t { kBalls, kSpace };
 
-enum class SampleType : uint8_t { kI8, kU8, kI16, kU16, kI32, kU32, kI64, kU64, kF32, kF64 };
+enum class SampleType : uint8_t { kI8, kU8, kI16, kU16, kI32, kU32, kI64, kU64, kF16, kF32, kF64 };
 
 // What a file holds that is nothing but samples (.raw).
 struct RawLayout {
