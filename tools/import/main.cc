@@ -67,7 +67,7 @@ absl::Status Parse(int argc, char** argv, Wanted* wanted) {
   app.add_option("--other-files", wanted->options.other_files)
       ->transform(CLI::Transformer(other_files));
   app.add_option("--style", wanted->options.style)->transform(CLI::Transformer(styles));
-  app.add_option("--pixels", wanted->options.pixels);
+  app.add_option("--pixels", wanted->options.pixels)->delimiter('x');
   app.add_flag("--globe", wanted->options.globe);
   app.add_flag("--attributes", wanted->options.attributes);
   app.add_option("--size", size)->delimiter('x')->expected(3);

@@ -129,8 +129,10 @@ size_t EndOfRootName(absl::string_view xml) {
 
 class Drawing {
  public:
-  Drawing(const SourceFile& file, uint32_t pixels)
-      : file_(file), pixels_(std::clamp(pixels, uint32_t{1}, kMostDrawingPixels)) {}
+  Drawing(const SourceFile& file, const std::array<uint32_t, 2>& pixels)
+      : file_(file),
+        across_(std::clamp(pixels[0], uint32_t{1}, kMostDrawingPixels)),
+        up_(std::clamp(pixels[1], uint32_t{1}, kMostDrawingPixels)) {}
 
   absl::StatusOr<Model> Read() {
     std::string inflated;
@@ -262,14 +264,16 @@ class Drawing {
   }
 
   // Pixels of the rendered picture along a pixel of the result.
-  uint32_t Fine() const { return std::clamp(kFinePixels / pixels_, uint32_t{1}, kMostFine); }
+  uint32_t Fine() const {
+    return std::clamp(kFinePixels / std::max(across_, up_), uint32_t{1}, kMostFine);
+  }
 
   absl::StatusOr<Picture> Render(const Page& page) const {
     const uint32_t fine = Fine();
-    double scale = pixels_ / std::max(page.width, page.height);
+    double scale = std::min(across_ / page.width, up_ / page.height);
     const auto along = [&](double length) {
       return static_cast<uint32_t>(
-          std::clamp(std::lround(length * scale), 1L, static_cast<long>(pixels_)));
+          std::clamp(std::lround(length * scale), 1L, static_cast<long>(std::max(across_, up_))));
     };
     Picture picture;
     picture.width = along(page.width) * fine;
@@ -430,7 +434,7 @@ class Drawing {
   }
 
   const SourceFile& file_;
-  const uint32_t pixels_;
+  const uint32_t across_, up_;
   Model model_;
   Handle handle_;
 };
@@ -451,7 +455,8 @@ std::vector<std::string> PrepareDrawings() {
   return folders;
 }
 
-absl::StatusOr<Model> ReadSvgDrawing(const SourceFile& file, uint32_t pixels) {
+absl::StatusOr<Model> ReadSvgDrawing(const SourceFile& file,
+                                     const std::array<uint32_t, 2>& pixels) {
   return Drawing(file, pixels).Read();
 }
 

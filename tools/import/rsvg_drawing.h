@@ -5,6 +5,7 @@
 // threads, run for hours or end the process; texts along paths and SVG fonts are not drawn by it.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -27,11 +28,11 @@ bool IsDrawing(absl::string_view extension);
 // no other threads, before the process is confined. Takes some milliseconds. Returns: the folders of fonts.
 std::vector<std::string> PrepareDrawings();
 
-// Returns: the drawing as a picture, one sample thick and with `pixels` (1 to kMostDrawingPixels, else the nearest of these) along its
-// longer side; upright, black where nothing is drawn. It is best to have as many pixels as voxels. Strokes that are thinner than a pixel
+// Returns: the drawing as a picture, one sample thick and with at most `pixels` across and up (each 1 to kMostDrawingPixels, else the
+// nearest of these); upright, black where nothing is drawn. It is best to have as many pixels as voxels. Strokes that are thinner than a pixel
 // are as bright as if they filled it. Opens no files but fonts. Texts are left out where no font can be read, no thread can be
 // started, or one of them is larger or longer than librsvg can draw. What the picture does not show is counted in the model.
 // Errors: InvalidArgument: `file` is not a valid drawing, is too large or nests too deep, or nothing of it can be seen.
-absl::StatusOr<Model> ReadSvgDrawing(const SourceFile& file, uint32_t pixels);
+absl::StatusOr<Model> ReadSvgDrawing(const SourceFile& file, const std::array<uint32_t, 2>& pixels);
 
 }  // namespace voxeld::voxelctl

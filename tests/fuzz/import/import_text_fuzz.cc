@@ -45,7 +45,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       voxeld::fuzz::CheckModel(ReadMolecule(file, MoleculeStyle::kBalls));
       break;
     default:
-      voxeld::fuzz::CheckModel(ReadSvgDrawing(file, 16));
+      voxeld::fuzz::CheckModel(ReadSvgDrawing(file, {16, 16}));
       break;
   }
   return 0;

@@ -56,7 +56,7 @@ class Drawings : public testing::Test {
 
   absl::StatusOr<Model> Import(const std::string& bytes, uint32_t pixels = 64) {
     ImportOptions options;
-    options.pixels = pixels;
+    options.pixels = {pixels, pixels};
     return ReadHere(folder_.Write("a.svg", bytes), options);
   }
   Model ReadAll(const std::string& bytes, uint32_t pixels = 64) {
@@ -510,7 +510,7 @@ TEST_F(Drawings, TextsAreDrawnInTheSandbox) {
   for (const OtherFiles others : {OtherFiles::kBelow, OtherFiles::kNone}) {
     ImportOptions options;
     options.other_files = others;
-    options.pixels = 64;
+    options.pixels = {64, 64};
     const auto model = ImportFile(
         folder_.Write("a.svg", Svg("<text x='5' y='80' font-size='90' fill='red'>M</text>")),
         options);

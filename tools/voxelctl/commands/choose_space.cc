@@ -18,6 +18,7 @@ namespace {
 absl::StatusOr<Room> CommonRoom(std::span<const v1::DisplayDescription* const> displays) {
   std::optional<DisplaySpace> common;
   int least_side = INT_MAX;
+  std::array<uint32_t, 2> voxels = {};
   for (const v1::DisplayDescription* display : displays) {
     if (display->scene_to_voxel().m_size() != 12) continue;
     gpu::Affine view;
@@ -30,8 +31,10 @@ absl::StatusOr<Room> CommonRoom(std::span<const v1::DisplayDescription* const> d
     common = common ? Intersection(*common, *space) : *space;
     least_side = std::min({least_side, static_cast<int>(grid.nx()), static_cast<int>(grid.ny()),
                            static_cast<int>(grid.nz())});
+    voxels = {std::max(voxels[0], static_cast<uint32_t>(grid.nx())),
+              std::max(voxels[1], static_cast<uint32_t>(grid.nz()))};
   }
-  return common ? Room{*common, least_side} : Room();
+  return common ? Room{*common, voxels, least_side} : Room();
 }
 
 }  // namespace

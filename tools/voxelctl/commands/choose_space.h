@@ -1,6 +1,8 @@
 // What room there is for a scene.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <string>
 
 #include "absl/status/statusor.h"
@@ -12,6 +14,8 @@ namespace voxeld::voxelctl {
 
 struct Room {
   DisplaySpace space;
+  std::array<uint32_t, 2> voxels = {
+      512, 512};  // across and up, of the display that has the most; without a display as it stands
   int least_side =
       128;  // voxels, of the display that has the fewest along an axis; without a display as it stands
 };

@@ -52,11 +52,15 @@ std::string Label(const std::string& path) {
 
 class Player {
  public:
-  Player(const PlayOptions& options, Connection& connection, Interrupt& interrupt, Console& console)
-      : options_(options), connection_(connection), interrupt_(interrupt), console_(console) {}
+  Player(const PlayOptions& options, const DisplaySpace& space, Connection& connection,
+         Interrupt& interrupt, Console& console)
+      : options_(options),
+        space_(space),
+        connection_(connection),
+        interrupt_(interrupt),
+        console_(console) {}
 
   absl::Status Run(std::vector<Model> models) {
-    if (absl::Status status = FindSpace(); !status.ok()) return status;
     if (absl::Status status = Color(models); !status.ok()) return status;
     PlaceModels(models, space_, {.up = options_.up, .spin = options_.spin, .each = options_.each});
     ApplyLook(models, {.fill = options_.fill, .flat = options_.flat});
@@ -71,7 +75,6 @@ class Player {
 
   // One after another, each at its time; those that come too late are left out.
   absl::Status Run(FrameSource& source) {
-    if (absl::Status status = FindSpace(); !status.ok()) return status;
     FramePlacement placement(options_.up);
     const int64_t last = source.count() - 1;
     const int64_t measured = std::min(last, kMeasuredFrames - 1);
@@ -132,12 +135,6 @@ class Player {
     for (const PlayedFile& file : files) {
       if (!file.note.empty()) console_.Say(EscapeForTerminal(file.note));
     }
-  }
-
-  absl::Status FindSpace() {
-    const absl::StatusOr<Room> room = ChooseSpace(connection_, options_.display, console_);
-    if (room.ok()) space_ = room->space;
-    return room.status();
   }
 
   // A frame replaces the layer whole, but not how a command before, of the same owner, had it look.
@@ -508,11 +505,11 @@ class Player {
   }
 
   const PlayOptions& options_;
+  const DisplaySpace space_;
   Connection& connection_;
   Interrupt& interrupt_;
   Console& console_;
   sync::SystemClock clock_;
-  DisplaySpace space_;
   std::unique_ptr<SceneSession> session_;
   std::optional<client::Layer> layer_;
   sync::TimeNs start_ = 0;
@@ -531,17 +528,18 @@ class Player {
 
 absl::Status Play(const PlayOptions& options, const Connector& connect, Interrupt& interrupt,
                   Console& console) {
-  const absl::StatusOr<std::unique_ptr<FrameSource>> frames = OpenFrameSource(options, interrupt);
-  if (!frames.ok()) return frames.status();
-  absl::StatusOr<std::vector<Model>> models;
-  if (*frames == nullptr) {
-    models = ReadFiles(options, interrupt, console);
-    if (!models.ok()) return models.status();
-  }
   const absl::StatusOr<std::unique_ptr<Connection>> connection = connect();
   if (!connection.ok()) return connection.status();
-  Player player(options, **connection, interrupt, console);
-  return *frames != nullptr ? player.Run(**frames) : player.Run(*std::move(models));
+  const absl::StatusOr<Room> room = ChooseSpace(**connection, options.display, console);
+  if (!room.ok()) return room.status();
+  const absl::StatusOr<std::unique_ptr<FrameSource>> frames =
+      OpenFrameSource(options, *room, interrupt);
+  if (!frames.ok()) return frames.status();
+  Player player(options, room->space, **connection, interrupt, console);
+  if (*frames != nullptr) return player.Run(**frames);
+  absl::StatusOr<std::vector<Model>> models = ReadFiles(options, *room, interrupt, console);
+  if (!models.ok()) return models.status();
+  return player.Run(*std::move(models));
 }
 
 }  // namespace voxeld::voxelctl

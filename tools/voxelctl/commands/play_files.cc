@@ -1,6 +1,7 @@
 #include "tools/voxelctl/commands/play_files.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <string>
 #include <utility>
@@ -15,18 +16,25 @@
 namespace voxeld::voxelctl {
 namespace {
 
-ImportOptions OptionsOf(const PlayOptions& options) {
+// Room that placement leaves free, so that a drawing has as many pixels as it gets voxels.
+constexpr double kFilled = 0.97;
+
+ImportOptions OptionsOf(const PlayOptions& options, const Room& room) {
+  const auto filled = [](uint32_t voxels) {
+    return static_cast<uint32_t>(std::max(1.0, std::floor(voxels * kFilled)));
+  };
   return {.globe = options.globe,
           .raw = options.raw,
           .style = options.style,
           .attributes = !options.color_by.empty(),
+          .pixels = {filled(room.voxels[0]), filled(room.voxels[1])},
           .other_files = options.other_files};
 }
 
 }  // namespace
 
-absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interrupt& interrupt,
-                                             Console& console) {
+absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, const Room& room,
+                                             Interrupt& interrupt, Console& console) {
   std::vector<Model> models;
   std::vector<std::string> errors;
   for (size_t i = 0; i < options.files.size(); ++i) {
@@ -34,7 +42,8 @@ absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, Interru
     console.ProgressBar("reading",
                         static_cast<double>(i) / static_cast<double>(options.files.size()),
                         EscapeForTerminal(options.files[i]));
-    absl::StatusOr<Model> model = ImportFile(options.files[i], OptionsOf(options), &interrupt);
+    absl::StatusOr<Model> model =
+        ImportFile(options.files[i], OptionsOf(options, room), &interrupt);
     if (model.ok()) {
       models.push_back(*std::move(model));
     } else {
@@ -84,6 +93,7 @@ absl::Status CheckOptions(const PlayOptions& options, std::span<const Model> mod
 }
 
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenFrameSource(const PlayOptions& options,
+                                                             const Room& room,
                                                              Interrupt& interrupt) {
   if (options.animation) {
     return OpenAnimation(options.files[0], *options.animation, options.fps, options.other_files,
@@ -103,8 +113,8 @@ absl::StatusOr<std::unique_ptr<FrameSource>> OpenFrameSource(const PlayOptions& 
   const bool own = std::all_of(files->begin(), files->end(), [](const std::string& path) {
     return IsOwnFormat(ExtensionOf(path));
   });
-  if (!own) return OpenSequence(*files, OptionsOf(options), &interrupt);
-  return std::make_unique<FileFrames>(*std::move(files), OptionsOf(options), &interrupt);
+  if (!own) return OpenSequence(*files, OptionsOf(options, room), &interrupt);
+  return std::make_unique<FileFrames>(*std::move(files), OptionsOf(options, room), &interrupt);
 }
 
 }  // namespace voxeld::voxelctl

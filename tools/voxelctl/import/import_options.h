@@ -27,7 +27,7 @@ struct ImportOptions {
   MoleculeStyle style = MoleculeStyle::kBalls;
   // Points, atoms and vertices keep their numbers that are neither place, normal nor colour.
   bool attributes = false;
-  uint32_t pixels = 512;  // of the longer side of drawings
+  std::array<uint32_t, 2> pixels = {512, 512};  // most that drawings have, across and up
   OtherFiles other_files = OtherFiles::kBelow;
 };
 

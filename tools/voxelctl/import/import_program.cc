@@ -59,7 +59,7 @@ std::vector<std::string> Words(const ImportOptions& options) {
   std::vector<std::string> words = {
       absl::StrCat("--other-files=", kOtherFiles[static_cast<size_t>(options.other_files)]),
       absl::StrCat("--style=", kStyles[static_cast<size_t>(options.style)]),
-      absl::StrCat("--pixels=", options.pixels)};
+      absl::StrCat("--pixels=", options.pixels[0], "x", options.pixels[1])};
   if (options.globe) words.push_back("--globe");
   if (options.attributes) words.push_back("--attributes");
   if (options.raw) {

@@ -12,6 +12,7 @@
 #include <system_error>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "daemon/address/descriptor.h"
 #include "tools/voxelctl/import/model_bytes.h"
 #include "tools/voxelctl/import/sandbox.h"
@@ -32,6 +33,11 @@ namespace {
 constexpr rlim_t kMostDescriptors = 64;
 // Limit of what the reader may write: more than the largest model (kMaxModelVertices and the others).
 constexpr rlim_t kMostModelBytes = rlim_t{5} << 30;
+
+// What libraries read from the environment could change what a file looks like, or load code. These are for fonts of the user's own, for
+// programs that find their libraries so, and for sanitizers.
+constexpr const char* kKeptVariables[] = {"HOME", "LD_LIBRARY_PATH", "ASAN_OPTIONS", "LSAN_OPTIONS",
+                                          "UBSAN_OPTIONS"};
 
 // The folder below which the reader may open files: that of the file, or the one that is read.
 std::string Readable(const SourceFile& file) {
@@ -109,7 +115,15 @@ ReaderMain ProgramOf(std::vector<std::string> command) {
     std::vector<char*> words;
     for (std::string& word : command) words.push_back(word.data());
     words.push_back(nullptr);
-    ::execv(words[0], words.data());
+    std::vector<std::string> kept;
+    for (const char* name : kKeptVariables) {
+      if (const char* value = std::getenv(name); value != nullptr)
+        kept.push_back(absl::StrCat(name, "=", value));
+    }
+    std::vector<char*> environment;
+    for (std::string& variable : kept) environment.push_back(variable.data());
+    environment.push_back(nullptr);
+    ::execve(words[0], words.data(), environment.data());
     ::_exit(kNotStarted);
   };
 }
