@@ -12,15 +12,13 @@
 #include "absl/strings/str_join.h"
 #include "common/text/printable.h"
 #include "tools/import/assimp_scene.h"
-#include "tools/import/mesh_checks.h"
-#include "tools/import/read_any.h"
+#include "tools/import/mesh_beginning.h"
 #include "tools/voxelctl/import/contained.h"
 
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr double kTicks = 25;  // a second, where a file does not say
-constexpr double kMostAnimationFrames = 1e6;
+constexpr double kTicks = 25;           // a second, where a file does not say
 constexpr unsigned kMostShapes = 4096;  // of a mesh
 
 // The two keys around `time`, and how far it is from the first to the second.
@@ -133,7 +131,7 @@ class AnimationFrames final : public FrameSource {
 
  private:
   absl::Status Load(size_t number, double fps) {
-    const absl::StatusOr<const aiScene*> scene = LoadScene(file_, true, &importer_);
+    const absl::StatusOr<const aiScene*> scene = LoadScene(file_, &importer_);
     if (!scene.ok()) return scene.status();
     scene_ = *scene;
     if (number < 1 || number > scene_->mNumAnimations) {
@@ -149,9 +147,10 @@ class AnimationFrames final : public FrameSource {
     animation_ = scene_->mAnimations[number - 1];
     const double ticks = animation_->mTicksPerSecond > 0 ? animation_->mTicksPerSecond : kTicks;
     const double seconds = animation_->mDuration / ticks;
-    if (!(seconds >= 0) || !(seconds * fps <= kMostAnimationFrames)) {
-      return FileError(file_, absl::StrCat("has an animation of ", seconds, " s"),
-                       absl::StrCat("at most ", kMostAnimationFrames / fps, " are played"));
+    if (!(seconds >= 0) || !(seconds * fps <= static_cast<double>(kMaxFrames))) {
+      return FileError(
+          file_, absl::StrCat("has an animation of ", seconds, " s"),
+          absl::StrCat("at most ", static_cast<double>(kMaxFrames) / fps, " are played"));
     }
     ticks_a_frame_ = ticks / fps;
     count_ = std::max<int64_t>(1, std::llround(seconds * fps));
@@ -168,9 +167,9 @@ class AnimationFrames final : public FrameSource {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<FrameSource>> OpenAnimationHere(SourceFile file, size_t number,
-                                                               double fps) {
-  if (absl::Status status = CheckMeshFile(file); !status.ok()) return status;
+absl::StatusOr<std::unique_ptr<FrameSource>> OpenAssimpAnimation(SourceFile file, size_t number,
+                                                                 double fps) {
+  if (absl::Status status = CheckMeshBeginning(file); !status.ok()) return status;
   return AnimationFrames::Open(std::move(file), number, fps);
 }
 

@@ -9,36 +9,35 @@
 #include <array>
 #include <cmath>
 #include <exception>
+#include <filesystem>
 #include <optional>
+#include <set>
+#include <string_view>
 #include <utility>
 #include <vector>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_replace.h"
+#include "absl/strings/str_split.h"
 #include "absl/strings/string_view.h"
 #include "common/text/printable.h"
 #include "tools/import/assimp_files.h"
+#include "tools/import/three_mf_colors.h"
 
 namespace voxeld::voxelctl {
 namespace {
 
 // Sharper edges stay edges when a file has no normals of its own.
 constexpr float kSmoothingDegrees = 50;
+constexpr double kCreaseDegrees = 25;
 constexpr double kBoneThickness = 0.004;  // of all bones' lengths together
 
 NodeMatrix FromAssimp(const aiMatrix4x4& m) {
   return {m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2, m.c3, m.c4};
-}
-
-NodeMatrix Compose(const NodeMatrix& outer, const NodeMatrix& inner) {
-  NodeMatrix r{};
-  for (size_t row = 0; row < 12; row += 4) {
-    for (size_t col = 0; col < 4; ++col) {
-      r[row + col] = outer[row] * inner[col] + outer[row + 1] * inner[4 + col] +
-                     outer[row + 2] * inner[8 + col] + (col == 3 ? outer[row + 3] : 0);
-    }
-  }
-  return r;
 }
 
 Point3 Map(const NodeMatrix& m, const aiVector3D& v) {
@@ -47,83 +46,100 @@ Point3 Map(const NodeMatrix& m, const aiVector3D& v) {
           m[8] * x + m[9] * y + m[10] * z + m[11]};
 }
 
-// The inverse transpose up to a positive factor, so that normals stay outside under a mirror too.
-NodeMatrix NormalMatrix(const NodeMatrix& m) {
-  const std::array<double, 9> cofactors = {
-      m[5] * m[10] - m[6] * m[9], m[6] * m[8] - m[4] * m[10], m[4] * m[9] - m[5] * m[8],
-      m[2] * m[9] - m[1] * m[10], m[0] * m[10] - m[2] * m[8], m[1] * m[8] - m[0] * m[9],
-      m[1] * m[6] - m[2] * m[5],  m[2] * m[4] - m[0] * m[6],  m[0] * m[5] - m[1] * m[4]};
-  const double determinant = m[0] * cofactors[0] + m[1] * cofactors[1] + m[2] * cofactors[2];
-  const double sign = determinant < 0 ? -1 : 1;
-  NodeMatrix r{};
-  for (size_t row = 0; row < 3; ++row) {
-    for (size_t col = 0; col < 3; ++col) r[row * 4 + col] = sign * cofactors[row * 3 + col];
-  }
-  return r;
+Rgb ToRgb(const aiColor4D& c) {
+  return {ColorByte(c.r, false), ColorByte(c.g, false), ColorByte(c.b, false)};
 }
 
-Point3 Unit(const Point3& p) {
-  const double length = std::sqrt(p.x * p.x + p.y * p.y + p.z * p.z);
-  if (!(length > 1e-30) || !std::isfinite(length)) return {};
-  return {p.x / length, p.y / length, p.z / length};
-}
-
-uint8_t Channel(double value, bool linear) {
-  if (!(value > 0)) return 0;
-  value = std::min(value, 1.0);
-  if (linear) value = value <= 0.0031308 ? 12.92 * value : 1.055 * std::pow(value, 1 / 2.4) - 0.055;
-  return static_cast<uint8_t>(std::lround(value * 255));
-}
-
-Rgb ToRgb(const aiColor4D& c, bool linear) {
-  return {Channel(c.r, linear), Channel(c.g, linear), Channel(c.b, linear)};
-}
-
-// The base colour that a material states itself; none for a texture's place-holder or the
-// importer's own default.
-std::optional<aiColor4D> BaseColor(const aiMaterial& material, bool linear) {
-  // A glTF material with KHR_materials_pbrSpecularGlossiness has a diffuse colour; its base colour is the library's default.
-  float glossiness = 0;
-  const bool glossy =
-      linear && material.Get(AI_MATKEY_GLOSSINESS_FACTOR, glossiness) == aiReturn_SUCCESS;
-  aiColor4D color;
-  if ((glossy || material.Get(AI_MATKEY_BASE_COLOR, color) != aiReturn_SUCCESS) &&
-      material.Get(AI_MATKEY_COLOR_DIFFUSE, color) != aiReturn_SUCCESS) {
-    return std::nullopt;
-  }
-  const auto is_grey = [&color](float grey) {
-    return color.r == grey && color.g == grey && color.b == grey;
-  };
-  // What the OBJ reader gives to a material that it was told nothing about.
-  if (!linear && is_grey(0.6f)) return std::nullopt;
-  // The library's own material for meshes without one. A material of the file may have its name but not its colour. In glTF both
-  // are white.
+// Whether the library made the material up for meshes without one. Such a material has its name, and a colour and nothing else, or its grey.
+bool IsMadeUp(const aiMaterial& material) {
   aiString name;
+  aiColor4D color;
   material.Get(AI_MATKEY_NAME, name);
-  if (!linear && is_grey(1) && absl::string_view(name.C_Str()) == AI_DEFAULT_MATERIAL_NAME) {
-    return std::nullopt;
+  material.Get(AI_MATKEY_COLOR_DIFFUSE, color);
+  const bool has_grey = color.r == 0.6f && color.g == 0.6f && color.b == 0.6f;
+  return (material.mNumProperties <= 2 || has_grey) &&
+         absl::string_view(name.C_Str()) == AI_DEFAULT_MATERIAL_NAME;
+}
+
+// The texture that gives a material its colours.
+std::optional<aiTextureType> ColorTextureOf(const aiMaterial& material) {
+  for (const aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
+    if (material.GetTextureCount(type) > 0) return type;
   }
-  const bool textured = material.GetTextureCount(aiTextureType_DIFFUSE) > 0 ||
-                        material.GetTextureCount(aiTextureType_BASE_COLOR) > 0;
-  if (textured && is_grey(1)) return std::nullopt;
-  return color;
+  return std::nullopt;
+}
+
+// What a material has beside its colour that is not shown.
+void CountMaterial(const aiMaterial& material, bool has_picture, Model* model) {
+  static constexpr std::pair<aiTextureType, const char*> kMaps[] = {
+      {aiTextureType_NORMALS, "normal maps"},
+      {aiTextureType_HEIGHT, "normal maps"},
+      {aiTextureType_NORMAL_CAMERA, "normal maps"},
+      {aiTextureType_DISPLACEMENT, "normal maps"},
+      {aiTextureType_SPECULAR, "maps of gloss and reflection"},
+      {aiTextureType_SHININESS, "maps of gloss and reflection"},
+      {aiTextureType_REFLECTION, "maps of gloss and reflection"},
+      {aiTextureType_METALNESS, "maps of gloss and reflection"},
+      {aiTextureType_DIFFUSE_ROUGHNESS, "maps of gloss and reflection"},
+      {aiTextureType_AMBIENT, "occlusion maps"},
+      {aiTextureType_LIGHTMAP, "occlusion maps"},
+      {aiTextureType_AMBIENT_OCCLUSION, "occlusion maps"},
+      {aiTextureType_EMISSIVE, "emission maps"},
+      {aiTextureType_EMISSION_COLOR, "emission maps"},
+      {aiTextureType_OPACITY, "opacity maps"},
+      {aiTextureType_UNKNOWN, "textures of an unknown kind"}};
+  for (const auto& [type, kind] : kMaps) AddLeftOut(kind, material.GetTextureCount(type), model);
+  const std::optional<aiTextureType> shown = ColorTextureOf(material);
+  if (shown) AddLeftOut("further layers of textures", material.GetTextureCount(*shown) - 1, model);
+  float opacity = 1;
+  material.Get(AI_MATKEY_OPACITY, opacity);
+  AddLeftOut("transparency of materials", opacity < 1 ? 1 : 0, model);
+  aiColor4D emission;
+  if (has_picture && material.Get(AI_MATKEY_COLOR_EMISSIVE, emission) == aiReturn_SUCCESS &&
+      !emission.IsBlack())
+    AddLeftOut("emission over pictures", 1, model);
 }
 
 struct Context {
   const SourceFile& file;
   const aiScene& scene;
-  bool linear;         // colours are linear light
-  bool has_materials;  // of its own; some readers make one up
+  bool has_materials;             // of its own; some readers make one up
+  bool has_diffuse;               // the file has diffuse colours at all
+  const ThreeMfColors* three_mf;  // null for other formats
   const Pose* pose;
+  bool at_rest;  // the pose is the file's own
   uint64_t vertices = 0, indices = 0;
   Model* model;
   std::unordered_map<std::string, NodeMatrix> globals =
       {};  // where each node is, by its name; only with a pose
+  std::unordered_map<std::string, uint32_t> pictures = {};  // by their name
+  std::set<unsigned> materials = {};                        // that were counted
+  double rounding = 0;  // how far single precision may have moved a vertex
 };
+
+// The colour that the file gives to a material; none if it gives none.
+std::optional<aiColor4D> BaseColor(const aiMaterial& material, bool has_picture,
+                                   const Context& context) {
+  // In FBX, COLLADA and Blender a texture stands in place of the colour.
+  if (has_picture) return aiColor4D(1, 1, 1, 1);
+  if (IsMadeUp(material) || !context.has_diffuse) return std::nullopt;
+  // COLLADA has one or the other, and the library a grey.
+  if (ColorTextureOf(material) && context.file.extension == "dae") return std::nullopt;
+  aiColor4D color;
+  if (material.Get(AI_MATKEY_BASE_COLOR, color) != aiReturn_SUCCESS &&
+      material.Get(AI_MATKEY_COLOR_DIFFUSE, color) != aiReturn_SUCCESS) {
+    return std::nullopt;
+  }
+  return color;
+}
 
 // For each vertex the sum of its bones' maps by their weights; empty if the mesh has no bones, or they do nothing.
 std::vector<NodeMatrix> SkinOf(const aiMesh& mesh, const Context& context) {
   if (context.pose == nullptr || mesh.mNumBones == 0) return {};
+  const auto has_place = [&context](const aiBone* bone) {
+    return context.globals.contains(bone->mName.C_Str());
+  };
+  if (std::none_of(mesh.mBones, mesh.mBones + mesh.mNumBones, has_place)) return {};
   std::vector<NodeMatrix> skin(mesh.mNumVertices, NodeMatrix{});
   std::vector<double> weights(mesh.mNumVertices);
   for (unsigned b = 0; b < mesh.mNumBones; ++b) {
@@ -205,6 +221,90 @@ class Shaped {
   const std::vector<double>* weights_ = nullptr;
 };
 
+// The bytes of a picture that the file contains or names; empty if there are none.
+std::string PictureBytes(const Context& context, const std::string& name) {
+  if (const aiTexture* const own = context.scene.GetEmbeddedTexture(name.c_str())) {
+    // Texels, if it has a height.
+    if (own->mHeight != 0) return "texels";
+    return {reinterpret_cast<const char*>(own->pcData), own->mWidth};
+  }
+  std::string slashes = absl::StrReplaceAll(name, {{"\\", "/"}});
+  if (absl::StartsWith(slashes, "file://")) slashes.erase(0, 7);
+  // Also as the name of a file that was elsewhere on the computer that wrote this one.
+  for (const std::string& one :
+       {name, slashes, PercentDecode(slashes),
+        std::filesystem::path(PercentDecode(slashes)).filename().string()}) {
+    absl::StatusOr<SourceFile> other = ReadOtherFile(context.file, one);
+    if (other.ok()) return std::move(other->bytes);
+  }
+  return {};
+}
+
+uint32_t PictureOf(const std::string& name, Context* context) {
+  const auto [at, is_new] = context->pictures.try_emplace(name, kNoPicture);
+  if (!is_new) return at->second;
+  std::string bytes = PictureBytes(*context, name);
+  if (bytes.empty()) {
+    AddLeftOut("textures that cannot be read", 1, context->model);
+  } else if (!IsPicture(bytes)) {
+    AddLeftOut("textures that are neither PNG nor JPEG", 1, context->model);
+  } else {
+    at->second = static_cast<uint32_t>(context->model->pictures.size());
+    context->model->pictures.push_back(std::move(bytes));
+  }
+  return at->second;
+}
+
+Wrap WrapOfMode(aiTextureMapMode mode) {
+  return mode == aiTextureMapMode_Wrap     ? Wrap::kRepeat
+         : mode == aiTextureMapMode_Mirror ? Wrap::kMirror
+                                           : Wrap::kClamp;
+}
+
+void AddPicture(const aiMaterial& material, const aiMesh& mesh, Part* part, Context* context) {
+  const std::optional<aiTextureType> type = ColorTextureOf(material);
+  if (!type) return;
+  aiString name;
+  aiTextureMapping mapping = aiTextureMapping_UV;
+  unsigned channel = 0;
+  std::array<aiTextureMapMode, 3> modes = {};
+  if (material.GetTexture(*type, 0, &name, &mapping, &channel, nullptr, nullptr, modes.data()) !=
+      aiReturn_SUCCESS)
+    return;
+  if (mapping != aiTextureMapping_UV || !mesh.HasTextureCoords(channel))
+    return AddLeftOut("textures without coordinates", 1, context->model);
+  part->picture = PictureOf(name.C_Str(), context);
+  if (part->picture == kNoPicture) return;
+  aiUVTransform transform;
+  material.Get(AI_MATKEY_UVTRANSFORM(*type, 0), transform);
+  AddLeftOut("turned textures", transform.mRotation != 0 ? 1 : 0, context->model);
+  const aiVector3D* const uv = mesh.mTextureCoords[channel];
+  part->texture_coordinates.reserve(mesh.mNumVertices);
+  for (unsigned v = 0; v < mesh.mNumVertices; ++v) {
+    const float u = uv[v].x * transform.mScaling.x + transform.mTranslation.x;
+    // v goes up in the library, and down in a model.
+    const float down = 1 - (uv[v].y * transform.mScaling.y + transform.mTranslation.y);
+    part->texture_coordinates.push_back({std::isfinite(u) ? u : 0, std::isfinite(down) ? down : 0});
+  }
+  AddLeftOut("triangles across the edge of a picture that does not repeat",
+             ApplyWrap(WrapOfMode(modes[0]), WrapOfMode(modes[1]), part), context->model);
+}
+
+// The library has 24 bits for each coordinate, of the mesh and of where its node is.
+void NoteRounding(const aiMesh& mesh, const NodeMatrix& map, Context* context) {
+  double largest = 0, factor = 0, move = 0;
+  for (unsigned v = 0; v < mesh.mNumVertices; ++v) {
+    const aiVector3D& p = mesh.mVertices[v];
+    largest =
+        std::max({largest, std::abs(double{p.x}), std::abs(double{p.y}), std::abs(double{p.z})});
+  }
+  for (size_t row = 0; row < 12; row += 4) {
+    for (size_t col = 0; col < 3; ++col) factor = std::max(factor, std::abs(map[row + col]));
+    move = std::max(move, std::abs(map[row + 3]));
+  }
+  context->rounding = std::max(context->rounding, std::ldexp(largest * factor + move, -24));
+}
+
 // Parts by kind: after sorting a mesh has faces of one kind, or of points only.
 absl::Status AddMesh(const aiMesh& mesh, const std::string& node, const NodeMatrix& to_model,
                      Context* context) {
@@ -235,20 +335,7 @@ absl::Status AddMesh(const aiMesh& mesh, const std::string& node, const NodeMatr
     part.normals.reserve(mesh.mNumVertices);
     for (unsigned v = 0; v < mesh.mNumVertices; ++v)
       part.normals.push_back(
-          Unit(Map(skin.empty() ? normal_matrix : NormalMatrix(skin[v]), shaped.Normal(v))));
-  }
-  std::optional<aiColor4D> base;
-  if (context->has_materials && mesh.mMaterialIndex < context->scene.mNumMaterials) {
-    base = BaseColor(*context->scene.mMaterials[mesh.mMaterialIndex], context->linear);
-  }
-  if (mesh.HasVertexColors(0)) {
-    // In glTF the material's colour is a factor of them; in other formats they replace it.
-    const aiColor4D by = context->linear && base ? *base : aiColor4D(1, 1, 1, 1);
-    part.colors.reserve(mesh.mNumVertices);
-    for (unsigned v = 0; v < mesh.mNumVertices; ++v)
-      part.colors.push_back(ToRgb(mesh.mColors[0][v] * by, context->linear));
-  } else if (base) {
-    part.colors.assign(mesh.mNumVertices, ToRgb(*base, context->linear));
+          Direction(Map(skin.empty() ? normal_matrix : NormalMatrix(skin[v]), shaped.Normal(v))));
   }
   if (corners > 1) {
     part.indices.reserve(size_t{corners} * mesh.mNumFaces);
@@ -259,6 +346,43 @@ absl::Status AddMesh(const aiMesh& mesh, const std::string& node, const NodeMatr
     }
     if (part.indices.empty()) return absl::OkStatus();
   }
+  if (context->three_mf != nullptr && corners == 3) {
+    NoteRounding(mesh, to_model, context);
+    // A mirror turns the winding round.
+    for (size_t i = 0; IsMirror(to_model) && i < part.indices.size(); i += 3)
+      std::swap(part.indices[i + 1], part.indices[i + 2]);
+    for (Part& painted :
+         context->three_mf->Paint(mesh.mName.C_Str(), std::move(part), context->model)) {
+      AddNormals(kCreaseDegrees, &painted);
+      context->model->parts.push_back(std::move(painted));
+    }
+    return absl::OkStatus();
+  }
+  std::optional<aiColor4D> base;
+  aiColor4D light(0, 0, 0, 0);
+  if (context->has_materials && mesh.mMaterialIndex < context->scene.mNumMaterials) {
+    const aiMaterial& material = *context->scene.mMaterials[mesh.mMaterialIndex];
+    if (corners == 3) AddPicture(material, mesh, &part, context);
+    base = BaseColor(material, part.picture != kNoPicture, *context);
+    if (part.picture == kNoPicture && !IsMadeUp(material))
+      material.Get(AI_MATKEY_COLOR_EMISSIVE, light);
+    if (context->materials.insert(mesh.mMaterialIndex).second)
+      CountMaterial(material, part.picture != kNoPicture, context->model);
+  }
+  const bool has_colors = mesh.HasVertexColors(0);
+  if (has_colors || base) {
+    const aiColor4D by = base ? *base : aiColor4D(1, 1, 1, 1);
+    if (has_colors) {
+      part.colors.reserve(mesh.mNumVertices);
+      for (unsigned v = 0; v < mesh.mNumVertices; ++v)
+        part.colors.push_back(ToRgb(mesh.mColors[0][v] * by + light));
+    } else {
+      part.colors.assign(mesh.mNumVertices, ToRgb(by + light));
+    }
+  }
+  AddLeftOut("further colours of vertices", mesh.HasVertexColors(1) ? 1 : 0, context->model);
+  AddLeftOut("morph targets", context->at_rest ? mesh.mNumAnimMeshes : 0, context->model);
+  NoteRounding(mesh, to_model, context);
   context->model->parts.push_back(std::move(part));
   return absl::OkStatus();
 }
@@ -343,12 +467,15 @@ struct AssimpFormat {
   absl::string_view extension, name;
   Up up = Up::kY;
 };
-constexpr AssimpFormat kAssimpFormats[] = {{"glb", "glTF binary"},   {"gltf", "glTF"},
-                                           {"obj", "Wavefront OBJ"}, {"off", "OFF"},
-                                           {"fbx", "FBX"},           {"3mf", "3MF", Up::kZ},
-                                           {"dae", "COLLADA"},       {"blend", "Blender", Up::kZ},
-                                           {"ifc", "IFC"},           {"bvh", "BVH"},
-                                           {"amf", "AMF", Up::kZ},   {"dxf", "DXF"}};
+constexpr AssimpFormat kAssimpFormats[] = {{"off", "OFF"},
+                                           {"fbx", "FBX"},
+                                           {"3mf", "3MF", Up::kZ},
+                                           {"dae", "COLLADA"},
+                                           {"blend", "Blender", Up::kZ},
+                                           {"ifc", "IFC"},
+                                           {"bvh", "BVH"},
+                                           {"amf", "AMF", Up::kZ},
+                                           {"dxf", "DXF"}};
 
 AssimpFormat FormatOf(const SourceFile& file) {
   for (const AssimpFormat& format : kAssimpFormats) {
@@ -364,12 +491,8 @@ absl::Status Failed(const SourceFile& file, absl::string_view reason) {
                    "the file is damaged or uses what is not supported");
 }
 
-absl::StatusOr<const aiScene*> Load(const SourceFile& file, bool skinned,
-                                    Assimp::Importer* importer) {
-  int removed = aiComponent_TEXCOORDS | aiComponent_TANGENTS_AND_BITANGENTS | aiComponent_TEXTURES |
-                aiComponent_LIGHTS | aiComponent_CAMERAS;
-  if (!skinned) removed |= aiComponent_BONEWEIGHTS | aiComponent_ANIMATIONS;
-  importer->SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, removed);
+absl::StatusOr<const aiScene*> Load(const SourceFile& file, Assimp::Importer* importer) {
+  importer->SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, aiComponent_TANGENTS_AND_BITANGENTS);
   importer->SetPropertyFloat(AI_CONFIG_PP_GSN_MAX_SMOOTHING_ANGLE, kSmoothingDegrees);
   importer->SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
   importer->SetIOHandler(new AssimpFiles(file));  // which it deletes
@@ -385,7 +508,8 @@ absl::StatusOr<const aiScene*> Load(const SourceFile& file, bool skinned,
   }
   // A cloud has no faces to work on, and some steps refuse such meshes.
   const auto has_faces = [](const aiMesh* mesh) { return mesh->mNumFaces > 0; };
-  if (scene->mNumMeshes > 0 &&
+  // Colours of 3MF go by the file's order.
+  if (scene->mNumMeshes > 0 && file.extension != "3mf" &&
       std::all_of(scene->mMeshes, scene->mMeshes + scene->mNumMeshes, has_faces)) {
     scene = importer->ApplyPostProcessing(aiProcess_RemoveComponent | aiProcess_Triangulate |
                                           aiProcess_SortByPType | aiProcess_GenSmoothNormals |
@@ -402,6 +526,65 @@ Up UpOf(const aiScene& scene, Up otherwise) {
   return axis == 0 ? Up::kX : axis == 1 ? Up::kY : axis == 2 ? Up::kZ : otherwise;
 }
 
+// What the library passes over without a word, by how the file names it.
+void CountUnread(const SourceFile& file, Model* model) {
+  static constexpr std::array<std::string_view, 3> kUnread[] = {
+      {"dae", "<spline", "splines"},
+      {"dae", "<convex_mesh", "convex meshes"},
+      {"dae", "<nurbs", "NURBS"},
+      {"dae", "<brep", "solids of surfaces"},
+      {"fbx", "\"NurbsCurve\" {", "NURBS curves"},
+      {"fbx", "\"NurbsSurface\" {", "NURBS surfaces"},
+      {"fbx", {"S\12\0\0\0NurbsCurve", 15}, "NURBS curves"},
+      {"fbx", {"S\14\0\0\0NurbsSurface", 17}, "NURBS surfaces"}};
+  for (const auto& [extension, mark, kind] : kUnread) {
+    if (extension != file.extension) continue;
+    uint64_t count = 0;
+    for (size_t at = file.bytes.find(mark); at != std::string::npos;
+         at = file.bytes.find(mark, at + mark.size()))
+      ++count;
+    AddLeftOut(kind, count, model);
+  }
+  if (file.extension != "bvh") return;
+  // A line for each frame follows the announced number of them.
+  absl::string_view text = file.bytes;
+  const auto take_after = [&text](absl::string_view mark) {
+    const size_t at = text.find(mark);
+    if (at == absl::string_view::npos) return absl::string_view();
+    text.remove_prefix(at + mark.size());
+    const size_t end = std::min(text.find('\n'), text.size());
+    const absl::string_view line = absl::StripAsciiWhitespace(text.substr(0, end));
+    text.remove_prefix(end);
+    return line;
+  };
+  uint64_t announced = 0, found = 0;
+  if (!absl::SimpleAtoi(take_after("Frames:"), &announced)) return;
+  take_after("Frame Time:");
+  for (const absl::string_view line : absl::StrSplit(text, '\n'))
+    found += absl::StripAsciiWhitespace(line).empty() ? 0 : 1;
+  AddLeftOut("frames beyond the announced number", found > announced ? found - announced : 0,
+             model);
+}
+
+// Adds a note if rounding is over half a voxel where the model fills 256.
+void NoteSinglePrecision(double rounding, Model* model) {
+  Point3 least = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, most = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+  for (const Part& part : model->parts) {
+    for (const Point3& p : part.positions) {
+      least = {std::min(least.x, p.x), std::min(least.y, p.y), std::min(least.z, p.z)};
+      most = {std::max(most.x, p.x), std::max(most.y, p.y), std::max(most.z, p.z)};
+    }
+  }
+  const double size = std::max({most.x - least.x, most.y - least.y, most.z - least.z});
+  if (!(rounding > size / 512)) return;
+  model->note = absl::StrCat(
+      "its coordinates are so large that single precision, in which files of this format are read, "
+      "moves them by up to ",
+      absl::StrFormat("%.2g", rounding),
+      " of its units, over half a voxel of 256; move the model "
+      "to its origin, or export it as glTF or OBJ");
+}
+
 }  // namespace
 
 bool AssimpReads(const std::string& extension) {
@@ -409,10 +592,9 @@ bool AssimpReads(const std::string& extension) {
          Assimp::Importer().IsExtensionSupported(absl::StrCat(".", extension));
 }
 
-absl::StatusOr<const aiScene*> LoadScene(const SourceFile& file, bool skinned,
-                                         Assimp::Importer* importer) {
+absl::StatusOr<const aiScene*> LoadScene(const SourceFile& file, Assimp::Importer* importer) {
   try {
-    return Load(file, skinned, importer);
+    return Load(file, importer);
   } catch (const std::exception& error) {
     return Failed(file, error.what());
   }
@@ -424,6 +606,10 @@ absl::StatusOr<Model> ModelOf(const SourceFile& file, const aiScene& scene, cons
   model.path = file.path;
   model.format = std::string(format.name);
   model.up = UpOf(scene, format.up);
+  AddLeftOut("cameras", scene.mNumCameras, &model);
+  AddLeftOut("lights", scene.mNumLights, &model);
+  if (pose == nullptr) AddLeftOut("animations", scene.mNumAnimations, &model);
+  CountUnread(file, &model);
   if (scene.mNumMeshes == 0) {
     Part bones = Bones(*scene.mRootNode, pose);
     if (bones.positions.empty())
@@ -434,14 +620,29 @@ absl::StatusOr<Model> ModelOf(const SourceFile& file, const aiScene& scene, cons
     return model;
   }
   const bool bare = file.extension == "off";
-  Context context{.file = file,
-                  .scene = scene,
-                  .linear = absl::StartsWith(file.extension, "gl"),
-                  .has_materials = !bare,
-                  .pose = pose,
-                  .model = &model};
+  static const Pose kRest;
+  std::optional<ThreeMfColors> three_mf;
+  if (file.extension == "3mf") three_mf.emplace(file, &model);
+  Context context{
+      .file = file,
+      .scene = scene,
+      .has_materials = !bare && !three_mf,
+      // The library gives a grey to COLLADA's materials that have none.
+      .has_diffuse = file.extension != "dae" || absl::StrContains(file.bytes, "<diffuse"),
+      .three_mf = three_mf ? &*three_mf : nullptr,
+      .pose = pose == nullptr ? &kRest : pose,
+      .at_rest = pose == nullptr,
+      .model = &model};
   const absl::Status status = AddNodes(&context);
   if (!status.ok()) return status;
+  for (Part& part : model.parts) {
+    if (part.kind == Kind::kTriangles)
+      AddLeftOut("triangles without an area", DropEmptyTriangles(&part), &model);
+  }
+  std::erase_if(model.parts, [](const Part& part) {
+    return part.kind == Kind::kTriangles && part.indices.empty();
+  });
+  NoteSinglePrecision(context.rounding, &model);
   return model;
 }
 

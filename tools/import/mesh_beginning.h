@@ -1,4 +1,4 @@
-// Files of meshes that have no check of their own in mesh_checks.h: how they must begin.
+// Files of meshes that assimp reads: how they must begin.
 #pragma once
 
 #include "absl/status/status.h"

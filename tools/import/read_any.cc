@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <assimp/Importer.hpp>
+#include <utility>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
@@ -11,9 +12,10 @@
 #include "tools/import/dicom_check.h"
 #include "tools/import/gdal_map.h"
 #include "tools/import/gemmi_molecule.h"
+#include "tools/import/gltf_model.h"
 #include "tools/import/las_points.h"
 #include "tools/import/mesh_beginning.h"
-#include "tools/import/mesh_checks.h"
+#include "tools/import/obj_model.h"
 #include "tools/import/pcd_points.h"
 #include "tools/import/rsvg_drawing.h"
 #include "tools/import/volumes.h"
@@ -23,9 +25,9 @@ namespace voxeld::voxelctl {
 namespace {
 
 absl::StatusOr<Model> ReadMesh(const SourceFile& file) {
-  if (absl::Status status = CheckMeshFile(file); !status.ok()) return status;
+  if (absl::Status status = CheckMeshBeginning(file); !status.ok()) return status;
   Assimp::Importer importer;
-  const absl::StatusOr<const aiScene*> scene = LoadScene(file, false, &importer);
+  const absl::StatusOr<const aiScene*> scene = LoadScene(file, &importer);
   if (!scene.ok()) return scene.status();
   return ModelOf(file, **scene, nullptr);
 }
@@ -39,17 +41,11 @@ bool IsMoleculeName(const SourceFile& file) {
 
 }  // namespace
 
-absl::Status CheckMeshFile(const SourceFile& file) {
-  const std::string& extension = file.extension;
-  if (extension == "obj") return CheckObj(file);
-  if (extension == "gltf" || extension == "glb") return CheckGltf(file);
-  return CheckMeshBeginning(file);
-}
-
 absl::StatusOr<Model> ReadAny(const SourceFile& file, const ImportOptions& options) {
   const std::string& extension = file.extension;
   if (IsOwnFormat(extension)) return ReadOwnFormat(file, options);
-  if (extension == "obj" || extension == "gltf" || extension == "glb") return ReadMesh(file);
+  if (extension == "gltf" || extension == "glb") return ReadGltfModel(file, options.attributes);
+  if (extension == "obj") return ReadObjModel(file);
   if (extension == "pcd") return ReadPcdPoints(file, options.attributes);
   if (extension == "las" || extension == "laz") return ReadLasPoints(file, options.attributes);
   if (extension == "nii" || (extension == "gz" && absl::EndsWithIgnoreCase(file.path, ".nii.gz")))
@@ -79,6 +75,15 @@ absl::StatusOr<Model> ReadAny(const SourceFile& file, const ImportOptions& optio
       ".dcm), molecules (.pdb, .ent, .cif, .mmcif, "
       "also with .gz, and .xyz) and drawings "
       "(.svg, .svgz)");
+}
+
+absl::StatusOr<std::unique_ptr<FrameSource>> OpenAnimationHere(SourceFile file, size_t number,
+                                                               double fps) {
+  if (file.extension == "obj")
+    return FileError(file, absl::StrCat("has no animation ", number), "it has none at all");
+  const bool is_gltf = file.extension == "gltf" || file.extension == "glb";
+  return is_gltf ? OpenGltfAnimation(std::move(file), number, fps)
+                 : OpenAssimpAnimation(std::move(file), number, fps);
 }
 
 absl::StatusOr<Model> ReadFolder(const std::string& path) { return ReadDicomFolder(path); }

@@ -45,12 +45,13 @@ TEST_P(MoreMeshes, AreReadWhole) {
   EXPECT_EQ(indices, GetParam().indices);
 }
 
+// 56 of the FBX spider's 1368 triangles have no area, and one of the house.
 INSTANTIATE_TEST_SUITE_P(
     Table, MoreMeshes,
-    testing::Values(Real{"OFF/Wuson.off", "OFF", 11196}, Real{"FBX/spider.fbx", "FBX", 4104},
+    testing::Values(Real{"OFF/Wuson.off", "OFF", 11196}, Real{"FBX/spider.fbx", "FBX", 3936},
                     Real{"3MF/box.3mf", "3MF", 36}, Real{"Collada/duck.dae", "COLLADA", 12636},
                     Real{"BLEND/Suzanne_248.blend", "Blender", 11616},
-                    Real{"IFC/AC14-FZK-Haus.ifc", "IFC", 107718}, Real{"BVH/01_01.bvh", "BVH", 74},
+                    Real{"IFC/AC14-FZK-Haus.ifc", "IFC", 107715}, Real{"BVH/01_01.bvh", "BVH", 74},
                     Real{"3DS/fels.3ds", "3ds", 2304}));
 
 TEST(MoreMeshes, ThatAreWrong) {

@@ -142,10 +142,11 @@ TEST_P(RealFiles, AreReadWhole) {
   EXPECT_EQ(totals.points, GetParam().points);
 }
 
+// Of the engine's 121496 triangles 11160 have no area.
 INSTANTIATE_TEST_SUITE_P(
     Table, RealFiles,
     testing::Values(RealFile{"glTF2/2CylinderEngine-glTF-Binary/2CylinderEngine.glb", "glTF binary",
-                             121496, 0, 0},
+                             110336, 0, 0},
                     RealFile{"OBJ/WusonOBJ.obj", "Wavefront OBJ", 3732, 0, 0},
                     RealFile{"PLY/Wuson.ply", "PLY mesh", 3732, 0, 0},
                     RealFile{"STL/Wuson.stl", "STL", 3732, 0, 0},
@@ -208,6 +209,10 @@ INSTANTIATE_TEST_SUITE_P(
         BadModel{"glTF2/BoxWithInfinites-glTF-Binary/BoxWithInfinites.glb", {"-inf", "finite"}},
         BadModel{"glTF2/draco/2CylinderEngine.gltf", {"KHR_draco_mesh_compression"}},
         BadModel{"glTF2/wrongTypes/badArray.gltf", {"primitives is no array"}},
+        BadModel{"glTF2/wrongTypes/badObject.gltf",
+                 {"materials[0].pbrMetallicRoughness is [", "an object is expected"}},
+        BadModel{"glTF2/wrongTypes/badUint.gltf",
+                 {"baseColorTexture.index is -1", "a whole number from 0 is expected"}},
         BadModel{"glTF2/TestNoRootNode/SceneWithoutNodes.gltf", {"no mesh"}}));
 
 // ------------------------------------------------------------------------------ broken files

@@ -1,0 +1,352 @@
+// Formats that assimp reads: colours, textures, what it passes over, and single precision.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
+#include "tests/tools/import/read_here.h"
+#include "tests/tools/voxelctl/status_matchers.h"
+#include "tests/tools/voxelctl/temp_folder.h"
+
+namespace voxeld::voxelctl {
+namespace assimp_test {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::UnorderedElementsAre;
+
+const std::string kPng("\x89PNG\r\n\x1a\n", 8);
+
+class AssimpFormats : public testing::Test {
+ protected:
+  Model Good(const std::string& name, const std::string& bytes) {
+    absl::StatusOr<Model> model = ReadHere(folder_.Write(name, bytes), {});
+    EXPECT_THAT(model, IsOk());
+    if (!model.ok()) return Model{.parts = {Part{.positions = {{}}, .colors = {{}}}}};
+    return *std::move(model);
+  }
+  TempFolder folder_;
+};
+
+// ---------------------------------------------------------------------------------------- COLLADA, FBX
+
+// A quad; `effect` is what stands in <lambert>, `images` an image library, `extra` another source of the mesh.
+std::string Dae(const std::string& effect, const std::string& positions, bool textured = false) {
+  return absl::StrCat(
+      "<?xml version='1.0'?><COLLADA xmlns='http://www.collada.org/2005/11/COLLADASchema' "
+      "version='1.4.1'><asset><unit name='u' meter='1'/><up_axis>Y_UP</up_axis></asset>",
+      textured ? "<library_images><image id='i'><init_from>my%20picture.png</init_from></image>"
+                 "</library_images>"
+               : "",
+      "<library_effects><effect id='e'><profile_COMMON>",
+      textured
+          ? "<newparam sid='s'><surface type='2D'><init_from>i</init_from></surface></newparam>"
+            "<newparam sid='t'><sampler2D><source>s</source></sampler2D></newparam>"
+          : "",
+      "<technique sid='x'><lambert>", effect,
+      "</lambert></technique></profile_COMMON></effect></"
+      "library_effects><library_materials><material "
+      "id='m'><instance_effect "
+      "url='#e'/></material></library_materials><library_geometries><geometry "
+      "id='g'><mesh><source id='p'><float_array id='pa' count='12'>",
+      positions,
+      "</float_array><technique_common><accessor source='#pa' count='4' stride='3'><param name='X' "
+      "type='float'/><param name='Y' type='float'/><param name='Z' type='float'/></accessor>"
+      "</technique_common></source><source id='u'><float_array id='ua' count='8'>0 0 1 0 1 1 0 "
+      "1</float_array><technique_common><accessor source='#ua' count='4' stride='2'><param "
+      "name='S' "
+      "type='float'/><param name='T' "
+      "type='float'/></accessor></technique_common></source><vertices "
+      "id='v'><input semantic='POSITION' source='#p'/></vertices><polylist count='1' material='s'>"
+      "<input semantic='VERTEX' source='#v' offset='0'/><input semantic='TEXCOORD' source='#u' "
+      "offset='0' set='0'/><vcount>4</vcount><p>0 1 2 3</p></polylist></mesh></geometry><geometry "
+      "id='h'><spline closed='1'></spline></geometry></library_geometries><library_visual_scenes>"
+      "<visual_scene id='sc'><node id='n'><instance_geometry url='#g'><bind_material>"
+      "<technique_common><instance_material symbol='s' target='#m'><bind_vertex_input "
+      "semantic='UV' "
+      "input_semantic='TEXCOORD' input_set='0'/></instance_material></technique_common>"
+      "</bind_material></instance_geometry></node></visual_scene></library_visual_scenes><scene>"
+      "<instance_visual_scene url='#sc'/></scene></COLLADA>");
+}
+
+constexpr char kQuad[] = "0 0 0 1 0 0 1 4 0 0 4 0";
+
+TEST_F(AssimpFormats, ColladaColoursAndLight) {
+  const Model red =
+      Good("a.dae", Dae("<emission><color>0 0.5 0 1</color></emission><diffuse><color>1 0 0 "
+                        "1</color></diffuse>",
+                        kQuad));
+  EXPECT_EQ(red.parts[0].colors[0], (Rgb{255, 128, 0}));
+  EXPECT_THAT(red.left_out, ElementsAre(LeftOut{"splines", 1}));
+  const Model grey = Good("a.dae", Dae("<diffuse><color>0.6 0.6 0.6 1</color></diffuse>", kQuad));
+  EXPECT_EQ(grey.parts[0].colors[0], (Rgb{153, 153, 153})) << "the file's own grey";
+  EXPECT_THAT(Good("a.dae", Dae("", kQuad)).parts[0].colors, IsEmpty()) << "the library's grey";
+}
+
+TEST_F(AssimpFormats, ColladaTexturesStandInPlaceOfColours) {
+  folder_.Write("my picture.png", kPng);
+  const std::string dae =
+      Dae("<diffuse><texture texture='t' texcoord='UV'/></diffuse>", kQuad, true);
+  const Model model = Good("a.dae", dae);
+  ASSERT_THAT(model.pictures, ElementsAre(kPng));
+  const Part& part = model.parts[0];
+  EXPECT_EQ(part.picture, 0u);
+  EXPECT_EQ(part.colors[0], (Rgb{255, 255, 255}));
+  // v goes up in COLLADA: the lower left corner is (0, 1) on the picture.
+  for (size_t v = 0; v < part.positions.size(); ++v) {
+    EXPECT_FLOAT_EQ(part.texture_coordinates[v][0], static_cast<float>(part.positions[v].x));
+    EXPECT_FLOAT_EQ(part.texture_coordinates[v][1],
+                    1 - static_cast<float>(part.positions[v].y) / 4);
+  }
+  const Model missing = Good("b.dae", absl::StrReplaceAll(dae, {{"my%20picture.png", "gone.png"}}));
+  EXPECT_THAT(missing.parts[0].colors, IsEmpty()) << "the library's grey";
+  EXPECT_THAT(missing.left_out, Contains(LeftOut{"textures that cannot be read", 1}));
+}
+
+TEST_F(AssimpFormats, SinglePrecisionIsReportedBeyondHalfAVoxel) {
+  // 16777216 is 2²⁴: halves are lost there. The model is 4 high, half a voxel of 256 is 1/128.
+  const Model far = Good("a.dae", Dae("", "9000000 0 0 9000001 0 0 9000001 4 0 9000000 4 0"));
+  EXPECT_THAT(far.note, HasSubstr("single precision"));
+  EXPECT_THAT(Good("a.dae", Dae("", kQuad)).note, IsEmpty());
+  // 100 from its origin: 100·2⁻²⁴ is far below 1/128.
+  EXPECT_THAT(Good("a.dae", Dae("", "100 0 0 101 0 0 101 4 0 100 4 0")).note, IsEmpty());
+  EXPECT_THAT(
+      Good("a.off", "OFF\n3 1 0\n70000000 0 0\n70000032 0 0\n70000032 900 0\n3 0 1 2\n").note,
+      HasSubstr("single precision"));
+}
+
+std::string Fbx(const std::string& objects, const std::string& connections) {
+  return absl::StrCat(R"(; FBX 7.3.0 project file
+FBXHeaderExtension:  {
+	FBXHeaderVersion: 1003
+	FBXVersion: 7300
+}
+GlobalSettings:  {
+	Version: 1000
+	Properties70:  {
+	}
+}
+Definitions:  {
+	Version: 100
+	Count: 3
+}
+Objects:  {
+	Geometry: 100, "Geometry::", "Mesh" {
+		Vertices: *12 {
+			a: 0,0,0,1,0,0,1,0,4,0,0,4
+		}
+		PolygonVertexIndex: *4 {
+			a: 0,1,2,-4
+		}
+		GeometryVersion: 124
+		LayerElementUV: 0 {
+			Version: 101
+			Name: "m"
+			MappingInformationType: "ByPolygonVertex"
+			ReferenceInformationType: "Direct"
+			UV: *8 {
+				a: 0,0,1,0,1,1,0,1
+			}
+		}
+		LayerElementMaterial: 0 {
+			Version: 101
+			Name: ""
+			MappingInformationType: "AllSame"
+			ReferenceInformationType: "IndexToDirect"
+			Materials: *1 {
+				a: 0
+			}
+		}
+		Layer: 0 {
+			Version: 100
+			LayerElement:  {
+				Type: "LayerElementUV"
+				TypedIndex: 0
+			}
+			LayerElement:  {
+				Type: "LayerElementMaterial"
+				TypedIndex: 0
+			}
+		}
+	}
+	Model: 200, "Model::bar", "Mesh" {
+		Version: 232
+		Properties70:  {
+		}
+	}
+)",
+                      objects, "}\nConnections:  {\n\tC: \"OO\",200,0\n\tC: \"OO\",100,200\n",
+                      connections, "}\n");
+}
+
+TEST_F(AssimpFormats, FbxTextures) {
+  const std::string material =
+      "\tMaterial: 300, \"Material::red\", \"\" {\n\t\tVersion: 102\n\t\tShadingModel: "
+      "\"lambert\"\n\t\tProperties70:  {\n\t\t\tP: \"DiffuseColor\", \"Color\", \"\", "
+      "\"A\",1,0,0\n\t\t}\n\t}\n";
+  const std::string texture =
+      "\tTexture: 400, \"Texture::t\", \"\" {\n\t\tType: \"TextureVideoClip\"\n\t\tVersion: "
+      "202\n\t\tTextureName: \"Texture::t\"\n\t\tFileName: "
+      "\"C:\\\\models\\\\p.png\"\n\t\tRelativeFilename: "
+      "\"p.png\"\n\t\tModelUVTranslation: 0,0\n\t\tModelUVScaling: 1,1\n\t}\n";
+  const std::string joined = "\tC: \"OO\",300,200\n";
+  EXPECT_THAT(Good("a.fbx", Fbx("", "")).parts[0].colors, IsEmpty())
+      << "the library's own material";
+  EXPECT_EQ(Good("a.fbx", Fbx(material, joined)).parts[0].colors[0], (Rgb{255, 0, 0}));
+  folder_.Write("p.png", kPng);
+  const Model model =
+      Good("a.fbx", Fbx(material + texture, joined + "\tC: \"OP\",400,300, \"DiffuseColor\"\n"));
+  ASSERT_THAT(model.pictures, ElementsAre(kPng));
+  EXPECT_EQ(model.parts[0].colors[0], (Rgb{255, 255, 255}));
+  EXPECT_EQ(model.parts[0].texture_coordinates.size(), model.parts[0].positions.size());
+}
+
+TEST_F(AssimpFormats, FramesOfBvhBeyondTheAnnouncedNumber) {
+  const std::string bvh =
+      "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\nEnd "
+      "Site\n{\nOFFSET 0 4 0\n}\n}\nMOTION\nFrames: 1\nFrame Time: 0.1\n0 0 0\n";
+  EXPECT_THAT(Good("a.bvh", bvh).left_out, ElementsAre(LeftOut{"animations", 1}));
+  EXPECT_THAT(Good("a.bvh", bvh + "1 0 0\n2 0 0\n").left_out,
+              Contains(LeftOut{"frames beyond the announced number", 2}));
+}
+
+// ------------------------------------------------------------------------------------------------ 3MF
+
+std::string Zip(const std::vector<std::pair<std::string, std::string>>& entries) {
+  const auto number = [](uint64_t value, size_t bytes) {
+    return std::string(reinterpret_cast<const char*>(&value), bytes);
+  };
+  std::string out, directory;
+  for (const auto& [name, bytes] : entries) {
+    const uint64_t crc =
+        ::crc32(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(bytes.size()));
+    const std::string common =
+        absl::StrCat(number(20, 2), number(0, 8), number(crc, 4), number(bytes.size(), 4),
+                     number(bytes.size(), 4), number(name.size(), 2), number(0, 2));
+    absl::StrAppend(&directory, "PK\x01\x02", number(20, 2), common, number(0, 10),
+                    number(out.size(), 4), name);
+    absl::StrAppend(&out, "PK\x03\x04", common, name, bytes);
+  }
+  return absl::StrCat(out, directory, "PK\x05\x06", number(0, 4), number(entries.size(), 2),
+                      number(entries.size(), 2), number(directory.size(), 4), number(out.size(), 4),
+                      number(0, 2));
+}
+
+// A tetrahedron; `triangles` are the properties of each of its four.
+std::string ThreeMf(const std::string& resources, const std::string& object,
+                    const std::vector<std::string>& triangles, const std::string& more = "",
+                    const std::string& item = "") {
+  static constexpr const char* kCorners[] = {"v1='0' v2='2' v3='1'", "v1='0' v2='1' v3='3'",
+                                             "v1='1' v2='2' v3='3'", "v1='0' v2='3' v3='2'"};
+  std::string all;
+  for (size_t i = 0; i < 4; ++i)
+    absl::StrAppend(&all, "<triangle ", kCorners[i], " ", i < triangles.size() ? triangles[i] : "",
+                    "/>");
+  return Zip(
+      {{"[Content_Types].xml",
+        "<?xml version='1.0'?><Types "
+        "xmlns='http://schemas.openxmlformats.org/package/2006/content-types'/>"},
+       {"_rels/.rels",
+        "<?xml version='1.0' encoding='UTF-8'?><Relationships "
+        "xmlns='http://schemas.openxmlformats.org/package/2006/relationships'><Relationship "
+        "Target='/3D/3dmodel.model' Id='r' "
+        "Type='http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel'/></Relationships>"},
+       {"3D/3dmodel.model",
+        absl::StrCat(
+            "<?xml version='1.0' encoding='UTF-8'?><model unit='millimeter' "
+            "xmlns='http://schemas.microsoft.com/3dmanufacturing/core/2015/02' "
+            "xmlns:m='http://schemas.microsoft.com/3dmanufacturing/material/2015/02'><resources>",
+            resources, "<object id='1' type='model' ", object,
+            "><mesh><vertices><vertex x='0' y='0' z='0'/><vertex x='1' y='0' z='0'/><vertex x='0' "
+            "y='1' z='0'/><vertex x='0' y='0' z='1'/></vertices><triangles>",
+            all, "</triangles></mesh></object>", more, "</resources><build><item objectid='1' ",
+            item, "/></build></model>")},
+       {"3D/Textures/a.png", kPng}});
+}
+
+Rgb ColorOfTriangle(const Part& part, size_t triangle) {
+  return part.colors[part.indices[3 * triangle]];
+}
+
+const char kBases[] =
+    "<basematerials id='5'><base name='a' displaycolor='#FF0000'/><base name='b' "
+    "displaycolor='#00FF00FF'/></basematerials>";
+
+TEST_F(AssimpFormats, ThreeMfBaseMaterialsOfEveryTriangle) {
+  const Part part = Good("a.3mf", ThreeMf(kBases, "pid='5' pindex='0'",
+                                          {"", "pid='5' p1='1'", "pid='5' p1='1' p2='0'", ""}))
+                        .parts.at(0);
+  ASSERT_EQ(part.indices.size(), 12u);
+  EXPECT_EQ(ColorOfTriangle(part, 0), (Rgb{255, 0, 0}));
+  EXPECT_EQ(ColorOfTriangle(part, 1), (Rgb{0, 255, 0}));
+  EXPECT_EQ(part.colors[part.indices[7]], (Rgb{0, 255, 0})) << "one material a triangle";
+  EXPECT_EQ(ColorOfTriangle(part, 3), (Rgb{255, 0, 0}));
+  for (size_t v = 0; v < part.positions.size(); ++v)
+    EXPECT_NEAR(std::hypot(part.normals[v].x, part.normals[v].y, part.normals[v].z), 1, 1e-9);
+}
+
+TEST_F(AssimpFormats, ThreeMfColourGroupsOfEveryCorner) {
+  const std::string group =
+      "<m:colorgroup id='7'><m:color color='#0000FF'/><m:color color='#FFFF0080'/></m:colorgroup>";
+  const Model model =
+      Good("a.3mf", ThreeMf(kBases + group, "pid='7' pindex='0'",
+                            {"", "p1='0' p2='1' p3='0'", "pid='5' p1='0'", "pid='9' p1='0'"}));
+  // The last triangle's group does not exist: it has no colour.
+  ASSERT_EQ(model.parts.size(), 2u);
+  EXPECT_THAT(model.parts[0].colors, IsEmpty());
+  EXPECT_EQ(model.parts[0].indices.size(), 3u);
+  const Part& part = model.parts[1];
+  EXPECT_EQ(ColorOfTriangle(part, 0), (Rgb{0, 0, 255}));
+  EXPECT_EQ(part.colors[part.indices[4]], (Rgb{255, 255, 0}));
+  EXPECT_EQ(part.colors[part.indices[5]], (Rgb{0, 0, 255}));
+  EXPECT_EQ(ColorOfTriangle(part, 2), (Rgb{255, 0, 0}));
+  EXPECT_THAT(model.left_out, ElementsAre(LeftOut{"transparency of materials", 1}));
+}
+
+TEST_F(AssimpFormats, ThreeMfTextureGroups) {
+  const std::string group =
+      "<m:texture2d id='3' path='/3D/Textures/a.png' contenttype='image/png'/><m:texture2dgroup "
+      "id='4' texid='3'><m:tex2coord u='0' v='0'/><m:tex2coord u='1' v='0'/><m:tex2coord u='0' "
+      "v='0.75'/></m:texture2dgroup>";
+  const Model model = Good("a.3mf", ThreeMf(group, "", {"pid='4' p1='0' p2='1' p3='2'"}));
+  ASSERT_THAT(model.pictures, ElementsAre(kPng));
+  ASSERT_EQ(model.parts.size(), 2u) << "three triangles have no property";
+  const Part& part = model.parts[1];
+  ASSERT_EQ(part.picture, 0u);
+  const auto at = [&part](size_t corner) { return part.texture_coordinates[part.indices[corner]]; };
+  // v goes up in 3MF.
+  EXPECT_EQ(at(0), (std::array<float, 2>{0, 1}));
+  EXPECT_EQ(at(1), (std::array<float, 2>{1, 1}));
+  EXPECT_EQ(at(2), (std::array<float, 2>{0, 0.25}));
+}
+
+TEST_F(AssimpFormats, ThreeMfPlacesAndWhatIsNotShown) {
+  const Model model =
+      Good("a.3mf",
+           ThreeMf("<m:compositematerials id='8' matid='5' matindices='0'/>", "", {},
+                   "<object id='2'><components><component objectid='1' transform='1 0 0 0 1 0 0 0 "
+                   "1 50 0 0'/></components></object>",
+                   "transform='2 0 0 0 2 0 0 0 -2 10 0 0'"));
+  ASSERT_EQ(model.parts.size(), 1u) << "no item shows the other object";
+  double least = 1e9, most = -1e9;
+  for (const Point3& p : model.parts[0].positions) {
+    least = std::min(least, p.x);
+    most = std::max(most, p.x);
+  }
+  EXPECT_EQ(least, 10);
+  EXPECT_EQ(most, 12);
+  // A mirror: the bottom is the top, and its normal points up.
+  EXPECT_THAT(model.parts[0].normals[model.parts[0].indices[0]].z, testing::DoubleNear(1, 1e-9));
+  EXPECT_THAT(model.left_out, ElementsAre(LeftOut{"composite materials", 1}));
+}
+
+}  // namespace assimp_test
+}  // namespace voxeld::voxelctl

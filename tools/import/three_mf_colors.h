@@ -1,0 +1,54 @@
+// Colours and textures of 3MF, which assimp reads for a whole object at most, and of one kind.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tools/import/mesh_parts.h"
+#include "tools/voxelctl/import/model.h"
+#include "tools/voxelctl/import/source_file.h"
+
+namespace voxeld::voxelctl {
+
+class ThreeMfColors {
+ public:
+  // Reads base materials, colour groups and texture groups of the archive's model with libxml2, and its pictures into `model`. Counts there what
+  // is not shown: composite materials, layers, lattices of beams, slices, objects in other models of the archive. What is damaged has
+  // no colour: assimp reports it.
+  ThreeMfColors(const SourceFile& file, Model* model);
+
+  // Cuts `part`, which has the triangles of an object in the file's order and no colours, into parts with the object's colours.
+  std::vector<Part> Paint(const std::string& object, Part part, Model* model) const;
+
+ private:
+  struct Group {
+    std::vector<Rgb> colors;                        // of base materials and colour groups
+    bool one_a_triangle = false;                    // base materials
+    std::vector<std::array<float, 2>> coordinates;  // of texture groups
+    uint32_t picture = kNoPicture;
+    Wrap wrap_u = Wrap::kRepeat, wrap_v = Wrap::kRepeat;
+  };
+  // A group's number and an entry for each corner.
+  struct Property {
+    uint32_t group = UINT32_MAX;
+    std::array<uint32_t, 3> entries = {};
+  };
+  struct Object {
+    Property common;
+    std::vector<Property> triangles;
+  };
+
+  // `read_entry` returns an entry of the archive.
+  void ReadModel(const std::string& text,
+                 const std::function<std::string(const std::string&)>& read_entry, Model* model);
+
+  std::map<uint32_t, Group> groups_;
+  std::map<std::string, Object> objects_;
+  std::map<uint32_t, Group> textures_;  // picture and rules
+};
+
+}  // namespace voxeld::voxelctl
