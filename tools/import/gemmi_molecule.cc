@@ -630,6 +630,7 @@ struct CifBlock {
     }
     if (found == nullptr) return {};
     std::vector<size_t> places;
+    places.reserve(names.size());
     for (const string_view name : names) places.push_back(place(*found, name));
     return {found, std::move(places)};
   }

@@ -86,6 +86,7 @@ class GltfFrames final : public FrameSource {
     const std::vector<std::string> names = scene_->AnimationNames();
     if (number < 1 || number > names.size()) {
       std::vector<std::string> known;
+      known.reserve(names.size());
       for (const std::string& name : names) {
         known.push_back(
             absl::StrCat(known.size() + 1, name.empty() ? "" : " ", EscapeForTerminal(name)));

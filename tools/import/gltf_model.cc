@@ -318,6 +318,7 @@ class Scene final : public GltfScene {
 
   std::vector<std::string> AnimationNames() const override {
     std::vector<std::string> names;
+    names.reserve(gltf_.animations.size());
     for (const tinygltf::Animation& animation : gltf_.animations) names.push_back(animation.name);
     return names;
   }

@@ -1,4 +1,4 @@
-#include "tools/import/las_points.h"
+#include "tools/import/clouds.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "tools/import/pcd_points.h"
+#include "tools/import/clouds.h"
 
 #include <liblzf/lzf.h>
 

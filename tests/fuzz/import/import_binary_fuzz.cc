@@ -3,8 +3,7 @@
 #include <cstdint>
 
 #include "tests/fuzz/import/check_model.h"
-#include "tools/import/las_points.h"
-#include "tools/import/pcd_points.h"
+#include "tools/import/clouds.h"
 #include "tools/voxelctl/import/ply_header.h"
 #include "tools/voxelctl/import/ply_mesh.h"
 #include "tools/voxelctl/import/ply_points.h"

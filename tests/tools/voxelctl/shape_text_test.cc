@@ -146,8 +146,10 @@ TEST(ShapeText, WhatIsWrongIsSaid) {
       ErrorOf("torus shell=2v"),
       "shell is \"2v\"; a number of voxels would be right, or one of units with a u, as 0.1u");
   EXPECT_EQ(ErrorOf("box label='open"), "a ' is not closed");
-  EXPECT_THAT(ErrorOf("box color=purpel"),
-              HasSubstr("color is \"purpel\"; #rrggbb or a CSS color name is expected; did you mean purple?"));
+  EXPECT_THAT(
+      ErrorOf("box color=purpel"),
+      HasSubstr(
+          "color is \"purpel\"; #rrggbb or a CSS color name is expected; did you mean purple?"));
   EXPECT_THAT(ErrorOf("points vertices=1,2"), HasSubstr("these are 2 numbers"));
   EXPECT_EQ(ErrorOf("sphere radius=1 color=red radius=2"),
             "sphere has radius twice, \"1\" and \"2\"; one of them would be right");

@@ -201,11 +201,10 @@ void MapLines::AddFeatures(const std::vector<uint32_t>& features, std::vector<fl
 absl::Status MapLines::Finish(std::string format, Model* model) && {
   // In degrees the map's edges are one place: those at ±180, or those at 0 and 360.
   const bool degrees = least_lon_ >= -360 && most_lon_ <= 360 && most_lat_ <= kMostLatitude;
-  if (degrees && least_lon_ >= -180 && most_lon_ <= 180) {
-    cut_ = 180;
-  } else if (degrees && least_lon_ >= 0) {
+  const bool around_zero = least_lon_ >= -180 && most_lon_ <= 180;
+  if (degrees && !around_zero && least_lon_ >= 0) {
     cut_ = 360;
-  } else if (degrees && globe_) {
+  } else if (degrees && (around_zero || globe_)) {
     cut_ = 180;
   }
   for (const Line& line : to_draw_) Draw(line);

@@ -121,6 +121,7 @@ ReaderMain ProgramOf(std::vector<std::string> command) {
         kept.push_back(absl::StrCat(name, "=", value));
     }
     std::vector<char*> environment;
+    environment.reserve(kept.size() + 1);
     for (std::string& variable : kept) environment.push_back(variable.data());
     environment.push_back(nullptr);
     ::execve(words[0], words.data(), environment.data());

@@ -108,7 +108,7 @@ absl::StatusOr<Legend> ApplyColorBy(const ColorBy& wanted, std::span<Model> mode
       }
       // All alike: the middle of the map.
       const double at = span > 0 ? std::clamp((number - legend.low) / span, 0.0, 1.0) : 0.5;
-      part->colors.push_back(ColorOf((*table)[static_cast<size_t>(at * 255 + 0.5)]));
+      part->colors.push_back(ColorOf((*table)[static_cast<size_t>(std::lround(at * 255))]));
     }
     part->normals.clear();
     part->picture = kNoPicture;
