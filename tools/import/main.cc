@@ -11,10 +11,12 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
 
+#include "daemon/usage/standard_output.h"
 #include "tools/import/gdal_map.h"
 #include "tools/import/read_any.h"
 #include "tools/import/rsvg_drawing.h"
@@ -142,12 +144,31 @@ std::vector<std::string> FoldersOf(const Wanted& wanted) {
   });
 }
 
+// As the table of docs/files.md.
+void PrintFormats() {
+  std::puts(
+      "| what | format | extensions | read | not read | library | files tried |\n"
+      "|---|---|---|---|---|---|---|");
+  const auto text = [](absl::string_view cell) { return std::string(cell.empty() ? "–" : cell); };
+  for (const Format& format : AllFormats()) {
+    std::printf("| %s | %s | %s | %s | %s | %s | %s |\n", text(format.what).c_str(),
+                text(format.name).c_str(), text(format.extensions).c_str(),
+                text(format.read).c_str(), text(format.not_read).c_str(),
+                text(format.library).c_str(), text(format.tried).c_str());
+  }
+}
+
 int Main(int argc, char** argv) {
   Wanted wanted;
+  if (argc == 2 && std::string_view(argv[1]) == "--formats") {
+    PrintFormats();
+    return usage::CheckedExit("voxeld-import", 0);
+  }
   if (::fcntl(kModelDescriptor, F_GETFD) < 0) {
-    std::fprintf(stderr,
-                 "voxeld-import is started by voxelctl; to show a file, run "
-                 "`voxelctl play FILE`\n");
+    std::fprintf(
+        stderr,
+        "voxeld-import is started by voxelctl; to show a file, run "
+        "`voxelctl play FILE`; to list the formats that are read, run `voxeld-import --formats`\n");
     return 2;
   }
   if (const absl::Status status = Parse(argc, argv, &wanted); !status.ok()) {

@@ -4,8 +4,10 @@
 #include <cstddef>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
+#include "tools/voxelctl/import/format.h"
 #include "tools/voxelctl/import/frames.h"
 #include "tools/voxelctl/import/import_options.h"
 #include "tools/voxelctl/import/model.h"
@@ -16,6 +18,9 @@ namespace voxeld::voxelctl {
 // Reads a file in this process: DICOM also by its contents, the others by their extension, those that voxelctl reads itself too.
 // InvalidArgument for an extension that nothing reads, with those that are read. Nobody has checked the model (CheckModel).
 absl::StatusOr<Model> ReadAny(const SourceFile& file, const ImportOptions& options);
+
+// All formats that are read, also those that voxelctl reads itself.
+std::vector<Format> AllFormats();
 
 // Reads a folder, which is taken for slices of DICOM.
 absl::StatusOr<Model> ReadFolder(const std::string& path);

@@ -8,7 +8,9 @@
 #include <system_error>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
 #include "tools/voxelctl/import/contained.h"
+#include "tools/voxelctl/import/format.h"
 #include "tools/voxelctl/import/geojson.h"
 #include "tools/voxelctl/import/import_program.h"
 #include "tools/voxelctl/import/importer.h"
@@ -154,10 +156,39 @@ absl::Status CheckModel(const SourceFile& file, const Model& model) {
   return absl::OkStatus();
 }
 
+bool HasExtension(const Format& format, absl::string_view extension) {
+  const std::vector<absl::string_view> all = absl::StrSplit(format.extensions, ' ');
+  return std::any_of(all.begin(), all.end(),
+                     [extension](absl::string_view one) { return one.substr(1) == extension; });
+}
+
+const std::vector<Format>& OwnFormats() {
+  static const std::vector<Format> formats = {
+      {"meshes", "STL", ".stl", "",
+       "ASCII and binary, several solids, the facets' colours of VisCAM, SolidView and Materialise "
+       "Magics",
+       "–", "assimp-testmodels: 8"},
+      {"meshes, points", "PLY", ".ply", "",
+       "ASCII and binary of either byte order, faces and strips, colours of vertices and faces, "
+       "normals; other properties by --color-by",
+       "pictures, materials, edges", "assimp-testmodels: 7 of 8 (one is damaged)"},
+      {"voxels", "MagicaVoxel", ".vox", "", "models where the scene's nodes put them, the palette",
+       "key frames after the first, hidden nodes and layers, materials", "–"},
+      {"points, molecules", "text", ".xyz .txt .asc .pts .csv", "",
+       "places, colours, intensities and normals by the names or the number of columns, the other "
+       "columns by --color-by; chemistry's XYZ as a molecule",
+       "frames after the first", "–"},
+      {"maps", "GeoJSON, TopoJSON", ".geojson .topojson .json", "",
+       "lines, points and the outlines of areas, simplestyle's colours; numbers of properties by "
+       "--color-by; --globe puts them on a sphere",
+       "fills of areas, heights but by --color-by", "world-atlas: 4"},
+  };
+  return formats;
+}
+
 bool IsOwnFormat(absl::string_view extension) {
-  constexpr absl::string_view kOwn[] = {"asc", "csv", "geojson", "json",     "ply", "pts",
-                                        "stl", "txt", "vox",     "topojson", "xyz"};
-  return std::find(std::begin(kOwn), std::end(kOwn), extension) != std::end(kOwn);
+  return std::any_of(OwnFormats().begin(), OwnFormats().end(),
+                     [extension](const Format& format) { return HasExtension(format, extension); });
 }
 
 absl::StatusOr<Model> ReadOwnFormat(const SourceFile& file, const ImportOptions& options) {

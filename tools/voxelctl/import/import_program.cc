@@ -8,8 +8,10 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
 #include "common/text/printable.h"
 #include "tools/voxelctl/import/contained.h"
+#include "tools/voxelctl/import/format.h"
 #include "tools/voxelctl/import/importer.h"
 #include "tools/voxelctl/import/reader_process.h"
 #include "tools/voxelctl/text/not_built.h"
@@ -34,11 +36,13 @@ std::string FindProgram() {
 
 absl::Status NoProgram(absl::string_view subject) {
 #if defined(VOXELD_HAS_IMPORTERS)
-  return absl::UnimplementedError(
-      absl::StrCat(subject, ": files of this kind are read by the program ", kProgram,
-                   ", which is not there; install the package ", kProgram,
-                   " (voxelctl itself reads .stl, .ply, .vox, .xyz, .txt, .asc, .pts, .csv, "
-                   ".geojson, .topojson and .json)"));
+  return absl::UnimplementedError(absl::StrCat(
+      subject, ": files of this kind are read by the program ", kProgram,
+      ", which is not there; install the package ", kProgram, " (voxelctl itself reads ",
+      absl::StrJoin(
+          OwnFormats(), " ",
+          [](std::string* out, const Format& format) { absl::StrAppend(out, format.extensions); }),
+      ")"));
 #else
   return NotBuilt(subject, "reads STL, PLY, VOX, GeoJSON, TopoJSON and point clouds as text",
                   "more formats", "VOXELD_IMPORTERS");

@@ -12,8 +12,7 @@
 
 namespace voxeld::voxelctl {
 
-// Whether voxelctl reads files of this extension (in lower case, without the dot) itself: stl, ply, vox, xyz, txt, asc, pts, csv, geojson,
-// topojson and json. The others are read by the program voxeld-import (import_program.h).
+// Whether voxelctl reads files of this extension (in lower case, without the dot) itself (OwnFormats). The others are read by the program voxeld-import (import_program.h).
 bool IsOwnFormat(absl::string_view extension);
 
 // Reads `path` by its extension, having checked that the contents are of that kind. Files, also folders, are read in a process of its own,
