@@ -1,7 +1,9 @@
 // Formats that assimp reads: colours, textures, what it passes over, and single precision.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
 #include <zlib.h>
+#include <algorithm>
 
 #include <cmath>
 #include <cstdint>
@@ -222,7 +224,9 @@ TEST_F(AssimpFormats, FramesOfBvhBeyondTheAnnouncedNumber) {
 
 std::string Zip(const std::vector<std::pair<std::string, std::string>>& entries) {
   const auto number = [](uint64_t value, size_t bytes) {
-    return std::string(reinterpret_cast<const char*>(&value), bytes);
+    std::string text(reinterpret_cast<const char*>(&value), std::min(bytes, sizeof(value)));
+    text.resize(bytes, '\0');
+    return text;
   };
   std::string out, directory;
   for (const auto& [name, bytes] : entries) {
