@@ -11,7 +11,8 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr uint64_t kMostBytes = 64u << 20;  // where the server names no limit
+constexpr uint64_t kBesideAsset = 64 << 10;  // of a commit that shows an asset
+constexpr uint64_t kMostBytes = 64u << 20;   // where the server names no limit
 constexpr uint32_t kMostAlong = 65536;
 constexpr size_t kBins = 1024;
 constexpr double kOutliers = 0.001;
@@ -285,10 +286,14 @@ absl::StatusOr<PackedVolume> PackVolume(const SampledVolume& volume, const Volum
   const uint64_t message =
       std::min(samples, beside_all_else(within(within(kMostBytes, limits.max_message_bytes),
                                                limits.max_uncommitted_bytes)));
-  const uint64_t asset = std::min(
-      samples,
-      within(limits.max_asset_bytes,
-             limits.max_uncommitted_bytes > 0 ? beside_all_else(limits.max_uncommitted_bytes) : 0));
+  // Until it is committed a server counts an asset twice: its bytes, and what its engines make of them.
+  const uint64_t asset =
+      std::min(samples, within(limits.max_asset_bytes,
+                               limits.max_uncommitted_bytes > 0
+                                   ? (limits.max_uncommitted_bytes -
+                                      std::min(limits.max_uncommitted_bytes / 2, kBesideAsset)) /
+                                         2
+                                   : 0));
   const uint64_t wanted = volume.samples.size() * BytesEach(volume, look);
   if (!upload || wanted <= message || asset <= message)
     return PackWithin(volume, look, message, nullptr);
