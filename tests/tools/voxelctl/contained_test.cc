@@ -162,7 +162,6 @@ TEST(Contained, ModelsThatAreNotSoundAreRefused) {
   EXPECT_TRUE(
       refused(with_picture([](Model& m) { m.parts[0].texture_coordinates[2][1] = INFINITY; })));
   EXPECT_TRUE(refused(with_picture([](Model& m) { m.parts[0].attributes[0].values.pop_back(); })));
-  EXPECT_TRUE(refused([](Model& m) { m.parts[0].level = kMostLevel + 1; }));
   EXPECT_TRUE(refused([](Model& m) { m.parts[0].thickness = HUGE_VAL; }));
   EXPECT_TRUE(refused([](Model& m) { m.volumes[0].corners[3].y = HUGE_VAL; }));
   // Their product is 4 modulo 2⁶⁴.

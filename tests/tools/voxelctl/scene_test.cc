@@ -421,32 +421,6 @@ TEST(PackObject, APictureThatCannotBeReadIsSaid) {
   EXPECT_THAT(packed.sizes->note, testing::HasSubstr("a picture of it"));
 }
 
-TEST(PackLevels, AnObjectForEach) {
-  Model model{.path = "a.svg"};
-  for (const uint8_t level : {uint8_t{0}, uint8_t{7}, uint8_t{0}, uint8_t{90}}) {
-    Part part{.kind = Kind::kPoints, .positions = {{1, 2, 3}}, .colors = {{1, 1, 1}}};
-    part.level = level;
-    model.parts.push_back(part);
-  }
-  std::vector<std::string> defined;
-  const auto packed =
-      PackLevels(&model, "thing", {},
-                 [&](const std::string& object, const std::vector<client::Part>&, uint64_t) {
-                   defined.push_back(object);
-                   return absl::OkStatus();
-                 });
-  ASSERT_THAT(packed, IsOk());
-  EXPECT_THAT(defined, testing::ElementsAre("thing/0", "thing", "thing/over1/0", "thing/over1",
-                                            "thing/over2/0", "thing/over2"));
-  ASSERT_EQ(packed->levels.size(), 3u);
-  EXPECT_EQ(packed->levels[2].object, "thing/over2");
-  EXPECT_EQ(packed->levels[2].objects, 2u);
-  EXPECT_EQ(packed->sizes.vertices, 4u);
-  EXPECT_EQ(packed->sizes.objects, 6u);
-  EXPECT_EQ(model.path, "a.svg");
-  EXPECT_TRUE(model.parts.empty());
-}
-
 TEST(PackObject, SaysWhatIsTooSmall) {
   client::Limits limits;
   limits.max_parts_per_object = 2;

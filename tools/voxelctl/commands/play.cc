@@ -232,15 +232,16 @@ class Player {
       for (const SampledVolume& volume : model.volumes) total += volume.samples.size();
     }
     for (size_t i = 0; i < models.size(); ++i) {
-      absl::StatusOr<PackedLevels> packed = PackLevels(
-          &models[i], Object(i), session_->server().limits,
+      const absl::StatusOr<PackedSizes> packed = PackObject(
+          models[i], Object(i), session_->server().limits,
           [&](const std::string& object, std::vector<client::Part> parts, uint64_t bytes) {
             return SendDefinition(object, std::move(parts), bytes, total);
           },
           options_.volume, [&](absl::string_view bytes) { return Upload(models[i].path, bytes); });
       if (!packed.ok()) return About(models[i], packed.status());
       Describe(models[i], *packed);
-      levels_.push_back(std::move(packed->levels));
+      paths_.push_back(models[i].path);
+      models[i] = {};  // the server has it
     }
     if (staged_operations_ > 0) {
       absl::Status status = CommitAndWait();
@@ -250,7 +251,7 @@ class Player {
     if (!status.ok()) return status;
     if (absl::Status plain = LookPlain(); !plain.ok()) return plain;
     client::Frame frame = layer_->BeginFrame();
-    for (size_t i = 0; i < models.size(); ++i) DrawLevels(i, levels_[i], 0, models[i].path, &frame);
+    for (size_t i = 0; i < paths_.size(); ++i) DrawObject(i, Object(i), 0, paths_[i], &frame);
     status = frame.End();
     return status.ok() ? CommitAndWait() : status;
   }
@@ -271,16 +272,15 @@ class Player {
     return absl::InvalidArgumentError(absl::StrCat(model.path, ": ", status.message()));
   }
 
-  void Describe(const Model& model, const PackedLevels& packed) {
-    const PackedSizes& sizes = packed.sizes;
+  void Describe(const Model& model, const PackedSizes& sizes) {
     std::string note = NoteOf(model);
     if (!sizes.note.empty()) {
       note = note.empty() ? absl::StrCat(model.path, ": ", sizes.note)
                           : absl::StrCat(note, "; ", sizes.note);
     }
-    summary_.files.push_back({model.path, model.format, std::move(note), model.left_out,
-                              packed.levels.size(), sizes.vertices, sizes.indices, sizes.samples,
-                              sizes.objects, sizes.bytes});
+    summary_.files.push_back({model.path, model.format, std::move(note), model.left_out, 1,
+                              sizes.vertices, sizes.indices, sizes.samples, sizes.objects,
+                              sizes.bytes});
   }
 
   absl::Status ShowFrames(FrameAhead& ahead, const FramePlacement& placement, int64_t count) {
@@ -347,18 +347,18 @@ class Player {
     if (absl::Status plain = first ? LookPlain() : absl::OkStatus(); !plain.ok()) return plain;
     const size_t half = summary_.frames % 2;
     const std::string object = absl::StrCat("voxelctl/frame", half);
-    absl::StatusOr<PackedLevels> packed = PackLevels(
-        &model, object, session_->server().limits,
+    const absl::StatusOr<PackedSizes> packed = PackObject(
+        model, object, session_->server().limits,
         [&](const std::string& name, std::vector<client::Part> parts, uint64_t bytes) {
           return Stage(name, std::move(parts), bytes);
         },
         frame_look_);
     if (!packed.ok()) return About(model, packed.status());
-    const absl::Status less = RemoveRest(halves_[half], packed->levels);
+    const absl::Status less = RemoveRest(object, halves_[half], packed->objects);
     if (!less.ok()) return less;
-    halves_[half] = packed->levels;
+    halves_[half] = packed->objects;
     client::Frame frame = layer_->BeginFrame();
-    DrawLevels(0, packed->levels, turns, model.path, &frame);
+    DrawObject(0, object, turns, model.path, &frame);
     if (absl::Status status = frame.End(); !status.ok()) return status;
     if (!first) {
       staged_bytes_ = staged_operations_ = 0;
@@ -372,30 +372,18 @@ class Player {
     return status;
   }
 
-  // What the frame before last had more of; an object before the pieces that it draws.
-  absl::Status RemoveRest(const std::vector<PackedLevel>& before,
-                          const std::vector<PackedLevel>& now) {
-    for (size_t level = 0; level < before.size(); ++level) {
-      const auto& [object, objects] = before[level];
-      absl::Status status;
-      if (level >= now.size()) status = session_->client().RemoveObject(object);
-      for (uint64_t piece = level < now.size() ? now[level].objects - 1 : 0;
-           status.ok() && piece + 1 < objects; ++piece)
-        status = session_->client().RemoveObject(absl::StrCat(object, "/", piece));
-      if (!status.ok()) return status;
-    }
-    return absl::OkStatus();
+  // Removes pieces that the object had more of in the frame before last: `before` and `now` count it and its pieces.
+  absl::Status RemoveRest(const std::string& object, uint64_t before, uint64_t now) {
+    absl::Status status;
+    for (uint64_t piece = now - 1; status.ok() && piece + 1 < before; ++piece)
+      status = session_->client().RemoveObject(absl::StrCat(object, "/", piece));
+    return status;
   }
 
-  // The later of the levels over those before.
-  void DrawLevels(size_t file, const std::vector<PackedLevel>& levels, double turns,
-                  const std::string& path, client::Frame* frame) const {
-    for (size_t level = 0; level < levels.size(); ++level) {
-      frame->Draw(Id(file, level), client::Instance{levels[level].object},
-                  {.transform = ToClient(InstanceTransform(space_, turns)),
-                   .priority = static_cast<uint32_t>(level),
-                   .label = Label(path)});
-    }
+  void DrawObject(size_t file, const std::string& object, double turns, const std::string& path,
+                  client::Frame* frame) const {
+    frame->Draw(Id(file), client::Instance{object},
+                {.transform = ToClient(InstanceTransform(space_, turns)), .label = Label(path)});
   }
 
   // A pattern would hide the scene. When it has gone the scene's commit is not "hidden" any more.
@@ -410,10 +398,8 @@ class Player {
   }
 
   // "play 1", as draw's are "draw 1".
-  static std::string Id(size_t file, size_t level) {
-    return level == 0 ? absl::StrCat("play ", file + 1)
-                      : absl::StrCat("play ", file + 1, "/over", level);
-  }
+  // "play 1", as draw's are "draw 1".
+  static std::string Id(size_t file) { return absl::StrCat("play ", file + 1); }
   static std::string Object(size_t file) { return absl::StrCat("voxelctl/", file + 1); }
 
   static client::Affine ToClient(const gpu::Affine& transform) {
@@ -479,12 +465,10 @@ class Player {
   }
 
   absl::Status Turn(double turns) {
-    for (size_t i = 0; i < levels_.size(); ++i) {
-      for (size_t level = 0; level < levels_[i].size(); ++level) {
-        const absl::Status status =
-            layer_->SetTransform(Id(i, level), ToClient(InstanceTransform(space_, turns)));
-        if (!status.ok()) return status;
-      }
+    for (size_t i = 0; i < paths_.size(); ++i) {
+      const absl::Status status =
+          layer_->SetTransform(Id(i), ToClient(InstanceTransform(space_, turns)));
+      if (!status.ok()) return status;
     }
     return session_->Commit();
   }
@@ -515,9 +499,9 @@ class Player {
   sync::TimeNs start_ = 0;
   sync::TimeNs up_since_ = 0;  // when the displays had been waited for
   uint64_t staged_bytes_ = 0, staged_operations_ = 0, sent_bytes_ = 0;
-  std::vector<OwnedLayer> before_;                       // what an earlier command left
-  std::vector<std::vector<PackedLevel>> levels_;         // of each file
-  std::array<std::vector<PackedLevel>, 2> halves_ = {};  // of each frame that is defined
+  std::vector<OwnedLayer> before_;       // what an earlier command left
+  std::vector<std::string> paths_;       // of the files that are up
+  std::array<uint64_t, 2> halves_ = {};  // objects of each frame that is defined
   VolumeLook frame_look_;
   bool taken_down_ = false;
   bool had_layer_ = false;  // of a command before, of the same owner: who has a token has one owner

@@ -84,7 +84,7 @@ bool IsSound(const Part& part, size_t pictures) {
   return (part.normals.empty() || part.normals.size() == count) &&
          (part.colors.empty() || part.colors.size() == count) &&
          (each == 0 ? part.indices.empty() : part.indices.size() % each == 0) &&
-         part.level <= kMostLevel && std::isfinite(part.thickness) && AllFinite(part.normals) &&
+         std::isfinite(part.thickness) && AllFinite(part.normals) &&
          HasSoundPicture(part, pictures) &&
          std::all_of(part.attributes.begin(), part.attributes.end(),
                      [&](const Attribute& one) { return one.values.size() == count; });

@@ -42,16 +42,12 @@ struct Part {
   std::vector<uint32_t> indices;
   // Diameter of points, which are balls then, and of segments, which have round ends; in the positions' unit. 0: one voxel.
   double thickness = 0;
-  // Where parts of several levels cover one place the highest is seen; at most kMostLevel.
-  uint8_t level = 0;
   std::vector<Attribute> attributes;
   // Of triangles: the place on a picture, (0, 0) its upper left corner and (1, 1) its lower right one; beyond them it repeats.
   std::vector<std::array<float, 2>> texture_coordinates;
   // The picture by which the colours are multiplied: an index of Model::pictures, or kNoPicture.
   uint32_t picture = kNoPicture;
 };
-
-inline constexpr uint8_t kMostLevel = 126;
 
 // Numbers at the centres of equal cells, that along the first axis side by side, then rows along the second.
 struct SampledVolume {

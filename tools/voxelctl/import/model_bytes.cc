@@ -119,7 +119,6 @@ bool WriteModel(const absl::StatusOr<Model>& model, int descriptor) {
   for (const Part& part : model->parts) {
     writer.Bytes(&part.kind, sizeof(part.kind));
     writer.Bytes(&part.thickness, sizeof(part.thickness));
-    writer.Bytes(&part.level, sizeof(part.level));
     writer.All(part.positions);
     writer.All(part.normals);
     writer.All(part.colors);
@@ -205,7 +204,6 @@ absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_
     if (kind > static_cast<uint8_t>(Kind::kTriangles)) return Spoilt(file, "gave up halfway");
     part.kind = static_cast<Kind>(kind);
     reader.Bytes(&part.thickness, sizeof(part.thickness));
-    reader.Bytes(&part.level, sizeof(part.level));
     reader.All(&part.positions);
     reader.All(&part.normals);
     reader.All(&part.colors);

@@ -1,7 +1,6 @@
 #include "tools/voxelctl/scene/pack.h"
 
 #include <algorithm>
-#include <map>
 #include <utility>
 #include <vector>
 
@@ -266,32 +265,6 @@ absl::StatusOr<PackedSizes> PackObject(const Model& model, const std::string& ob
     if (!status.ok()) return status;
   }
   return packer.Finish();
-}
-
-absl::StatusOr<PackedLevels> PackLevels(Model* model, const std::string& object,
-                                        const client::Limits& limits, const ObjectSink& sink,
-                                        const VolumeLook& look, const AssetSink& upload) {
-  std::map<uint8_t, Model> levels;
-  for (Part& part : std::exchange(model->parts, {}))
-    levels[part.level].parts.push_back(std::move(part));
-  if (levels.empty()) levels[0];
-  for (auto& [level, content] : levels) content.pictures = model->pictures;
-  levels.begin()->second.volumes = std::exchange(model->volumes, {});
-  PackedLevels packed;
-  for (const auto& [level, content] : levels) {
-    const size_t over = packed.levels.size();
-    const std::string name = over == 0 ? object : absl::StrCat(object, "/over", over);
-    const absl::StatusOr<PackedSizes> sizes = PackObject(content, name, limits, sink, look, upload);
-    if (!sizes.ok()) return sizes.status();
-    packed.levels.push_back({name, sizes->objects});
-    packed.sizes.objects += sizes->objects;
-    packed.sizes.vertices += sizes->vertices;
-    packed.sizes.indices += sizes->indices;
-    packed.sizes.samples += sizes->samples;
-    packed.sizes.bytes += sizes->bytes;
-    if (packed.sizes.note.empty()) packed.sizes.note = sizes->note;
-  }
-  return packed;
 }
 
 }  // namespace voxeld::voxelctl

@@ -32,22 +32,4 @@ absl::StatusOr<PackedSizes> PackObject(const Model& model, const std::string& ob
                                        const client::Limits& limits, const ObjectSink& sink,
                                        const VolumeLook& look = {}, const AssetSink& upload = {});
 
-// The object of a level, and how many were defined for it.
-struct PackedLevel {
-  std::string object;
-  uint64_t objects = 0;
-};
-
-struct PackedLevels {
-  PackedSizes sizes;  // of all
-  std::vector<PackedLevel>
-      levels;  // from the lowest: what is in a later one is to be seen before what is in it
-};
-
-// The same for each level of the model's parts (Part::level): the lowest one's object is `object`, the others are "OBJECT/over1"
-// and so on. Volumes are in the lowest. The model is left without parts and volumes.
-absl::StatusOr<PackedLevels> PackLevels(Model* model, const std::string& object,
-                                        const client::Limits& limits, const ObjectSink& sink,
-                                        const VolumeLook& look = {}, const AssetSink& upload = {});
-
 }  // namespace voxeld::voxelctl
