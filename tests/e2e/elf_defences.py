@@ -50,7 +50,11 @@ def defences(path):
         "stack_protector": "__stack_chk_fail" in imported,
         "fortify": any(re.fullmatch(r"__\w+_chk", name) for name in imported),
         "library_assertions": any("__glibcxx_assert_fail" in name for name in imported),
-        "stack_clash": re.search(r"sub\s+\$0x1000,%rsp\n.*or[ql]?\s+\$0x0,\(%rsp\)", code) is not None,
+        # The probe may lie anywhere in the new page: GCC may touch its far end.
+        "stack_clash": re.search(
+            r"sub\s+\$0x1000,%rsp\n.*or[ql]?\s+\$0x0,(?:0x[0-9a-f]+)?\(%rsp\)", code
+        )
+        is not None,
         "branch_targets": "endbr64" in code,
         "shadow_stack": "SHSTK" in notes,
     }
