@@ -9,10 +9,10 @@
 
 namespace voxeld {
 
-// Returns: 0x00RRGGBB; none if `text` is no such colour. Case does not count.
+// Returns: 0x00RRGGBB; nullopt if `text` is not a valid colour. Ignores case.
 std::optional<uint32_t> ParseColor(absl::string_view text);
 
-// What to say of a text that is no colour: "#rrggbb or a CSS color name is expected; did you mean rebeccapurple?".
+// Returns: the remedy for an invalid colour: "#rrggbb or a CSS color name is expected; did you mean rebeccapurple?".
 std::string ColorAdvice(absl::string_view wrong);
 
 }  // namespace voxeld

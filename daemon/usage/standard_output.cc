@@ -9,7 +9,7 @@
 namespace voxeld::usage {
 namespace {
 
-// Of a pipe or socket.
+// Returns: true if the reader of a pipe or socket has closed it.
 bool ReaderIsGone() {
   pollfd output = {STDOUT_FILENO, 0, 0};
   return ::poll(&output, 1, 0) > 0 && (output.revents & (POLLERR | POLLHUP)) != 0;

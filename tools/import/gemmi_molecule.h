@@ -1,7 +1,7 @@
 // Molecules of the Protein Data Bank (.pdb, .ent, .cif, .mmcif, and these compressed by gzip) by gemmi.
 //
 // gemmi was chosen because crystallographers' programs use it, it consists of headers only, and it knows the dialects of old files.
-// Version 0.5.7 loses the following, so the source does it itself. Of PDB files it stops at the first END, ignores CONECT, takes a
+// Version 0.5.7 mishandles the following, so this reader does it itself. In PDB files gemmi stops at the first END, ignores CONECT, takes a
 // coordinate that is not a number for 0, and searches all chains whenever the chain changes. Its tables of CIF do not compile as C++20,
 // and their parser needs two more libraries (PEGTL, stb); so the syntax of CIF is read here, and gemmi supplies numbers with their
 // uncertainty, elements, unit cells and space groups.

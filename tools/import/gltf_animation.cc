@@ -131,7 +131,7 @@ class GltfFrames final : public FrameSource {
           pose.weights[channel.node] = std::move(value);
       }
     }
-    absl::StatusOr<Model> model = scene_->ModelAt(&pose, false);
+    absl::StatusOr<Model> model = scene_->ModelAt(&pose, true);
     if (!model.ok()) return model;
     for (const LeftOut& one : left_out_.left_out) AddLeftOut(one.kind, one.count, &*model);
     for (const Part& part : model->parts) {

@@ -31,7 +31,7 @@ absl::StatusOr<Model> ReadGltfModel(const SourceFile& file, bool attributes = fa
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenGltfAnimation(SourceFile file, size_t number,
                                                                double fps);
 
-// The rest is for these two.
+// The declarations below are internal to these two functions.
 
 enum class GltfPath { kTranslation, kRotation, kScale, kWeights };
 enum class GltfInterpolation { kLinear, kStep, kCubicSpline };

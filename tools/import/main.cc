@@ -57,11 +57,9 @@ absl::Status Parse(int argc, char** argv, Wanted* wanted) {
       {"none", OtherFiles::kNone}, {"below", OtherFiles::kBelow}, {"any", OtherFiles::kAny}};
   const std::map<std::string, MoleculeStyle> styles = {{"balls", MoleculeStyle::kBalls},
                                                        {"space", MoleculeStyle::kSpace}};
-  const std::map<std::string, SampleType> types = {
-      {"i8", SampleType::kI8},   {"u8", SampleType::kU8},   {"i16", SampleType::kI16},
-      {"u16", SampleType::kU16}, {"i32", SampleType::kI32}, {"u32", SampleType::kU32},
-      {"i64", SampleType::kI64}, {"u64", SampleType::kU64}, {"f32", SampleType::kF32},
-      {"f64", SampleType::kF64}};
+  std::map<std::string, SampleType> types;
+  for (size_t i = 0; i < std::size(kSampleTypeNames); ++i)
+    types[std::string(kSampleTypeNames[i])] = static_cast<SampleType>(i);
   CLI::App app;
   std::vector<uint64_t> size;
   RawLayout raw;
@@ -90,8 +88,8 @@ absl::Status Parse(int argc, char** argv, Wanted* wanted) {
   return absl::OkStatus();
 }
 
-// Folders to read from, besides that of the first file. Loads what drawings need.
-std::vector<std::string> FoldersOf(const Wanted& wanted) {
+// Files and folders to read, besides the folder of the first file. Loads what drawings need.
+std::vector<std::string> ReadablesOf(const Wanted& wanted) {
   std::vector<std::string> folders;
   if (std::any_of(wanted.files.begin(), wanted.files.end(),
                   [](const std::string& file) { return IsDrawing(ExtensionOf(file)); })) {
@@ -101,7 +99,11 @@ std::vector<std::string> FoldersOf(const Wanted& wanted) {
                   [](const std::string& file) { return IsGdalMap(ExtensionOf(file)); })) {
     for (const std::string& folder : MapDataFolders()) folders.push_back(folder);
   }
-  if (!wanted.sequence || wanted.options.other_files == OtherFiles::kNone) return folders;
+  if (!wanted.sequence) return folders;
+  if (wanted.options.other_files == OtherFiles::kNone) {
+    folders.insert(folders.end(), wanted.files.begin(), wanted.files.end());
+    return folders;
+  }
   for (const std::string& file : wanted.files) {
     const std::string folder = std::filesystem::path(file).parent_path().string();
     folders.push_back(folder.empty() ? "." : folder);
@@ -124,7 +126,7 @@ std::vector<std::string> FoldersOf(const Wanted& wanted) {
   const SourceFile nothing{
       .path = path, .extension = {}, .bytes = {}, .other_files = wanted.options.other_files};
   if (!ConfineReader(file.ok() ? *file : nothing, frames ? Answers::kFrames : Answers::kModel,
-                     FoldersOf(wanted))) {
+                     ReadablesOf(wanted))) {
     ::_exit(kNotConfined);
   }
   if (wanted.sequence) {
@@ -144,10 +146,10 @@ std::vector<std::string> FoldersOf(const Wanted& wanted) {
   });
 }
 
-// As the table of docs/files.md.
+// Prints the table of docs/files.md.
 void PrintFormats() {
   std::puts(
-      "| what | format | extensions | read | not read | library | files tried |\n"
+      "| type | format | extensions | read | not read | library | tested with |\n"
       "|---|---|---|---|---|---|---|");
   const auto text = [](absl::string_view cell) { return std::string(cell.empty() ? "–" : cell); };
   for (const Format& format : AllFormats()) {

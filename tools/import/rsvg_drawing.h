@@ -2,7 +2,7 @@
 //
 // librsvg is the renderer of GNOME. It has what a reader of our own lacked: CSS selectors, text, gradients, patterns, clips, masks, markers,
 // nested viewports and embedded pictures. It runs no scripts and no animations. Filters are switched off, since some of them start
-// threads, run for hours or end the process; texts along paths and SVG fonts are not drawn by it.
+// threads, run for hours or end the process; texts along paths and SVG fonts are not drawn.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@
 
 namespace voxeld::voxelctl {
 
-// Of the longer side, where the display is not known.
+// Pixels of the longer side if the display is unknown.
 inline constexpr uint32_t kDrawingPixels = 512;
 inline constexpr uint32_t kMostDrawingPixels = 4096;
 

@@ -1,8 +1,8 @@
 // Readers of volumes, one source each. Patients have the head up and the face to the front.
 //
-// Which library reads what, and why it is not ITK 5.2.1 (libinsighttoolkit5), which has readers of all these formats. It was tried on
+// The table below lists the libraries. ITK 5.2.1 (libinsighttoolkit5) reads all these formats but is not used. It was tried on
 // the same files as these readers:
-// - It opens files by name and has no reader of memory. NIfTI needs the right extension, and NRRD and MetaImage open every file that a
+// - It opens files by name and cannot read from memory. NIfTI needs the right extension, and NRRD and MetaImage open every file that a
 //   header names, whatever its folder. So a stranger's file cannot be read in a process that may not open files.
 // - A truncated NIfTI, MetaImage or MRC is read without an error: the rest of the samples is uninitialised memory. Damaged DICOM
 //   ended the process by abort() in 2 to 14 of 100 attempts, since GDCM then sees the file's own elements.
@@ -11,7 +11,7 @@
 // - Its TIFF reader contains libtiff 4.0.3 of 2012, with the vulnerabilities that were found since.
 // - Debian's headers of it refuse Clang, and it adds HDF5, MINC and FFTW.
 //
-// | format    | library                                              | lost |
+// | format    | library                                              | not read |
 // | NIfTI     | libnifti2 for the matrix of a checked header, zlib   | complex numbers, numbers of 128 bits |
 // | NRRD      | zlib                                                 | bzip2, samples in several files |
 // | MetaImage | zlib                                                 | AnatomicalOrientation without a matrix |

@@ -83,10 +83,12 @@ void Intake::AddLights(const Datagram& packet, sync::TimeNs now) {
   }
   // Where sync packets come, a picture waits for them; if they stop, for no longer than they may be apart.
   const bool told = (synchronised_ || sync_universe_ != 0) && now - sync_heard_ns_ < kSyncLife;
+  const size_t there = values_.size() - static_cast<size_t>(index) * channels;
   const size_t used = std::min(packet.values.size(), channels);
-  const auto rest = packet.values.subspan(used);
+  const auto rest = packet.values.subspan(std::min(used, there));
+  // Senders fill universes up with zeros.
   if (std::any_of(rest.begin(), rest.end(), [](uint8_t value) { return value != 0; }))
-    ++tally_.unused;
+    ++(there <= channels ? tally_.beyond : tally_.unused);
   const bool set = Set(packet.universe, static_cast<size_t>(index) * channels,
                        packet.values.first(used), told ? More::kTold : More::kPerhaps,
                        told ? sync_heard_ns_ + kSyncLife : now + options_.gather_ns);

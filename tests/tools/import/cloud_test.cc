@@ -242,6 +242,20 @@ TEST_F(Clouds, TextColumnsAreAttributesOnlyIfTheyAreWanted) {
   EXPECT_EQ(plain->left_out, (std::vector<LeftOut>{{"other columns", 2}}));
 }
 
+TEST_F(Clouds, QuotedWordsMayHaveMarksAndComments) {
+  const auto model = Import(
+      "a.csv", "name,x,y,z\n\"a, b\",1,2,3\n\"say \"\"hi\"\", x\",4,5,6\n\"http://h/#a\",7,8,9\n");
+  ASSERT_THAT(model, IsOk());
+  EXPECT_THAT(model->parts[0].positions,
+              ElementsAre(Point3{1, 2, 3}, Point3{4, 5, 6}, Point3{7, 8, 9}));
+}
+
+TEST_F(Clouds, WordsBeyondTheColumnsAreCounted) {
+  const auto model = Import("a.csv", "x,y,z\n1,2,3,4,5\n6,7,8\n9,9,9,9\n");
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"words beyond the columns", 3}}));
+}
+
 TEST_F(Clouds, TextColumnsWithoutNamesHaveNumbers) {
   EXPECT_THAT(AttributesOf(folder_.Write("a.xyz", "0 0 0 5 6\n1 0 0 7 8\n")),
               ElementsAre("intensity: 5 7", "column 5: 6 8"));

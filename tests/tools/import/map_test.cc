@@ -23,6 +23,7 @@ namespace map_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::IsNan;
 
 // Numbers in both byte orders.
@@ -247,7 +248,17 @@ TEST_F(Maps, TracksOfGpx) {
   EXPECT_EQ(ValuesOf(model->parts[0], "height").at(3), 400.5f);
   EXPECT_THAT(ValuesOf(model->parts[0], "number"),
               ElementsAre(IsNan(), IsNan(), 3.f, 3.f, 3.f, 3.f));
-  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"heights", 3}}));
+  EXPECT_THAT(model->left_out, IsEmpty());
+}
+
+TEST_F(Maps, HeightsThatNothingShowsAreCounted) {
+  const auto model = ReadHere(
+      folder_.Write("a.gpx", Gpx(R"(<trk><trkseg><trkpt lat="48" lon="9"><ele>300</ele></trkpt>)"
+                                 R"(<trkpt lat="49" lon="9"><ele>400.5</ele></trkpt>)"
+                                 R"(<trkpt lat="50" lon="9"/></trkseg></trk>)")),
+      {});
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"heights", 2}}));
 }
 
 TEST_F(Maps, ColoursAndNumbersOfKml) {
@@ -281,8 +292,7 @@ TEST_F(Maps, ColoursAndNumbersOfKml) {
   EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"ground overlays", 1},
                                                    {"network links", 1},
                                                    {"fills of areas", 1},
-                                                   {"hidden features", 1},
-                                                   {"heights", 1}}));
+                                                   {"hidden features", 1}}));
 }
 
 TEST_F(Maps, KmlWithoutItsRoot) {

@@ -385,6 +385,23 @@ TEST(Intake, UniversesOf512ChannelsFollowOneAnother) {
   EXPECT_EQ(plain.tally().unused, 1u);
 }
 
+TEST(Intake, ValuesBeyondTheLastLightOfAUniverseAreCountedUnlessTheyAreZeros) {
+  IntakeOptions options;
+  options.protocol = Protocol::kE131;
+  options.lights = 100;
+  Intake intake(options);
+  Sender sender(E131Stream(100, 1));
+  ASSERT_TRUE(intake.AddDatagram(sender.Pixels(0, Bytes3(100, 9)), 0).ok());
+  EXPECT_EQ(intake.tally().beyond, 0u);
+  Bytes filled = Bytes3(170, 0);
+  std::fill_n(filled.begin(), 300, uint8_t{9});
+  ASSERT_TRUE(intake.AddDatagram(sender.Pixels(0, filled), 0).ok());
+  EXPECT_EQ(intake.tally().beyond, 0u);
+  ASSERT_TRUE(intake.AddDatagram(sender.Pixels(0, Bytes3(170, 9)), 0).ok());
+  EXPECT_EQ(intake.tally().beyond, 1u);
+  EXPECT_EQ(intake.tally().unused, 0u);
+}
+
 TEST(Intake, OpcValuesThatAreNotUsedAreCounted) {
   IntakeOptions options;
   options.lights = 4;

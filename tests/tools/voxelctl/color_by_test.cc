@@ -77,7 +77,7 @@ TEST(ColorBy, WhatThereIsNotIsSaidWithWhatThereIs) {
   EXPECT_THAT(ApplyColorBy({.attribute = "qqqqqq"}, {&model, 1}),
               Fails(Words{"temperature", "nothing", "z"}));
   EXPECT_THAT(ApplyColorBy({.attribute = "nothing"}, {&model, 1}),
-              Fails(Words{"nowhere a number"}));
+              Fails(Words{"no numeric value in any file"}));
   EXPECT_THAT(ApplyColorBy({.attribute = "temperature", .colormap = "virids"}, {&model, 1}),
               Fails(Words{"virids", "viridis"}));
 }

@@ -51,6 +51,37 @@ TEST_F(ImportProgram, TakesEveryOption) {
   EXPECT_EQ(model->volumes[0].samples, (std::vector<float>{1, 2, 3, 256, 5, 6}));
 }
 
+TEST_F(ImportProgram, TakesEveryTypeOfSamples) {
+  // One sample is 0, the other 1; IEEE 754 has 0x3c00, 0x3f800000 and 0x3ff0000000000000 for 1.
+  const std::pair<SampleType, std::string> cases[] = {
+      {SampleType::kI8, std::string("\0\1", 2)},
+      {SampleType::kU8, std::string("\0\1", 2)},
+      {SampleType::kI16, std::string("\0\0\1\0", 4)},
+      {SampleType::kU16, std::string("\0\0\1\0", 4)},
+      {SampleType::kI32, std::string("\0\0\0\0\1\0\0\0", 8)},
+      {SampleType::kU32, std::string("\0\0\0\0\1\0\0\0", 8)},
+      {SampleType::kF16, std::string("\0\0\0\x3c", 4)},
+      {SampleType::kF32, std::string("\0\0\0\0\0\0\x80\x3f", 8)},
+      {SampleType::kF64, std::string("\0\0\0\0\0\0\0\0\0\0\0\0\0\0\xf0\x3f", 16)}};
+  for (const auto& [type, bytes] : cases) {
+    ImportOptions options;
+    options.raw = RawLayout{.size = {2, 1, 1}, .type = type};
+    const auto model = ImportFile(folder_.Write("a.raw", bytes), options);
+    ASSERT_THAT(model, IsOk());
+    EXPECT_EQ(model->volumes[0].samples, (std::vector<float>{0, 1})) << static_cast<int>(type);
+  }
+}
+
+TEST_F(ImportProgram, ASequenceIsReadWithoutOtherFiles) {
+  const std::string triangle = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  folder_.Write("a.mtl", "newmtl m\n");
+  const std::vector<std::string> paths = {folder_.Write("1.obj", triangle),
+                                          folder_.Write("2.obj", triangle)};
+  const auto frames = OpenSequence(paths, {.other_files = OtherFiles::kNone}, nullptr);
+  ASSERT_THAT(frames, IsOk());
+  for (const int64_t frame : {0, 1}) EXPECT_THAT((*frames)->Read(frame), IsOk());
+}
+
 TEST_F(ImportProgram, AFileWhoseNameLooksLikeAnOptionIsAFile) {
   const std::string path = folder_.Write("--help", "x");
   const std::filesystem::path before = std::filesystem::current_path();

@@ -32,7 +32,7 @@ std::array<double, 2> ReadRange(absl::string_view option, const std::string& tex
   if (!absl::SimpleAtod(ends.first, &range[0]) || !absl::SimpleAtod(ends.second, &range[1]) ||
       !(range[0] < range[1]) || !std::isfinite(range[1] - range[0])) {
     throw UsageError{absl::StrCat(option, " is ", EscapeForTerminal(text),
-                                  "; LOW:HIGH is expected, such as -160:240")};
+                                  "; LOW:HIGH is expected, LOW less than HIGH, such as 0:100")};
   }
   return range;
 }
@@ -86,15 +86,15 @@ void PlayArguments::Add(CLI::App* c) {
       ->type_name("balls|space")
       ->capture_default_str();
   c->add_option("--colormap", options_.volume.colormap,
-                "Of volumes and with --color-by: colours by a map's name, such as viridis (default "
-                "of volumes: grey)")
+                "Colour map for volumes and --color-by, such as viridis (default "
+                "for volumes: grey)")
       ->type_name("NAME");
   c->add_option("--color-by", options_.color_by,
-                "Of points, meshes and molecules: colours by a column or attribute of the file, or "
-                "by x, y or z. --colormap says which (default: viridis)")
+                "Colour points, meshes and molecules by a column or attribute of the file, or "
+                "by x, y or z, with the map of --colormap (default: viridis)")
       ->type_name("NAME");
   c->add_option("--range", range_,
-                "With --color-by: the numbers that have the first and the last colour (default: "
+                "With --color-by: the values of the first and the last colour (default: "
                 "the least and the greatest)")
       ->type_name("LOW:HIGH");
   c->add_option("--window", window_,
@@ -133,9 +133,12 @@ void PlayArguments::ReadAnimation() {
 
 void PlayArguments::ReadVolume() {
   if (!window_.empty()) options_.volume.window = ReadRange("--window", window_);
+  if (command_->count("--color-by") > 0 && options_.color_by.empty())
+    throw UsageError{"--color-by wants a name, such as z"};
   if (!range_.empty()) {
     options_.range = ReadRange("--range", range_);
-    if (options_.color_by.empty()) throw UsageError{"--range is of --color-by, which is missing"};
+    if (options_.color_by.empty())
+      throw UsageError{"--range requires --color-by, for example --color-by z"};
   }
   if (!std::isnan(level_)) {
     if (options_.volume.window) throw UsageError{"--window and --level do not go together"};

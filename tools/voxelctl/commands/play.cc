@@ -15,6 +15,7 @@
 #include "tools/voxelctl/commands/choose_space.h"
 #include "tools/voxelctl/commands/commands.h"
 #include "tools/voxelctl/commands/end_patterns.h"
+#include "tools/voxelctl/commands/not_showing.h"
 #include "tools/voxelctl/commands/own_layer.h"
 #include "tools/voxelctl/commands/play_files.h"
 #include "tools/voxelctl/commands/play_summary.h"
@@ -109,14 +110,15 @@ class Player {
     return absl::OkStatus();
   }
 
-  // Waits for the displays and tells on which of them the files are up, what their colours mean and what of them is not shown.
+  // Waits for the displays and prints which of them show the files, the legend, and the parts that are not shown.
   void Announce() {
     const bool moving = options_.spin || summary_.frames > 0;
     const absl::Status settled = session_->WaitSettled(moving ? kLastOutcomeTime : kOutcomeTime);
     up_since_ = clock_.Now();
     std::vector<std::string> displays;
     for (const auto& [name, counts] : session_->client().GetTally().displays) {
-      if (counts.presented + counts.unchanged > 0) displays.push_back(EscapeForTerminal(name));
+      if (counts.presented + counts.unchanged > 0 && counts.lost == 0 && counts.not_shown == 0)
+        displays.push_back(EscapeForTerminal(name));
     }
     const std::vector<PlayedFile>& files = summary_.files;
     const std::string label = files.empty() ? "it" : Label(files[0].path);
@@ -135,6 +137,28 @@ class Player {
     for (const PlayedFile& file : files) {
       if (!file.note.empty()) console_.Say(EscapeForTerminal(file.note));
     }
+    for (const std::string& sentence : later_) console_.Say(sentence);
+    if (moving) return;  // what is asked about would be another frame
+    std::vector<std::string> ids;
+    for (size_t i = 0; i < files.size(); ++i) ids.push_back(Id(i));
+    for (const std::string& sentence : Unseen(summary_.owner, kLayer, ids, connection_))
+      console_.Say(sentence);
+  }
+
+  // Of a kind, as many as the frame with the most of it leaves out.
+  void CountLeftOut(const Model& model) {
+    std::vector<LeftOut>& known = summary_.files[0].left_out;
+    for (const LeftOut& one : model.left_out) {
+      const auto same = std::find_if(known.begin(), known.end(),
+                                     [&](const LeftOut& other) { return other.kind == one.kind; });
+      if (same == known.end()) {
+        known.push_back(one);
+        console_.Say(absl::StrCat(EscapeForTerminal(model.path), ": left out: ",
+                                  EscapeForTerminal(one.kind), " (", one.count, ")"));
+      } else {
+        same->count = std::max(same->count, one.count);
+      }
+    }
   }
 
   // A frame replaces the layer whole, but not how a command before, of the same owner, had it look.
@@ -151,7 +175,7 @@ class Player {
     });
     const absl::StatusOr<TakenDown> taken = TakeDown(before_, connection_);
     if (!taken.ok()) return taken.status();
-    if (!taken->stay.empty()) console_.Say(OthersStay(taken->stay));
+    if (!taken->stay.empty()) later_.push_back(OthersStay(taken->stay));
     return absl::OkStatus();
   }
 
@@ -309,7 +333,7 @@ class Player {
             options_.spin ? static_cast<double>(clock_.Now() - began) / 1e9 / kSecondsPerTurn : 0;
         absl::Status status = PutFrame(*std::move(model), placement, turns);
         if (!status.ok()) return status;
-        if (frame == 0) {  // the displays were waited for
+        if (frame == 0) {  // all displays have answered
           began = clock_.Now();
           if (options_.duration_s) end = began + std::llround(*options_.duration_s * 1e9);
         }
@@ -361,6 +385,7 @@ class Player {
     DrawObject(0, object, turns, model.path, &frame);
     if (absl::Status status = frame.End(); !status.ok()) return status;
     if (!first) {
+      CountLeftOut(model);
       staged_bytes_ = staged_operations_ = 0;
       return session_->Commit();
     }
@@ -391,9 +416,9 @@ class Player {
     const absl::StatusOr<EndedPatterns> patterns = EndPatterns(connection_);
     if (!patterns.ok()) return patterns.status();
     for (const std::string& display : patterns->ended) {
-      console_.Say(absl::StrCat("ended the test pattern on ", EscapeForTerminal(display)));
+      later_.push_back(absl::StrCat("ended the test pattern on ", EscapeForTerminal(display)));
     }
-    if (!patterns->stay.empty()) console_.Say(PatternsStay(*patterns));
+    if (!patterns->stay.empty()) later_.push_back(PatternsStay(*patterns));
     return absl::OkStatus();
   }
 
@@ -497,12 +522,13 @@ class Player {
   std::unique_ptr<SceneSession> session_;
   std::optional<client::Layer> layer_;
   sync::TimeNs start_ = 0;
-  sync::TimeNs up_since_ = 0;  // when the displays had been waited for
+  sync::TimeNs up_since_ = 0;  // when all displays had answered
   uint64_t staged_bytes_ = 0, staged_operations_ = 0, sent_bytes_ = 0;
   std::vector<OwnedLayer> before_;       // what an earlier command left
   std::vector<std::string> paths_;       // of the files that are up
   std::array<uint64_t, 2> halves_ = {};  // objects of each frame that is defined
   VolumeLook frame_look_;
+  std::vector<std::string> later_;  // sentences that follow the first line
   bool taken_down_ = false;
   bool had_layer_ = false;  // of a command before, of the same owner: who has a token has one owner
   PlaySummary summary_;

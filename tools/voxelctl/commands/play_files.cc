@@ -16,7 +16,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// Room that placement leaves free, so that a drawing has as many pixels as it gets voxels.
+// The share of a display that placement fills. A drawing gets one pixel per voxel of it.
 constexpr double kFilled = 0.97;
 
 ImportOptions OptionsOf(const PlayOptions& options, const Room& room) {
@@ -69,8 +69,10 @@ absl::Status CheckOptions(const PlayOptions& options, std::span<const Model> mod
     bool applies;
     absl::string_view what;
   } wants[] = {
-      {"--globe", any([](const Model& model) { return model.globe; }), "maps (GeoJSON, TopoJSON)"},
-      {"--style", any([](const Model& model) { return model.molecule; }), "molecules (PDB)"},
+      {"--globe", any([](const Model& model) { return model.globe; }),
+       "maps (GeoJSON, TopoJSON, Shapefile, GPX, KML)"},
+      {"--style", any([](const Model& model) { return model.molecule; }),
+       "molecules (PDB, mmCIF, XYZ)"},
       {"--fill", any([](const Model& model) {
          return std::any_of(model.parts.begin(), model.parts.end(),
                             [](const Part& part) { return part.kind == Kind::kTriangles; });
@@ -87,7 +89,7 @@ absl::Status CheckOptions(const PlayOptions& options, std::span<const Model> mod
         std::find(options.given.begin(), options.given.end(), option) != options.given.end();
     if (!given || applies) continue;
     return absl::InvalidArgumentError(
-        absl::StrCat(option, " is for ", what, ", and none of the files is one"));
+        absl::StrCat(option, " is for ", what, ", and has no effect on these files"));
   }
   return absl::OkStatus();
 }

@@ -109,8 +109,9 @@ absl::Status EndOf(const SourceFile& file, int state) {
     return NoSandbox(file, absl::UnavailableError("its reader could not be confined"));
   }
   if (WEXITSTATUS(state) == kNotStarted) {
-    return absl::UnavailableError(absl::StrCat(EscapeForTerminal(file.path),
-                                               ": the program that reads it could not be started"));
+    return absl::UnavailableError(absl::StrCat(
+        EscapeForTerminal(file.path),
+        ": could not start voxeld-import, which reads it; reinstall the package voxeld-import"));
   }
   if (WEXITSTATUS(state) != 0) return Spoilt(file, "wanted more than 4 GiB of memory, or gave up");
   return absl::OkStatus();

@@ -1,4 +1,4 @@
-// What is known of a format, for people: docs/files.md has these as a table, which tools/import/main.cc writes.
+// Describes a file format for users. docs/files.md has these as a table, which tools/import/main.cc writes.
 #pragma once
 
 #include <string>
@@ -11,11 +11,11 @@ namespace voxeld::voxelctl {
 struct Format {
   absl::string_view what;        // "meshes"
   absl::string_view name;        // "Wavefront OBJ"
-  absl::string_view extensions;  // in lower case, with a dot, parted by blanks
+  absl::string_view extensions;  // in lower case, with a dot, separated by spaces
   absl::string_view library;     // empty: none
   absl::string_view read;
   absl::string_view not_read;
-  absl::string_view tried;  // real files that were tried, beside those that tests make
+  absl::string_view tried;  // real files it was tested with, besides those that tests generate
 };
 
 // `extension` is in lower case, without the dot.

@@ -175,13 +175,14 @@ const std::vector<Format>& OwnFormats() {
       {"voxels", "MagicaVoxel", ".vox", "", "models where the scene's nodes put them, the palette",
        "key frames after the first, hidden nodes and layers, materials", "–"},
       {"points, molecules", "text", ".xyz .txt .asc .pts .csv", "",
-       "places, colours, intensities and normals by the names or the number of columns, the other "
+       "positions, colours, intensities and normals by the names or the number of columns, the "
+       "other "
        "columns by --color-by; chemistry's XYZ as a molecule",
        "frames after the first", "–"},
       {"maps", "GeoJSON, TopoJSON", ".geojson .topojson .json", "",
        "lines, points and the outlines of areas, simplestyle's colours; numbers of properties by "
        "--color-by; --globe puts them on a sphere",
-       "fills of areas, heights but by --color-by", "world-atlas: 4"},
+       "fills of areas, heights (except by --color-by)", "world-atlas: 4"},
   };
   return formats;
 }

@@ -2,9 +2,12 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <optional>
 
+#include "absl/strings/string_view.h"
 #include "tools/voxelctl/import/source_file.h"
 
 namespace voxeld::voxelctl {
@@ -14,7 +17,12 @@ enum class MoleculeStyle : uint8_t { kBalls, kSpace };
 
 enum class SampleType : uint8_t { kI8, kU8, kI16, kU16, kI32, kU32, kI64, kU64, kF16, kF32, kF64 };
 
-// What a file holds that is nothing but samples (.raw).
+// In the enumeration's order; as options have them.
+inline constexpr absl::string_view kSampleTypeNames[] = {"i8",  "u8",  "i16", "u16", "i32", "u32",
+                                                         "i64", "u64", "f16", "f32", "f64"};
+static_assert(std::size(kSampleTypeNames) == static_cast<size_t>(SampleType::kF64) + 1);
+
+// The layout of a file of raw samples (.raw).
 struct RawLayout {
   std::array<uint64_t, 3> size = {};
   SampleType type = SampleType::kU8;
@@ -27,7 +35,7 @@ struct ImportOptions {
   MoleculeStyle style = MoleculeStyle::kBalls;
   // Points, atoms and vertices keep their numbers that are neither place, normal nor colour.
   bool attributes = false;
-  std::array<uint32_t, 2> pixels = {512, 512};  // most that drawings have, across and up
+  std::array<uint32_t, 2> pixels = {512, 512};  // maximum size of a drawing, width and height
   OtherFiles other_files = OtherFiles::kBelow;
 };
 

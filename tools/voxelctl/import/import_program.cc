@@ -37,8 +37,8 @@ std::string FindProgram() {
 absl::Status NoProgram(absl::string_view subject) {
 #if defined(VOXELD_HAS_IMPORTERS)
   return absl::UnimplementedError(absl::StrCat(
-      subject, ": files of this kind are read by the program ", kProgram,
-      ", which is not there; install the package ", kProgram, " (voxelctl itself reads ",
+      subject, ": files of this type need the program ", kProgram,
+      ", which is not installed; install the package ", kProgram, " (voxelctl itself reads ",
       absl::StrJoin(
           OwnFormats(), " ",
           [](std::string* out, const Format& format) { absl::StrAppend(out, format.extensions); }),
@@ -58,8 +58,6 @@ SourceFile Unread(const std::string& path, OtherFiles other_files) {
 std::vector<std::string> Words(const ImportOptions& options) {
   constexpr absl::string_view kOtherFiles[] = {"none", "below", "any"};
   constexpr absl::string_view kStyles[] = {"balls", "space"};
-  constexpr absl::string_view kTypes[] = {"i8",  "u8",  "i16", "u16", "i32",
-                                          "u32", "i64", "u64", "f32", "f64"};
   std::vector<std::string> words = {
       absl::StrCat("--other-files=", kOtherFiles[static_cast<size_t>(options.other_files)]),
       absl::StrCat("--style=", kStyles[static_cast<size_t>(options.style)]),
@@ -69,13 +67,13 @@ std::vector<std::string> Words(const ImportOptions& options) {
   if (options.raw) {
     const RawLayout& raw = *options.raw;
     words.push_back(absl::StrCat("--size=", raw.size[0], "x", raw.size[1], "x", raw.size[2]));
-    words.push_back(absl::StrCat("--type=", kTypes[static_cast<size_t>(raw.type)]));
+    words.push_back(absl::StrCat("--type=", kSampleTypeNames[static_cast<size_t>(raw.type)]));
     if (raw.big_endian) words.push_back("--big-endian");
   }
   return words;
 }
 
-// `more`: how what is read is wanted.
+// `more`: further command-line options.
 absl::StatusOr<std::vector<std::string>> Command(const std::vector<std::string>& paths,
                                                  const ImportOptions& options,
                                                  const std::vector<std::string>& more) {

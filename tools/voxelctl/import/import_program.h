@@ -15,7 +15,7 @@
 
 namespace voxeld::voxelctl {
 
-// Returns: OK if there is the program, beside this one or in ../libexec/voxeld. Errors: Unimplemented "SUBJECT: …" with how to get it.
+// Returns: OK if the program exists beside this one or in ../libexec/voxeld. Errors: Unimplemented "SUBJECT: …" with how to get it.
 absl::Status CheckImporters(absl::string_view subject);
 
 // Reads a file or folder as ImportFile does, with the program.
@@ -23,7 +23,7 @@ absl::StatusOr<Model> ImportByProgram(const std::string& path, const ImportOptio
                                       Interrupt* interrupt);
 
 // Animation `number`, from 1 on, of a mesh file or skeleton (glTF, FBX, COLLADA, BVH, …), in frames of `fps` a second from its
-// beginning to its end. Meshes follow their bones; without meshes the bones are lines. The program reads it as long as the result lives.
+// beginning to its end. Meshes follow their bones; without meshes the bones are lines. The program runs as long as the result lives.
 // `interrupt` may be null. Errors: InvalidArgument if there is no such animation, with the names of those there are; as above.
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenAnimation(
     const std::string& path, size_t number, double fps, OtherFiles other_files = OtherFiles::kBelow,

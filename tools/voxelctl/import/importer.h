@@ -1,4 +1,4 @@
-// From a file's name to a model.
+// Reads a file into a model.
 #pragma once
 
 #include <string>

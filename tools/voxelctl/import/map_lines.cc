@@ -134,7 +134,10 @@ void MapLines::AddEdge(LonLat from, LonLat to) {
 absl::Status MapLines::AddLine(std::span<const LonLat> line, bool closed) {
   absl::Status status = Check(line);
   if (!status.ok()) return status;
-  if (line.size() < 2) return absl::OkStatus();
+  if (line.size() < 2) {
+    if (line.size() == 1) LeaveOut("lines of one position");
+    return absl::OkStatus();
+  }
   to_draw_.push_back({corners_.size(), corners_.size() + line.size(), feature_, closed});
   corners_.insert(corners_.end(), line.begin(), line.end());
   return absl::OkStatus();
@@ -215,7 +218,7 @@ absl::Status MapLines::Finish(std::string format, Model* model) && {
   corners_ = {};
   AddFeatures(line_features_, std::move(line_heights_), false, &lines_);
   AddFeatures(point_features_, std::move(point_heights_), true, &points_);
-  if (heights_ > 0) LeaveOut("heights", heights_);
+  if (heights_ > 0 && !attributes_) LeaveOut("heights", heights_);
   model->path = file_.path;
   model->format = std::move(format);
   model->globe = globe_;

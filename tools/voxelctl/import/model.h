@@ -25,7 +25,7 @@ inline constexpr uint32_t kNoPicture = UINT32_MAX;
 
 enum class Kind : uint8_t { kPoints, kSegments, kTriangles };
 
-// A number of each vertex, such as a measured column, by which `play --color-by` colours.
+// A value per vertex, such as a measured column, for `play --color-by`.
 struct Attribute {
   std::string name;           // as in the file
   std::vector<float> values;  // as many as positions; not a number where the file has none
@@ -64,7 +64,7 @@ struct SampledVolume {
 // makes +z the front and keeps +x right; +x up keeps −y the front.
 enum class Up : uint8_t { kAuto, kX, kY, kZ };
 
-// What a file contains and its model does not show.
+// A kind of item that a file contains and its model does not show.
 struct LeftOut {
   std::string kind;  // in the plural: "cameras", "atoms at alternate locations"
   uint64_t count = 0;
@@ -89,7 +89,7 @@ struct Model {
 // Counts `count` things of `kind` that are left out; 0 changes nothing.
 void AddLeftOut(std::string_view kind, uint64_t count, Model* model);
 
-// "PATH: NOTE; left out: cameras (2), lights (1)", without what there is not; empty if there is nothing to say.
+// "PATH: NOTE; left out: cameras (2), lights (1)", without the parts that are empty; empty if there is nothing to say.
 std::string NoteOf(const Model& model);
 
 // What one model may hold in all, so that no file makes the tool run out of memory.

@@ -81,7 +81,7 @@ bool WriteNumber(int descriptor, int64_t number) {
 
 bool ConfineReader(const SourceFile& file, Answers answers,
                    const std::vector<std::string>& folders) {
-  if (answers == Answers::kModel) {  // who asks for frames watches the time of each
+  if (answers == Answers::kModel) {  // for frames, the parent limits the time of each
     ::alarm(kMostReadingSeconds);
     Limit(RLIMIT_CPU, kMostProcessorSeconds);
   }

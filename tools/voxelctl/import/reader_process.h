@@ -1,4 +1,4 @@
-// The process that reads a file, from its own side (contained.h has the other).
+// The child process that reads a file (contained.h is the parent's side).
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,7 @@ using OpenFrames = std::function<absl::StatusOr<std::unique_ptr<FrameSource>>(So
 // One model, or as many frames as are asked for.
 enum class Answers : uint8_t { kModel, kFrames };
 
-// Confines this process for good, as ReadContained says, before it answers so; `folders`, if they are there, are readable besides, for data
+// Confines this process permanently, as ReadContained describes, before it sends `answers`. Those `folders` that exist stay readable, for data
 // that libraries need. Returns: false if files cannot be confined and the file is a stranger's, so that it must not be read.
 bool ConfineReader(const SourceFile& file, Answers answers,
                    const std::vector<std::string>& folders = {});
@@ -47,7 +47,7 @@ ReaderMain ProgramOf(std::vector<std::string> command);
 [[noreturn]] void AnswerModel(const std::function<absl::StatusOr<Model>()>& read);
 
 // Opens the source and answers with the number of its frames; on an error, writes that with WriteModel and answers -1. Then, for each
-// frame number that it receives, writes the frame and answers 0. Ends the process when nobody asks any more.
+// frame number that it receives, writes the frame and answers 0. Exits when the channel is closed.
 [[noreturn]] void ServeFrames(
     const std::function<absl::StatusOr<std::unique_ptr<FrameSource>>()>& open);
 

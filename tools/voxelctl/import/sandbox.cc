@@ -7,6 +7,7 @@
 #include <seccomp.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
+#include <sys/stat.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -35,11 +36,14 @@ absl::Status NoLandlock(int error) {
       "this system cannot confine a process to files (Landlock: ", std::strerror(error), ")"));
 }
 
-// False, with errno, if files below `path` cannot be allowed.
+// False, with errno, if `path`, or files below it, cannot be allowed.
 bool AllowReading(const daemon::Descriptor& rules, const std::string& path) {
   const daemon::Descriptor folder(::open(path.c_str(), O_PATH | O_CLOEXEC));
   landlock_path_beneath_attr below = {};
-  below.allowed_access = LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
+  struct stat info {};
+  const bool directory = folder.ok() && ::fstat(folder.get(), &info) == 0 && S_ISDIR(info.st_mode);
+  below.allowed_access =
+      LANDLOCK_ACCESS_FS_READ_FILE | (directory ? LANDLOCK_ACCESS_FS_READ_DIR : 0);
   below.parent_fd = folder.get();
   return folder.ok() &&
          ::syscall(SYS_landlock_add_rule, rules.get(), LANDLOCK_RULE_PATH_BENEATH, &below, 0) == 0;
@@ -55,9 +59,7 @@ absl::Status ConfineFiles(const std::string& readable, const std::vector<std::st
       static_cast<int>(::syscall(SYS_landlock_create_ruleset, &rights, sizeof(rights), 0)));
   if (!rules.ok()) return NoLandlock(errno);
   if (!readable.empty() && !AllowReading(rules, readable)) return NoLandlock(errno);
-  for (const std::string& folder : more) {
-    if (!AllowReading(rules, folder) && errno != ENOENT) return NoLandlock(errno);
-  }
+  for (const std::string& path : more) (void)AllowReading(rules, path);  // else it stays closed
   if (::syscall(SYS_landlock_restrict_self, rules.get(), 0) != 0) return NoLandlock(errno);
   return absl::OkStatus();
 }

@@ -21,7 +21,7 @@ class Sandbox {
   absl::Status CheckLandlock() const;
 
   // Confines this process for good, its threads and children too. It can still use its memory and open descriptors, and open files
-  // to read below `readable` (a folder; "/": all files; empty: none) and below those of `more` that are there. It cannot write or create files, use the network, start
+  // to read below `readable` (a folder; "/": all files; empty: none) and those of `more` (files, or folders with all below them) that can be opened. It cannot write or create files, use the network, start
   // programs, or signal and trace other processes. Call it in a process with one thread.
   // Errors: Unavailable: files (CheckLandlock) or calls (seccomp) are not confined, the other is.
   absl::Status Enter(const std::string& readable, const std::vector<std::string>& more = {}) const;

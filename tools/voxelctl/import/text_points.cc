@@ -30,6 +30,16 @@ struct Column {
 using Columns = std::vector<Column>;
 constexpr size_t kMostColumns = 256;
 
+// Where a comment begins, outside quotation marks; npos: there is none.
+size_t CommentBegin(absl::string_view line) {
+  bool quoted = false;
+  for (size_t i = 0; i < line.size(); ++i) {
+    if (line[i] == '"') quoted = !quoted;
+    if (!quoted && (line[i] == '#' || line.substr(i, 2) == "//")) return i;
+  }
+  return absl::string_view::npos;
+}
+
 // Lines without their ends, comments and blanks around. A comment begins with "#" or "//".
 class Lines {
  public:
@@ -45,7 +55,7 @@ class Lines {
       const size_t end = std::min(rest_.find('\n'), rest_.size());
       const absl::string_view all = absl::StripAsciiWhitespace(rest_.substr(0, end));
       rest_.remove_prefix(std::min(end + 1, rest_.size()));
-      const size_t begin = std::min(all.find('#'), all.find("//"));
+      const size_t begin = CommentBegin(all);
       *line = absl::StripAsciiWhitespace(all.substr(0, begin));
       if (!line->empty()) return true;
       if (begin == 0) {
@@ -95,10 +105,12 @@ Words SplitAt(absl::string_view line, char mark) {
     if (mark == ' ' && line.empty()) break;
     size_t from = 0;
     absl::string_view word;
-    const bool quoted =
-        absl::StartsWith(line, "\"") && line.find('"', 1) != absl::string_view::npos;
+    // Two quotation marks in a quoted word are one of its own.
+    size_t close = absl::StartsWith(line, "\"") ? line.find('"', 1) : absl::string_view::npos;
+    while (close != absl::string_view::npos && line.substr(close + 1, 1) == "\"")
+      close = line.find('"', close + 2);
+    const bool quoted = close != absl::string_view::npos;
     if (quoted) {
-      const size_t close = line.find('"', 1);
       word = line.substr(1, close - 1);
       from = close + 1;
     }
@@ -296,10 +308,12 @@ absl::StatusOr<Model> ReadTextPoints(const SourceFile& file, bool attributes) {
   if (!table.ok()) return table.status();
   if (attributes) table->SetAttributes(std::move(names));
   std::vector<double> values(numbers.size());
+  uint64_t beyond = 0;                          // words
   bool has_points = false, has_commas = false;  // decimal points and decimal commas
   do {
     const auto words = WordsOf(line, mark, columns->size());
     PointRow row = {};
+    beyond += words.size() - std::min(words.size(), columns->size());
     for (size_t c = 0; c < columns->size(); ++c) {
       if (!(*columns)[c].known.has_value()) continue;
       const std::optional<double> value = c < words.size() ? Number(words[c]) : std::nullopt;
@@ -336,6 +350,7 @@ absl::StatusOr<Model> ReadTextPoints(const SourceFile& file, bool attributes) {
   Model model =
       std::move(*table).Finish(file, file.extension == "csv" ? "CSV points" : "XYZ points");
   if (!attributes) AddLeftOut("other columns", others, &model);
+  AddLeftOut("words beyond the columns", beyond, &model);
   return model;
 }
 

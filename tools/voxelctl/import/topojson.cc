@@ -150,7 +150,6 @@ absl::Status TopoJsonReader::ReadGeometry(const json& geometry, const std::strin
 
 absl::Status TopoJsonReader::DrawArc(const json& arc, const std::string& where) {
   if (!arc.is_array() || arc.empty()) return Wrong(where, "an array of positions");
-  if (arc.size() == 1) lines_.LeaveOut("arcs of one position");  // simplification leaves such arcs
   std::vector<LonLat> line(arc.size());
   std::array<double, 2> at{};
   for (size_t i = 0; i < line.size(); ++i) {
@@ -159,6 +158,10 @@ absl::Status TopoJsonReader::DrawArc(const json& arc, const std::string& where) 
     if (!status.ok()) return status;
     at = quantized_ ? std::array<double, 2>{at[0] + value[0], at[1] + value[1]} : value;
     line[i] = Place(at[0], at[1]);
+  }
+  if (line.size() == 1) {  // simplification leaves such arcs
+    lines_.LeaveOut("arcs of one position");
+    return absl::OkStatus();
   }
   return lines_.AddLine(line, false);
 }

@@ -60,7 +60,7 @@ absl::Status NoSuchAttribute(const std::string& name, std::span<const Model> mod
   }
   for (const absl::string_view axis : kCoordinates) known.emplace_back(axis);
   return absl::InvalidArgumentError(absl::StrCat("--color-by is \"", EscapeForTerminal(name),
-                                                 "\", and no file has such numbers",
+                                                 "\", which no file contains",
                                                  EscapeForTerminal(Suggestion(name, known))));
 }
 
@@ -71,9 +71,10 @@ absl::StatusOr<Legend> ApplyColorBy(const ColorBy& wanted, std::span<Model> mode
                 .colormap = wanted.colormap.empty() ? "viridis" : wanted.colormap};
   const std::optional<ColorTable> table = FindColormap(legend.colormap);
   if (!table) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "--colormap is \"", EscapeForTerminal(legend.colormap), "\", and there is no such map",
-        EscapeForTerminal(ColormapAdvice(legend.colormap))));
+    return absl::InvalidArgumentError(
+        absl::StrCat("--colormap is \"", EscapeForTerminal(legend.colormap),
+                     "\", which is not a known colour map; ",
+                     EscapeForTerminal(ColormapAdvice(legend.colormap))));
   }
   std::vector<std::pair<Part*, std::vector<double>>> colored;
   double least = std::numeric_limits<double>::infinity(), greatest = -least;
@@ -89,10 +90,17 @@ absl::StatusOr<Legend> ApplyColorBy(const ColorBy& wanted, std::span<Model> mode
       colored.emplace_back(&part, std::move(numbers));
     }
   }
+  const bool parts = std::any_of(models.begin(), models.end(),
+                                 [](const Model& model) { return !model.parts.empty(); });
+  if (!parts) {
+    return absl::InvalidArgumentError(
+        "--color-by is for points, lines and meshes; volumes and drawings have --colormap");
+  }
   if (colored.empty()) return NoSuchAttribute(wanted.attribute, models);
   if (!wanted.range && !(least <= greatest)) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "--color-by is \"", EscapeForTerminal(wanted.attribute), "\", which is nowhere a number"));
+    return absl::InvalidArgumentError(absl::StrCat("--color-by is \"",
+                                                   EscapeForTerminal(wanted.attribute),
+                                                   "\", which has no numeric value in any file"));
   }
   legend.low = wanted.range ? (*wanted.range)[0] : least;
   legend.high = wanted.range ? (*wanted.range)[1] : greatest;

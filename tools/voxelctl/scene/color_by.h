@@ -27,7 +27,7 @@ struct Legend {
   uint64_t without = 0;  // vertices that have no number; they are grey
 };
 
-// Gives every part of the models that has the attribute the colours of its numbers, in place of its own and of its picture, without
+// Colours every part that has the attribute by its values. They replace the part's own colours and texture, without
 // shading. Numbers beyond the range have the colours of its ends. Call it before PlaceModels: x, y and z are as in the file.
 // Errors: InvalidArgument if no part has such numbers, with the names of those there are, or if there is no such colour map.
 absl::StatusOr<Legend> ApplyColorBy(const ColorBy& wanted, std::span<Model> models);

@@ -12,7 +12,9 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// Of a picture that repeats.
+constexpr uint64_t kMostTexels = uint64_t{64} << 20;
+
+// Returns: the texel index of a coordinate; the picture repeats.
 uint32_t Texel(float at, uint32_t size) {
   const double within = at - std::floor(double{at});
   return std::min(static_cast<uint32_t>(within * size), size - 1);
@@ -24,6 +26,10 @@ absl::StatusOr<Part> PaintVertices(const Part& part, const std::string& picture)
   const absl::StatusOr<pictures::PictureFile> file = pictures::PictureFile::Open(picture);
   if (!file.ok()) {
     return absl::InvalidArgumentError(absl::StrCat("a picture of it ", file.status().message()));
+  }
+  if (const auto [width, height] = file->size(); uint64_t{width} * height > kMostTexels) {
+    return absl::InvalidArgumentError(absl::StrCat("a picture of it has ", width, " by ", height,
+                                                   " texels; at most ", kMostTexels, " are read"));
   }
   const absl::StatusOr<std::vector<uint32_t>> texels = file->Read();
   if (!texels.ok()) {

@@ -233,7 +233,8 @@ absl::StatusOr<PackedVolume> PackWithin(const SampledVolume& volume, const Volum
     if (!(*look.level > range.least) || *look.level > range.greatest) {
       return absl::InvalidArgumentError(
           absl::StrCat("--level is ", *look.level, ", and the samples go from ", range.least,
-                       " to ", range.greatest, "; give a level above the least of them"));
+                       " to ", range.greatest, "; a level above ", range.least, " and at most ",
+                       range.greatest, " is expected"));
     }
     grid.samples = ToArray(
         Quantise<uint16_t>(volume, factors, packed.samples, range.least, range.greatest), brought);
