@@ -67,20 +67,26 @@ TEST(PlyMesh, FacesMayComeBeforeVertices) {
   ExpectSquare(Ply(AsciiPly(kFace + VertexElement(4), absl::StrCat("4 0 1 2 3\n", kSquare))));
 }
 
-TEST(PlyMesh, OtherElementsArePassedOver) {
-  ExpectSquare(Ply(AsciiPly(
-      absl::StrCat("element camera 1\nproperty float f\nproperty list uchar int l\n",
+TEST(PlyMesh, OtherElementsAndPicturesAreCounted) {
+  const auto model = Ply(AsciiPly(
+      absl::StrCat("comment TextureFile a.png\ncomment TextureFile\ncomment made by hand\n",
+                   "element camera 1\nproperty float f\nproperty list uchar int l\n",
                    VertexElement(4), "element edge 2\nproperty int vertex1\nproperty int vertex2\n",
-                   kFace, "element material 1\nproperty uchar m\n"),
-      absl::StrCat("0.5 3 7 8 9\n", kSquare, "0 1\n1 2\n4 0 1 2 3\n9\n"))));
+                   kFace, "element material 1\nproperty uchar m\nelement none 0\n"),
+      absl::StrCat("0.5 3 7 8 9\n", kSquare, "0 1\n1 2\n4 0 1 2 3\n9\n")));
+  ExpectSquare(model);
+  EXPECT_EQ(model->left_out,
+            (std::vector<LeftOut>{{"entries of other elements", 4}, {"pictures", 1}}));
 }
 
-TEST(PlyMesh, OtherPropertiesOfFacesArePassedOver) {
-  ExpectSquare(Ply(AsciiPly(
+TEST(PlyMesh, OtherPropertiesOfFacesAreCounted) {
+  const auto model = Ply(AsciiPly(
       VertexElement(4) +
           "element face 1\nproperty uchar flags\nproperty list uchar int vertex_index\nproperty "
           "list uchar float texcoord\n",
-      absl::StrCat(kSquare, "1 4 0 1 2 3 2 0.5 0.5\n"))));
+      absl::StrCat(kSquare, "1 4 0 1 2 3 2 0.5 0.5\n")));
+  ExpectSquare(model);
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"other properties of faces", 2}}));
 }
 
 TEST(PlyMesh, StripsOfTrianglesKeepTheirWinding) {

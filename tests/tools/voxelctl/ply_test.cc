@@ -47,6 +47,8 @@ TEST(PlyPoints, AsciiWithListsAndOtherElements) {
   EXPECT_EQ(part.kind, Kind::kPoints);
   EXPECT_EQ(part.positions, (std::vector<Point3>{{0, 0, 0}, {1, 0, 0}, {0, 0, 2.5}}));
   EXPECT_EQ(part.colors, (std::vector<Rgb>{{255, 0, 0}, {0, 255, 0}, {0, 0, 255}}));
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"other properties of vertices", 1},
+                                                   {"entries of other elements", 1}}));
 }
 
 class PlyBinary : public testing::TestWithParam<bool> {};

@@ -181,6 +181,27 @@ TEST_F(VoxFiles, OfKeyFramesTheFirstIsShown) {
   EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"key frames after the first", 1}}));
 }
 
+TEST_F(VoxFiles, MaterialsAndUnknownChunksAreCounted) {
+  const auto material = [](const std::string& type) {
+    return Chunk("MATL", Int(7) + Dictionary({{"_type", type}}));
+  };
+  const std::string model = Model3(1, 1, 1, {{0, 0, 0, 1}});
+  const std::string plain = material("_diffuse") + Chunk("MATL", Int(8) + Dictionary({})) +
+                            Chunk("MATT", Int(9) + Int(0) + Int(0)) + Chunk("rCAM", "x") +
+                            Chunk("rOBJ", "x") + Chunk("NOTE", "x") + Chunk("IMAP", "x");
+  auto read = Import(Vox(Chunk("PACK", Int(1)) + model + plain));
+  ASSERT_THAT(read, IsOk());
+  EXPECT_THAT(read->left_out, testing::IsEmpty());
+  read = Import(Vox(model + material("_emit") + material("_glass") +
+                    Chunk("MATT", Int(9) + Int(3) + Int(0)) + Chunk("RSTK", "") +
+                    Chunk("rAIR", "12")));
+  ASSERT_THAT(read, IsOk());
+  EXPECT_EQ(read->left_out, (std::vector<LeftOut>{{"materials other than diffuse", 3},
+                                                  {"chunks of unknown kinds", 2}}));
+  EXPECT_THAT(std::string(Import(Vox(model + Chunk("MATL", Int(7) + Int(1)))).status().message()),
+              HasSubstr("its chunk MATL is cut off"));
+}
+
 TEST_F(VoxFiles, HiddenLayersAreNotShown) {
   const std::string models =
       Model3(1, 1, 1, {{0, 0, 0, 1}}) + Model3(2, 1, 1, {{0, 0, 0, 1}, {1, 0, 0, 1}});

@@ -180,6 +180,16 @@ const PlyElement* PlyHeader::Find(absl::string_view name) const {
   return nullptr;
 }
 
+uint64_t PlyHeader::OtherEntries() const {
+  uint64_t count = 0;
+  for (const PlyElement& element : elements) {
+    const bool read =
+        &element == Find("vertex") || &element == Find("face") || &element == Find("tristrips");
+    if (!read) count += element.count;
+  }
+  return count;
+}
+
 absl::StatusOr<PlyHeader> ParsePlyHeader(const SourceFile& file, PlyCounts counts) {
   const absl::string_view text = absl::string_view(file.bytes).substr(0, kMaxHeaderBytes);
   PlyHeader header;
@@ -216,6 +226,8 @@ absl::StatusOr<PlyHeader> ParsePlyHeader(const SourceFile& file, PlyCounts count
       status = ParseElement(file, number, line, words, &header);
     } else if (words[0] == "property") {
       status = ParseProperty(file, number, line, words, &header);
+    } else if (words.size() > 2 && words[0] == "comment" && words[1] == "TextureFile") {
+      ++header.pictures;
     }
     // Anything else is a comment, or a line that an exporter put there without calling it one.
     if (!status.ok()) return status;

@@ -34,10 +34,14 @@ struct PlyHeader {
   enum class Format : uint8_t { kAscii, kBinaryLittleEndian, kBinaryBigEndian };
   Format format = Format::kAscii;
   std::vector<PlyElement> elements;
-  size_t body = 0;  // where the data begin
+  size_t body = 0;        // where the data begin
+  uint64_t pictures = 0;  // that comments name as textures ("comment TextureFile NAME", MeshLab's)
 
   // Null if there is none, or it has no entries.
   const PlyElement* Find(absl::string_view name) const;
+
+  // How many entries the elements have that are neither vertices, faces nor strips.
+  uint64_t OtherEntries() const;
 };
 
 // InvalidArgument if it is not a PLY header, has no vertices with x, y and z, or announces more

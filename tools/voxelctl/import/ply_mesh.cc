@@ -31,6 +31,7 @@ struct PlyFaces {
   std::vector<uint32_t> vertices;  // of all faces
   std::vector<uint32_t> sizes;     // of each
   std::vector<Rgb> colors;         // or none
+  uint64_t others = 0;             // properties that are neither indices nor colours
 };
 
 constexpr double kMostListed = kMaxModelIndices;  // entries of a list
@@ -74,6 +75,9 @@ absl::StatusOr<PlyFaces> ReadFaces(const SourceFile& file, const PlyElement& ele
   if (element.count > kMaxModelIndices) return TooManyIndices(file);
   const PlyColorProperties colors(element);
   PlyFaces faces;
+  for (size_t p = 0; p < element.properties.size(); ++p) {
+    if (p != *list && colors.ChannelOf(p) < 0) ++faces.others;
+  }
   std::vector<float> floating;  // colors until their range is known
   bool to_255 = false;
   const auto cut = [&](uint64_t number) {
@@ -315,6 +319,9 @@ absl::StatusOr<Model> ReadPlyMesh(const SourceFile& file, const PlyHeader& heade
     model.parts.push_back(*std::move(part));
   }
   AddLeftOut("other properties of vertices", vertices->others, &model);
+  AddLeftOut("other properties of faces", faces->others + strips->others, &model);
+  AddLeftOut("entries of other elements", header.OtherEntries(), &model);
+  AddLeftOut("pictures", header.pictures, &model);
   if (model.parts.empty()) {
     return FileError(file, "its faces are no triangle", "a face has at least three vertices");
   }

@@ -49,6 +49,8 @@ absl::StatusOr<Model> ReadPlyPoints(const SourceFile& file, const PlyHeader& hea
   Model model;
   AddLeftOut("points that are not a number", count - kept, &model);
   AddLeftOut("other properties of vertices", vertices->others, &model);
+  AddLeftOut("entries of other elements", header.OtherEntries(), &model);
+  AddLeftOut("pictures", header.pictures, &model);
   part.positions = std::move(vertices->positions);
   part.normals = std::move(vertices->normals);
   part.colors = std::move(vertices->colors);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <iterator>
 #include <optional>
 #include <utility>
 
@@ -110,6 +111,13 @@ bool IsHidden(const std::map<std::string, std::string>& attributes) {
   return hidden != attributes.end() && hidden->second == "1";
 }
 
+// Chunks that tell MagicaVoxel how to show a scene, and nothing of the scene: cameras, rendering, names of colours, the order in which
+// its palette lies on the screen.
+bool IsForTheEditor(absl::string_view id) {
+  static constexpr absl::string_view kThese[] = {"PACK", "rCAM", "rOBJ", "NOTE", "IMAP"};
+  return std::ranges::find(kThese, id) != std::end(kThese);
+}
+
 class VoxReader {
  public:
   explicit VoxReader(const SourceFile& file) : file_(file) { scene_.palette = DefaultPalette(); }
@@ -169,6 +177,16 @@ class VoxReader {
     } else if (id == "LAYR") {
       const int32_t layer = bytes.Int();
       if (IsHidden(bytes.Dictionary()) && layer >= 0) scene_.hidden_layers.insert(layer);
+    } else if (id == "MATL") {
+      bytes.Int();  // the colour that is made of it
+      const auto attributes = bytes.Dictionary();
+      const auto type = attributes.find("_type");
+      if (type != attributes.end() && type->second != "_diffuse") ++scene_.materials;
+    } else if (id == "MATT") {
+      bytes.Int();
+      if (bytes.Int() != 0) ++scene_.materials;
+    } else if (!IsForTheEditor(id)) {
+      ++scene_.unknown_chunks;
     }
     if (status.ok() && !bytes.ok()) return CutOff(Named(id));
     return status;

@@ -44,7 +44,10 @@ struct VoxScene {
   std::array<Rgb, 256> palette = {};  // by a voxel's colour; 0 is none
   std::map<int32_t, VoxNode> nodes;   // 0 is the root; empty: there are none
   std::set<int32_t> hidden_layers;
-  uint64_t later_frames = 0;  // key frames after the first of each node, which are left out
+  // Left out:
+  uint64_t later_frames = 0;    // key frames after the first of each node
+  uint64_t materials = 0;       // of glass, metal, light and the like: all but diffuse ones
+  uint64_t unknown_chunks = 0;  // that neither MagicaVoxel's description nor this reader knows
 };
 
 absl::StatusOr<VoxScene> ReadVoxChunks(const SourceFile& file);

@@ -69,6 +69,8 @@ class Builder {
     model.parts.push_back(std::move(part_));
     AddLeftOut("key frames after the first", scene_.later_frames, &model);
     AddLeftOut("hidden nodes", hidden_, &model);
+    AddLeftOut("materials other than diffuse", scene_.materials, &model);
+    AddLeftOut("chunks of unknown kinds", scene_.unknown_chunks, &model);
     return model;
   }
 
