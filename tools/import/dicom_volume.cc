@@ -138,7 +138,7 @@ Point3 StepOf(const std::vector<Layer>& layers, const Slice& first, std::string*
   return Times(first.Normal(), between);
 }
 
-// In MONOCHROME1 the least number is white. Turns numbers round within the window, or else within their range.
+// MONOCHROME1 stores white as the smallest value. Inverts the values within the window, or within their range if there is none.
 void TurnRound(SampledVolume* volume) {
   double sum = 0;
   if (volume->window) {

@@ -26,7 +26,7 @@ using ::testing::IsNan;
 
 std::string Atom(int serial, const std::string& name, double x, double y, double z,
                  const std::string& element = "", char location = ' ') {
-  return absl::StrFormat("HETATM%5d %-4s%cXXX A   1    %8.3f%8.3f%8.3f  1.00  0.00          %2s\n",
+  return absl::StrFormat("HETATM%5d %-4s%cLIG A   1    %8.3f%8.3f%8.3f  1.00  0.00          %2s\n",
                          serial, name, location, x, y, z, element);
 }
 
@@ -228,10 +228,10 @@ TEST_F(Molecules, LinksAndWhatIsNotDrawn) {
   atoms.replace(atoms.find('\n') + 1 + 25, 1, "2");  // the second atom is in residue 2
   // wwPDB's format 3.3: residues in columns 16 to 22 and 30 to 36, atoms in 13 to 16 and 43 to 46, symmetry from 60 and 67.
   const std::string bridge =
-      "SSBOND   1 XXX A    1    XXX A    2                          1555   1555  2.03\n";
+      "SSBOND   1 LIG A    1    LIG A    2                          1555   1555  2.03\n";
   EXPECT_EQ(Bonds(bridge + atoms), 1u);
   const std::string link =
-      "LINK         SG  XXX A   1                 SG  XXX A   2     1555   1555  5.00\n";
+      "LINK         SG  LIG A   1                 SG  LIG A   2     1555   1555  5.00\n";
   EXPECT_EQ(Bonds(link + atoms), 1u);
   std::string other = link;
   other.replace(other.rfind("1555"), 4, "2655");

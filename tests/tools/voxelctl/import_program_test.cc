@@ -27,6 +27,7 @@ TEST(OwnFormats, HaveNoAnimations) {
 
 class ImportProgram : public ::testing::Test {
  protected:
+  // A build without importers (-DVOXELD_IMPORTERS=OFF) has no program to test. The default build has it.
   void SetUp() override {
     if (const absl::Status status = CheckImporters("play"); !status.ok())
       GTEST_SKIP() << status.message();

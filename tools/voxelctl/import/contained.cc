@@ -187,7 +187,8 @@ class ContainedFrames final : public FrameSource {
     absl::StatusOr<Model> model = Written();
     if (!model.ok()) return model;
     const absl::Status sound = CheckModel(file_, *model);
-    if (!sound.ok()) return sound;
+    if (!sound.ok())
+      return absl::Status(sound.code(), absl::StrCat(sound.message(), " (in frame ", frame, ")"));
     return model;
   }
 
