@@ -9,10 +9,13 @@
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
+#include <initializer_list>
+#include <limits>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "tests/tools/import/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
@@ -22,6 +25,7 @@
 namespace voxeld::voxelctl {
 namespace animation_test {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 std::string ModelFile(const std::string& name) {
@@ -167,6 +171,36 @@ TEST(Animations, OfASkinInGltf) {
     ++(first->parts[0].positions[i] == later->parts[0].positions[i] ? still : moved);
   EXPECT_GT(still, 0u);
   EXPECT_GT(moved, 0u);
+}
+
+TEST(MoreMeshes, AFrameThatLeavesTheNumbersIsNamed) {
+  // Two moments of translation: none, and infinitely far along x.
+  const auto bytes = [](std::initializer_list<float> values) {
+    return std::string(reinterpret_cast<const char*>(values.begin()),
+                       values.size() * sizeof(float));
+  };
+  const std::string data = bytes({0, 0, 0, 1, 0, 0, 0, 1, 0}) + bytes({0, 1}) +
+                           bytes({0, 0, 0, std::numeric_limits<float>::infinity(), 0, 0});
+  TempFolder folder;
+  const std::string path = folder.Write(
+      "a.gltf",
+      absl::StrCat(
+          R"({"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
+          R"("meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"buffers":[{"byteLength":68,)"
+          R"("uri":"data:application/octet-stream;base64,)",
+          absl::Base64Escape(data),
+          R"("}],"bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":8},)"
+          R"({"buffer":0,"byteOffset":44,"byteLength":24}],"accessors":[)"
+          R"({"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},)"
+          R"({"bufferView":1,"componentType":5126,"count":2,"type":"SCALAR","min":[0],"max":[1]},)"
+          R"({"bufferView":2,"componentType":5126,"count":2,"type":"VEC3"}],"animations":[{"samplers":)"
+          R"([{"input":1,"output":2,"interpolation":"STEP"}],)"
+          R"("channels":[{"sampler":0,"target":{"node":0,"path":"translation"}}]}]})"));
+  const auto frames = OpenAnimation(path, 1, 1);
+  ASSERT_THAT(frames, IsOk());
+  EXPECT_THAT((*frames)->Read(0), IsOk());
+  EXPECT_THAT(std::string((*frames)->Read(1).status().message()),
+              AllOf(HasSubstr("coordinates must be finite"), HasSubstr("(in frame 1)")));
 }
 
 TEST(Animations, ThatAreNotThere) {
