@@ -55,22 +55,22 @@ SourceFile Unread(const std::string& path, OtherFiles other_files) {
 }
 
 // The options that tools/import/main.cc takes.
-std::vector<std::string> Words(const ImportOptions& options) {
+std::vector<std::string> ArgumentsOf(const ImportOptions& options) {
   constexpr absl::string_view kOtherFiles[] = {"none", "below", "any"};
   constexpr absl::string_view kStyles[] = {"balls", "space"};
-  std::vector<std::string> words = {
+  std::vector<std::string> arguments = {
       absl::StrCat("--other-files=", kOtherFiles[static_cast<size_t>(options.other_files)]),
       absl::StrCat("--style=", kStyles[static_cast<size_t>(options.style)]),
       absl::StrCat("--pixels=", options.pixels[0], "x", options.pixels[1])};
-  if (options.globe) words.push_back("--globe");
-  if (options.attributes) words.push_back("--attributes");
+  if (options.globe) arguments.push_back("--globe");
+  if (options.attributes) arguments.push_back("--attributes");
   if (options.raw) {
     const RawLayout& raw = *options.raw;
-    words.push_back(absl::StrCat("--size=", raw.size[0], "x", raw.size[1], "x", raw.size[2]));
-    words.push_back(absl::StrCat("--type=", kSampleTypeNames[static_cast<size_t>(raw.type)]));
-    if (raw.big_endian) words.push_back("--big-endian");
+    arguments.push_back(absl::StrCat("--size=", raw.size[0], "x", raw.size[1], "x", raw.size[2]));
+    arguments.push_back(absl::StrCat("--type=", kSampleTypeNames[static_cast<size_t>(raw.type)]));
+    if (raw.big_endian) arguments.push_back("--big-endian");
   }
-  return words;
+  return arguments;
 }
 
 // `more`: further command-line options.
@@ -80,7 +80,7 @@ absl::StatusOr<std::vector<std::string>> Command(const std::vector<std::string>&
   std::string program = FindProgram();
   if (program.empty()) return NoProgram(EscapeForTerminal(paths.front()));
   std::vector<std::string> command = {std::move(program)};
-  for (std::string& word : Words(options)) command.push_back(std::move(word));
+  for (std::string& argument : ArgumentsOf(options)) command.push_back(std::move(argument));
   command.insert(command.end(), more.begin(), more.end());
   command.push_back("--");
   command.insert(command.end(), paths.begin(), paths.end());
