@@ -39,7 +39,7 @@ using absl::string_view;
 
 constexpr double kFarthest = 1e6;  // Å
 constexpr uint64_t kMostUnpacked = uint64_t{1} << 30;
-constexpr float kNoValue = std::numeric_limits<float>::quiet_NaN();
+constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 constexpr char kFurtherModels[] = "further models";
 constexpr char kOtherLocations[] = "atoms at alternate locations";
 constexpr char kNoPlace[] = "atoms without coordinates";
@@ -55,18 +55,15 @@ const ChemicalElement& ElementOf(gemmi::Element element) {
   return found != nullptr ? *found : UnknownElement();
 }
 
-float AttributeOf(double value) {
-  return std::abs(value) <= std::numeric_limits<float>::max() ? static_cast<float>(value)
-                                                              : kNoValue;
-}
+double AttributeOf(double value) { return std::isfinite(value) ? value : kNoValue; }
 
 // Collects atoms with their attributes, of each residue those of one alternate location, and finds them by address.
 class Builder {
  public:
   // The numbers of an atom by which it can be coloured.
   struct Values {
-    float b_factor = kNoValue, occupancy = kNoValue, charge = kNoValue, chain = kNoValue,
-          residue = kNoValue;
+    double b_factor = kNoValue, occupancy = kNoValue, charge = kNoValue, chain = kNoValue,
+           residue = kNoValue;
   };
 
   // Returns false, and counts the atom, if another alternate location of its residue was chosen.
@@ -88,14 +85,14 @@ class Builder {
     if (a != b && molecule_.bonds.size() < kMaxModelVertices / 4) molecule_.bonds.push_back({a, b});
   }
 
-  float ChainNumber(string_view chain) {
-    return static_cast<float>(
+  double ChainNumber(string_view chain) {
+    return static_cast<double>(
         chains_.emplace(std::string(chain), chains_.size() + 1).first->second);
   }
 
   absl::Status Draw(const SourceFile& file, MoleculeStyle style, bool attributes, Model* model) && {
     AddLeftOut(kOtherLocations, other_locations_, model);
-    const auto attribute = [this](const char* name, float Values::*member) {
+    const auto attribute = [this](const char* name, double Values::*member) {
       Attribute one{name, {}};
       one.values.reserve(values_.size());
       for (const Values& values : values_) one.values.push_back(values.*member);
@@ -303,7 +300,7 @@ absl::Status PdbReader::Read(Builder* builder, Model* model) {
         place.element = &ElementOf(ElementOfName(atom, residue, line));
         if (!Stripped(line, 55, 60).empty()) values.occupancy = AttributeOf(atom.occ);
         if (!Stripped(line, 61, 66).empty()) values.b_factor = AttributeOf(atom.b_iso);
-        if (HasCharge(line)) values.charge = static_cast<float>(atom.charge);
+        if (HasCharge(line)) values.charge = atom.charge;
         if (residue.seqid.num.has_value())
           values.residue = static_cast<float>(residue.seqid.num.value);
       }
@@ -922,7 +919,7 @@ absl::Status CifReader::ReadCrystal(const CifColumns& sites, Builder* builder, M
         {{at.x, at.y, at.z}, &ElementOf(site.element)},
         {.b_factor = AttributeOf(std::isnan(u) ? sites.Number(row, kBIso) : u * gemmi::u_to_b()),
          .occupancy = AttributeOf(sites.Number(row, kSiteOccupancy)),
-         .charge = static_cast<float>(site.charge)});
+         .charge = static_cast<double>(site.charge)});
   }
   uint64_t copies = 0;
   for (const char* tag : {"_symmetry_equiv_pos_as_xyz", "_space_group_symop_operation_xyz"})

@@ -1128,7 +1128,7 @@ void Scene::AddPrimitive(const tinygltf::Primitive& primitive, int node,
     attribute.values.resize(elements.vertices);
     ForEachElement(numbers, [&](uint64_t i, const double* v) {
       const uint32_t to = KeptOf(elements, i);
-      if (to != kNone) attribute.values[to] = static_cast<float>(v[0]);
+      if (to != kNone) attribute.values[to] = v[0];
     });
     part.attributes.push_back(std::move(attribute));
   }

@@ -125,8 +125,7 @@ std::vector<std::string> ReadablesOf(const Wanted& wanted) {
                                            : ReadSourceFile(path, wanted.options.other_files);
   const SourceFile nothing{
       .path = path, .extension = {}, .bytes = {}, .other_files = wanted.options.other_files};
-  if (!ConfineReader(file.ok() ? *file : nothing, frames ? Answers::kFrames : Answers::kModel,
-                     ReadablesOf(wanted))) {
+  if (!ConfineReader(file.ok() ? *file : nothing, ReadablesOf(wanted))) {
     ::_exit(kNotConfined);
   }
   if (wanted.sequence) {
@@ -142,7 +141,11 @@ std::vector<std::string> ReadablesOf(const Wanted& wanted) {
   }
   AnswerModel([&]() -> absl::StatusOr<Model> {
     if (!file.ok()) return file.status();
-    return unread ? ReadFolder(path) : ReadAny(*file, wanted.options);
+    if (unread) return ReadFolder(path);
+    absl::StatusOr<Model> model = ReadAny(*file, wanted.options);
+    // Memory for the answer's time, which the model alone needs.
+    file->bytes = std::string();
+    return model;
   });
 }
 
@@ -166,7 +169,7 @@ int Main(int argc, char** argv) {
     PrintFormats();
     return usage::CheckedExit("voxeld-import", 0);
   }
-  if (::fcntl(kModelDescriptor, F_GETFD) < 0) {
+  if (::fcntl(kAnswerDescriptor, F_GETFD) < 0) {
     std::fprintf(
         stderr,
         "voxeld-import is started by voxelctl; to show a file, run "

@@ -290,7 +290,7 @@ TEST_F(Clouds, PropertiesOfPlyAreAttributes) {
   ASSERT_THAT(mesh, IsOk());
   const Part& part = mesh->parts[0];
   ASSERT_EQ(part.attributes.size(), 1u);
-  std::vector<float> at_corners;
+  std::vector<double> at_corners;
   for (const uint32_t v : part.indices) at_corners.push_back(part.attributes[0].values.at(v));
   EXPECT_THAT(at_corners, ElementsAre(1, 2, 3, 4, 3, 2));
 }

@@ -109,7 +109,7 @@ std::vector<std::pair<Point3, Point3>> Segments(const Part& part) {
   return segments;
 }
 
-std::vector<float> ValuesOf(const Part& part, const std::string& name) {
+std::vector<double> ValuesOf(const Part& part, const std::string& name) {
   for (const Attribute& one : part.attributes) {
     if (one.name == name) return one.values;
   }
@@ -285,7 +285,7 @@ TEST_F(Maps, ColoursAndNumbersOfKml) {
                           Rgb{0, 0, 255}, Rgb{0, 0, 255}, Rgb{0, 0, 255}, Rgb{0, 0, 255}));
   EXPECT_THAT(model->parts[1].positions, ElementsAre(Point3{1, 2, 0}));
   EXPECT_TRUE(ValuesOf(model->parts[0], "tessellate").empty());
-  const std::vector<float> numbers = ValuesOf(model->parts[0], "n");
+  const std::vector<double> numbers = ValuesOf(model->parts[0], "n");
   ASSERT_EQ(numbers.size(), 8u);
   EXPECT_EQ(numbers[1], 5.f);
   EXPECT_THAT(numbers[2], IsNan());

@@ -38,8 +38,8 @@ size_t AtomsOf(const Model& model) {
 }
 
 // The values of an attribute of all atoms, part by part.
-std::vector<float> ValuesOf(const Model& model, const std::string& name) {
-  std::vector<float> values;
+std::vector<double> ValuesOf(const Model& model, const std::string& name) {
+  std::vector<double> values;
   for (const Part& part : model.parts) {
     for (const Attribute& one : part.attributes) {
       if (part.kind == Kind::kPoints && one.name == name)
@@ -356,8 +356,8 @@ TEST_F(Molecules, CrystalsInFractions) {
       ImportAs("a.cif", cell + "_symmetry_space_group_name_H-M 'F m -3 m'\n" + sites);
   ASSERT_THAT(model, IsOk());
   EXPECT_EQ(AtomsOf(*model), 2u);
-  EXPECT_EQ(ValuesOf(*model, "element"), (std::vector<float>{17, 11}));
-  EXPECT_EQ(ValuesOf(*model, "charge"), (std::vector<float>{-1, 1}));
+  EXPECT_EQ(ValuesOf(*model, "element"), (std::vector<double>{17, 11}));
+  EXPECT_EQ(ValuesOf(*model, "charge"), (std::vector<double>{-1, 1}));
   EXPECT_NEAR(model->parts[0].positions[0].y, 2.81, 1e-9);
   EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"copies by crystal symmetry", 191},
                                                    {"atoms at alternate locations", 1}}));
@@ -401,8 +401,8 @@ TEST_F(Molecules, XyzOfSeveralFramesShowsTheFirst) {
   const auto model = ImportAs("a.xyz", frame + frame + frame + "\ntotal energy\n");
   ASSERT_THAT(model, IsOk());
   EXPECT_EQ(AtomsOf(*model), 2u);
-  EXPECT_EQ(ValuesOf(*model, "element"), (std::vector<float>{6, 17}));
-  EXPECT_EQ(ValuesOf(*model, "column 5"), (std::vector<float>{0.5f, -0.5f}));
+  EXPECT_EQ(ValuesOf(*model, "element"), (std::vector<double>{6, 17}));
+  EXPECT_EQ(ValuesOf(*model, "column 5"), (std::vector<double>{0.5, -0.5}));
   EXPECT_EQ(model->left_out,
             (std::vector<LeftOut>{{"further models", 2}, {"lines after the last atom", 1}}));
 }
@@ -410,15 +410,15 @@ TEST_F(Molecules, XyzOfSeveralFramesShowsTheFirst) {
 TEST_F(Molecules, XyzByAtomicNumbersAndWithNamedColumns) {
   const auto numbers = ImportAs("a.xyz", "2\nenergy\n8 0 0 0\n1 0.9 0 0\n");
   ASSERT_THAT(numbers, IsOk());
-  EXPECT_EQ(ValuesOf(*numbers, "element"), (std::vector<float>{1, 8}));
+  EXPECT_EQ(ValuesOf(*numbers, "element"), (std::vector<double>{1, 8}));
   const auto extended = ImportAs(
       "a.xyz",
       "1\nLattice=\"1 0 0 0 1 0 0 0 1\" Properties=id:I:1:species:S:1:pos:R:3:forces:R:3 pbc=T\n"
       "7 Xx 1 2 3 0.1 0.2 0.3\n");
   ASSERT_THAT(extended, IsOk());
   EXPECT_THAT(extended->parts.at(0).positions, ElementsAre(Point3{1, 2, 3}));
-  EXPECT_EQ(ValuesOf(*extended, "id"), (std::vector<float>{7}));
-  EXPECT_EQ(ValuesOf(*extended, "forces_3"), (std::vector<float>{0.3f}));
+  EXPECT_EQ(ValuesOf(*extended, "id"), (std::vector<double>{7}));
+  EXPECT_EQ(ValuesOf(*extended, "forces_3"), (std::vector<double>{0.3}));
 }
 
 TEST_F(Molecules, PointCloudsAreNotTakenForMolecules) {

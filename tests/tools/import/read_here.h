@@ -22,7 +22,7 @@ inline absl::StatusOr<Model> ReadAndCheck(const SourceFile& file, const ImportOp
 
 // Reads in a confined copy of this process.
 inline absl::StatusOr<Model> ReadApart(const std::string& path, const ImportOptions& options = {}) {
-  const absl::StatusOr<SourceFile> file = ReadSourceFile(path, options.other_files);
+  absl::StatusOr<SourceFile> file = ReadSourceFile(path, options.other_files);
   if (!file.ok()) return file.status();
   return ReadContained(*file, ReaderOf(*file, [&] { return ReadAndCheck(*file, options); }));
 }

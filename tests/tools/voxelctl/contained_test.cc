@@ -23,12 +23,14 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
 #include "tools/voxelctl/import/importer.h"
+#include "tools/voxelctl/import/model_bytes.h"
 #include "tools/voxelctl/import/reader_process.h"
 #include "tools/voxelctl/import/sandbox.h"
 
@@ -37,16 +39,22 @@ namespace contained_test {
 
 using ::testing::HasSubstr;
 
-absl::StatusOr<Model> ReadApart(const SourceFile& file,
-                                const std::function<absl::StatusOr<Model>()>& read,
-                                Interrupt* interrupt = nullptr) {
-  return ReadContained(file, ReaderOf(file, read), interrupt);
+absl::StatusOr<Model> ReadApart(SourceFile file, const std::function<absl::StatusOr<Model>()>& read,
+                                Interrupt* interrupt = nullptr, const ReaderLimits& limits = {}) {
+  return ReadContained(file, ReaderOf(file, read), interrupt, limits);
 }
 
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenApart(const SourceFile& file,
                                                        const OpenFrames& open,
-                                                       Interrupt* interrupt = nullptr) {
-  return OpenContained(file, FramesOf(file, open), interrupt);
+                                                       Interrupt* interrupt = nullptr,
+                                                       const ReaderLimits& limits = {}) {
+  return OpenContained(file, FramesOf(file, open), interrupt, limits);
+}
+
+[[noreturn]] void RunForEver() {
+  for (volatile bool always = true; always;) {
+  }
+  ::_exit(1);
 }
 
 TEST(Contained, ModelsComeBackAsTheyWere) {
@@ -93,7 +101,7 @@ TEST(Contained, ModelsComeBackAsTheyWere) {
   EXPECT_EQ(back->parts[1].texture_coordinates, model.parts[1].texture_coordinates);
   ASSERT_EQ(back->parts[0].attributes.size(), 2u);
   EXPECT_EQ(back->parts[0].attributes[1].name, "none");
-  EXPECT_EQ(back->parts[0].attributes[1].values, (std::vector<float>{7, 8}));
+  EXPECT_EQ(back->parts[0].attributes[1].values, (std::vector<double>{7, 8}));
   EXPECT_EQ(back->parts[0].kind, Kind::kSegments);
   EXPECT_EQ(back->parts[0].positions, model.parts[0].positions);
   EXPECT_EQ(back->parts[0].normals, model.parts[0].normals);
@@ -301,15 +309,10 @@ TEST_F(SandboxTest, WithoutLandlockAStrangersFileIsRefusedWithTheReason) {
 TEST(Contained, EndsWhenItIsInterrupted) {
   Interrupt interrupt(Interrupt::Watch::kNothing);
   std::thread later([&interrupt] { interrupt.Request(); });
-  const absl::Status status = ReadApart(
-                                  {.path = "p"},
-                                  []() -> absl::StatusOr<Model> {
-                                    for (volatile bool always = true; always;) {
-                                    }
-                                    return Model();
-                                  },
-                                  &interrupt)
-                                  .status();
+  const absl::Status status =
+      ReadApart(
+          {.path = "p"}, []() -> absl::StatusOr<Model> { RunForEver(); }, &interrupt)
+          .status();
   later.join();
   EXPECT_TRUE(absl::IsCancelled(status)) << status;
 }
@@ -325,11 +328,7 @@ pid_t ChildOf(pid_t process) {
 TEST(Contained, EndsWithWhoAsked) {
   const pid_t asks = ::fork();
   if (asks == 0) {
-    (void)ReadApart({.path = "p"}, []() -> absl::StatusOr<Model> {
-      for (volatile bool always = true; always;) {
-      }
-      return Model();
-    });
+    (void)ReadApart({.path = "p"}, []() -> absl::StatusOr<Model> { RunForEver(); });
     ::_exit(0);
   }
   pid_t reads = 0;
@@ -363,13 +362,14 @@ class Points final : public FrameSource {
 };
 
 absl::StatusOr<std::unique_ptr<FrameSource>> PointFrames(std::function<void(int64_t, Model&)> spoil,
-                                                         Interrupt* interrupt = nullptr) {
+                                                         Interrupt* interrupt = nullptr,
+                                                         const ReaderLimits& limits = {}) {
   return OpenApart(
       {.path = "p"},
       [spoil = std::move(spoil)](SourceFile) -> absl::StatusOr<std::unique_ptr<FrameSource>> {
         return std::make_unique<Points>(spoil);
       },
-      interrupt);
+      interrupt, limits);
 }
 
 TEST(ContainedFrames, AreReadInAnyOrderByAnotherProcess) {
@@ -432,34 +432,128 @@ TEST(ContainedFrames, ReaderCannotOpenFilesOutsideOfTheFolder) {
   EXPECT_EQ((*frames)->Read(0)->note, "10");
 }
 
-// A reader that was taken over has the descriptors of the frame (3) and of the channel (4).
-constexpr int kFrameFile = 3, kChannel = 4;
+// A reader that was taken over writes what it likes to its socket.
+void Send(const std::string& bytes) {
+  (void)!::write(kAnswerDescriptor, bytes.data(), bytes.size());
+}
 
-TEST(ContainedFrames, HalfAnAnswerDoesNotKeepTheParentWaiting) {
-  const auto frames = PointFrames([](int64_t frame, Model&) {
-    if (frame != 1) return;
-    (void)!::write(kChannel, "half", 4);
-    for (volatile bool forever = true; forever;) {
-    }
-  });
+TEST(ContainedFrames, HalfAnAnswerKeepsTheParentWaitingNoLongerThanItsLimits) {
+  for (const ReaderLimits& limits :
+       {ReaderLimits{.processor_s = 0.5}, ReaderLimits{.reading_s = 0.5}}) {
+    const auto frames = PointFrames(
+        [](int64_t frame, Model&) {
+          if (frame != 1) return;
+          Send("VXMO");
+          RunForEver();
+        },
+        nullptr, limits);
+    ASSERT_THAT(frames, IsOk());
+    EXPECT_THAT((*frames)->Read(0), IsOk());
+    const absl::Status late = (*frames)->Read(1).status();
+    EXPECT_THAT(std::string(late.message()), HasSubstr("timed out after 0.5 s"));
+    EXPECT_EQ((*frames)->Read(0).status(), late) << "it is not asked again";
+  }
+}
+
+// A byte now and then does not begin the limit anew.
+TEST(ContainedFrames, AnAnswerInDropsHasTheSameLimit) {
+  const auto frames = PointFrames(
+      [](int64_t, Model&) {
+        Send(std::string("VXMODEL\1\0\0\0\0", 12));
+        for (;;) {
+          Send(std::string(1, '\0'));
+          ::usleep(1000);
+        }
+      },
+      nullptr, {.reading_s = 0.5, .frame_bytes = 1 << 20});
   ASSERT_THAT(frames, IsOk());
-  EXPECT_FALSE((*frames)->Read(1).ok());
+  EXPECT_FALSE((*frames)->Read(0).ok());
 }
 
 TEST(ContainedFrames, AnswersThatNobodyAskedForDoNotBlockTheParent) {
   const auto frames = PointFrames([](int64_t frame, Model&) {
     if (frame != 0) return;
-    // It answers a thousand times, and does not read what it is asked any more.
-    const int64_t answer = 0;
-    for (int i = 0; i < 1000; ++i) (void)!::write(kChannel, &answer, sizeof(answer));
-    for (volatile bool forever = true; forever;) {
-    }
+    // It sends without end, and does not read what it is asked any more.
+    for (;;) Send(std::string(4096, 'x'));
   });
   ASSERT_THAT(frames, IsOk());
-  for (int i = 0; i < 1000; ++i) (void)(*frames)->Read(0);
+  for (int i = 0; i < 1000; ++i) EXPECT_FALSE((*frames)->Read(0).ok());
 }
 
-TEST(ContainedFrames, CountsAndFramesHaveLimits) {
+TEST(Contained, AnswersThatNoReaderGivesAreRefused) {
+  const std::string ok = std::string("VXMODEL\1\0\0\0\0", 12), none(8, '\0');
+  const std::string many("\xff\xff\xff\x7f\0\0\0\0", 8);    // 2³¹ − 1
+  const std::string head = ok + none + none + none + none;  // the texts and what is left out
+  struct Case {
+    std::string bytes, says;
+  };
+  for (const auto& [bytes, says] :
+       {Case{"", "gave up"}, Case{"VXMODEL", "gave up"},
+        Case{std::string(64, 'x'), "gave an answer that is none"},
+        Case{std::string("VXMODEL\2\0\0\0\0", 12), "are of different releases"},
+        Case{ok, "gave up halfway"}, Case{ok + many, "gave up halfway"},
+        Case{head + "\7", "gave up halfway"},                                // up
+        Case{head + std::string(4, '\0') + many, "gave up halfway"},         // parts
+        Case{head + std::string(4, '\0') + "\1" + none, "gave up halfway"},  // no whole number
+        Case{head + std::string(4, '\0') + "\1" + std::string(7, '\0') + "\x09",
+             "gave up halfway"}}) {  // the kind of a part
+    const auto model = ReadApart({.path = "p"}, [&bytes]() -> absl::StatusOr<Model> {
+      Send(bytes);
+      ::_exit(0);
+    });
+    EXPECT_THAT(std::string(model.status().message()), HasSubstr(says)) << bytes.size();
+  }
+}
+
+TEST(Contained, AnAnswerOfMoreThanTheLimitIsRefused) {
+  const auto model = ReadApart(
+      {.path = "p"},
+      []() -> absl::StatusOr<Model> {
+        Model large;
+        large.parts.push_back({.kind = Kind::kPoints, .positions = std::vector<Point3>(1 << 20)});
+        return large;
+      },
+      nullptr, {.model_bytes = 1 << 20});
+  EXPECT_THAT(std::string(model.status().message()), HasSubstr("made more than 1048576 bytes"));
+}
+
+// Memory that this process has, in bytes.
+int64_t ResidentBytes() {
+  std::ifstream file("/proc/self/statm");
+  int64_t all = 0, resident = 0;
+  file >> all >> resident;
+  return resident * ::sysconf(_SC_PAGESIZE);
+}
+
+TEST(Contained, MemoryOfAModelIsGivenBackWhileItIsWritten) {
+  constexpr int64_t kModelBytes = int64_t{48} << 20;
+  int ends[2] = {-1, -1};
+  ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM, 0, ends), 0);
+  Model model;
+  model.parts.push_back(
+      {.kind = Kind::kPoints,
+       .positions = std::vector<Point3>(kModelBytes / sizeof(Point3), {1, 2, 3})});
+  const int64_t before = ResidentBytes();
+  int64_t freed = 0;
+  std::thread takes([&] {
+    std::vector<char> some(1 << 16);
+    for (int64_t taken = 0; taken < kModelBytes / 4 * 3;) {
+      const ssize_t got = ::read(ends[0], some.data(), some.size());
+      ASSERT_GT(got, 0);
+      taken += got;
+    }
+    freed = before - ResidentBytes();
+    while (::read(ends[0], some.data(), some.size()) > 0) {
+    }
+  });
+  EXPECT_TRUE(WriteModel(std::move(model), ends[1]));
+  ::close(ends[1]);
+  takes.join();
+  ::close(ends[0]);
+  EXPECT_GT(freed, kModelBytes / 2);
+}
+
+TEST(ContainedFrames, CountsHaveALimit) {
   class Many final : public FrameSource {
    public:
     int64_t count() const override { return int64_t{1} << 40; }
@@ -470,19 +564,13 @@ TEST(ContainedFrames, CountsAndFramesHaveLimits) {
         return std::make_unique<Many>();
       });
   EXPECT_THAT(std::string(many.status().message()), HasSubstr("counts 1099511627776 frames"));
-  // A file with a hole costs the reader no memory, but its parent would copy it.
-  const auto frames =
-      PointFrames([](int64_t, Model&) { ::lseek(kFrameFile, off_t{4} << 30, SEEK_SET); });
-  ASSERT_THAT(frames, IsOk());
-  EXPECT_THAT(std::string((*frames)->Read(0).status().message()), HasSubstr("made a frame of "));
 }
 
 TEST(ContainedFrames, AnInterruptEndsAFrameThatTakesForEver) {
   Interrupt interrupt(Interrupt::Watch::kNothing);
   const auto frames = PointFrames(
       [](int64_t frame, Model&) {
-        for (volatile bool forever = frame == 1; forever;) {
-        }
+        if (frame == 1) RunForEver();
       },
       &interrupt);
   ASSERT_THAT(frames, IsOk());

@@ -69,7 +69,7 @@ TEST(GeoJson, GeometriesWithoutCoordinatesAreCounted) {
   EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"geometries without coordinates", 7}}));
 }
 
-std::vector<float> ValuesOf(const Part& part, const std::string& name) {
+std::vector<double> ValuesOf(const Part& part, const std::string& name) {
   for (const Attribute& one : part.attributes) {
     if (one.name == name) return one.values;
   }

@@ -209,7 +209,7 @@ absl::StatusOr<Model> ImportFile(const std::string& path, const ImportOptions& o
   std::error_code ignored;
   if (!IsOwnFormat(ExtensionOf(path)) || std::filesystem::is_directory(path, ignored))
     return ImportByProgram(path, options, interrupt);
-  const absl::StatusOr<SourceFile> file = ReadSourceFile(path, options.other_files);
+  absl::StatusOr<SourceFile> file = ReadSourceFile(path, options.other_files);
   if (!file.ok()) return file.status();
   absl::StatusOr<Model> model = ReadContained(
       *file, ReaderOf(*file, [&] { return ReadOwnFormat(*file, options); }), interrupt);

@@ -97,7 +97,7 @@ absl::StatusOr<Model> ImportByProgram(const std::string& path, const ImportOptio
                                       Interrupt* interrupt) {
   absl::StatusOr<std::vector<std::string>> command = Command({path}, options, {});
   if (!command.ok()) return command.status();
-  const SourceFile file = Unread(path, options.other_files);
+  SourceFile file = Unread(path, options.other_files);
   absl::StatusOr<Model> model = ReadContained(file, ProgramOf(*std::move(command)), interrupt);
   if (!model.ok()) return model;
   const absl::Status status = CheckModel(file, *model);

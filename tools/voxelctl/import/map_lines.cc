@@ -15,7 +15,7 @@ constexpr double kStepDegrees = 2;
 constexpr double kOnCut = 1e-9;
 constexpr double kMostLatitude = 90 + kOnCut;
 constexpr uint64_t kMostNumbers = uint64_t{1} << 27;  // of all attributes: half a gigabyte
-constexpr float kNoNumber = std::numeric_limits<float>::quiet_NaN();
+constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 
 Point3 OnSphere(LonLat p) {
   const double lon = p.lon * std::numbers::pi / 180, lat = p.lat * std::numbers::pi / 180;
@@ -28,10 +28,7 @@ LonLat Between(LonLat from, LonLat to, double t) {
           from.height + (to.height - from.height) * t};
 }
 
-float HeightOf(LonLat p) {
-  return std::abs(p.height) <= std::numeric_limits<float>::max() ? static_cast<float>(p.height)
-                                                                 : kNoNumber;
-}
+double HeightOf(LonLat p) { return std::isfinite(p.height) ? p.height : kNoNumber; }
 
 bool IsOnCut(LonLat p) { return std::abs(std::abs(p.lon) - 180) < kOnCut; }
 bool IsPole(LonLat p) { return std::abs(std::abs(p.lat) - 90) < kOnCut; }
@@ -49,11 +46,11 @@ Rgb WithOpacity(Rgb color, double opacity) {
 uint32_t MapLines::BeginFeature(const MapFeature& feature) {
   Feature kept{feature.line, feature.point, numbers_.size(), 0};
   for (const auto& [name, value] : feature.numbers) {
-    if (!attributes_ || !(std::abs(value) <= std::numeric_limits<float>::max())) continue;
+    if (!attributes_ || !std::isfinite(value)) continue;
     const auto [at, is_new] =
         name_numbers_.emplace(name, static_cast<uint32_t>(name_numbers_.size()));
     if (is_new) names_.push_back(name);
-    numbers_.emplace_back(at->second, static_cast<float>(value));
+    numbers_.emplace_back(at->second, value);
   }
   kept.end = numbers_.size();
   // Features that have nothing of all this share an entry.
@@ -160,7 +157,7 @@ void MapLines::Draw(const Line& line) {
   if (line.closed && at.size() > 2 && at.front() != at.back()) AddEdge(at.back(), at.front());
 }
 
-void MapLines::AddFeatures(const std::vector<uint32_t>& features, std::vector<float> heights,
+void MapLines::AddFeatures(const std::vector<uint32_t>& features, std::vector<double> heights,
                            bool points, Part* part) {
   const auto color_of = [&](uint32_t feature) {
     return points ? features_[feature].point : features_[feature].line;
@@ -185,7 +182,7 @@ void MapLines::AddFeatures(const std::vector<uint32_t>& features, std::vector<fl
         continue;
       }
       places[name] = static_cast<uint32_t>(part->attributes.size());
-      part->attributes.push_back({names_[name], std::vector<float>(features.size(), kNoNumber)});
+      part->attributes.push_back({names_[name], std::vector<double>(features.size(), kNoNumber)});
     }
   }
   for (size_t i = 0; i < features.size(); ++i) {

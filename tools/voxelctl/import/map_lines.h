@@ -76,7 +76,7 @@ class MapLines {
   void Draw(const Line& line);
   void AddEdge(LonLat from, LonLat to);
   uint32_t AddVertex(LonLat point);
-  void AddFeatures(const std::vector<uint32_t>& features, std::vector<float> heights, bool points,
+  void AddFeatures(const std::vector<uint32_t>& features, std::vector<double> heights, bool points,
                    Part* part);
 
   const SourceFile& file_;
@@ -92,9 +92,9 @@ class MapLines {
   std::vector<Feature> features_ = {Feature()};
   std::vector<std::string> names_;                        // of properties
   std::map<std::string, uint32_t> name_numbers_;          // indices of names_
-  std::vector<std::pair<uint32_t, float>> numbers_;       // name and value
+  std::vector<std::pair<uint32_t, double>> numbers_;      // name and value
   std::vector<uint32_t> line_features_, point_features_;  // of each vertex
-  std::vector<float> line_heights_, point_heights_;       // of each vertex
+  std::vector<double> line_heights_, point_heights_;      // of each vertex
   uint64_t heights_ = 0;                                  // that are not 0
   uint32_t feature_ = 0;
   Part lines_{.kind = Kind::kSegments};

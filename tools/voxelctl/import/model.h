@@ -27,8 +27,8 @@ enum class Kind : uint8_t { kPoints, kSegments, kTriangles };
 
 // A value per vertex, such as a measured column, for `play --color-by`.
 struct Attribute {
-  std::string name;           // as in the file
-  std::vector<float> values;  // as many as positions; not a number where the file has none
+  std::string name;            // as in the file
+  std::vector<double> values;  // as many as positions; not a number where the file has none
   bool operator==(const Attribute&) const = default;
 };
 

@@ -1,27 +1,86 @@
 #include "tools/voxelctl/import/model_bytes.h"
 
+#include <sys/mman.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
 
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr uint64_t kMostMessageBytes = 64 << 10;
+constexpr std::array<char, 8> kMarker = {'V', 'X', 'M', 'O', 'D', 'E', 'L', kModelVersion};
+constexpr char kOfAnotherRelease[] =
+    ": voxeld-import and voxelctl are of different releases; install both packages of one release";
+
+// Lists are written and read by so many bytes at a time.
+constexpr size_t kChunk = size_t{1} << 20;
+
+// Limits of lists, beside those of the whole model (CheckModel).
+constexpr uint64_t kMostTextBytes = 64 << 10, kMostItems = 1 << 20,
+                   kMostPictureBytes = uint64_t{1} << 30;
+
+// Gives back the whole pages among these bytes, which are not used any more. Their contents become zero.
+void GiveBackPages(const char* bytes, size_t size) {
+  static const auto page = static_cast<uintptr_t>(::sysconf(_SC_PAGESIZE));
+  const auto at = reinterpret_cast<uintptr_t>(bytes);
+  const uintptr_t begin = (at + page - 1) / page * page, end = (at + size) / page * page;
+  if (begin < end) ::madvise(reinterpret_cast<void*>(begin), end - begin, MADV_DONTNEED);
+}
 
 class ModelWriter {
  public:
-  explicit ModelWriter(int descriptor) : descriptor_(descriptor) {}
-  bool ok() const { return ok_; }
+  explicit ModelWriter(int descriptor) : descriptor_(descriptor) { buffer_.reserve(kBuffered); }
+
+  // Call it at the end. Returns: whether everything could be written.
+  bool Finish() {
+    Flush();
+    return ok_;
+  }
 
   void Bytes(const void* bytes, size_t size) {
-    const char* at = static_cast<const char*>(bytes);
+    if (size > kBuffered - buffer_.size()) Flush();
+    if (size > kBuffered) {
+      Write(static_cast<const char*>(bytes), size);
+    } else {
+      buffer_.append(static_cast<const char*>(bytes), size);
+    }
+  }
+  template <typename Number>
+  void Value(Number number) {
+    Bytes(&number, sizeof(number));
+  }
+  // At most kMostTextBytes of it.
+  void Text(absl::string_view text) { All(text.substr(0, kMostTextBytes)); }
+  template <typename Values>
+  void All(Values values) {
+    Value(uint64_t{values.size()});
+    const char* const bytes = reinterpret_cast<const char*>(values.data());
+    const size_t size = values.size() * sizeof(values[0]);
+    for (size_t from = 0; from < size; from += kChunk) {
+      const size_t some = std::min(kChunk, size - from);
+      Bytes(bytes + from, some);
+      if (some == kChunk) GiveBackPages(bytes + from, some);
+    }
+  }
+
+ private:
+  static constexpr size_t kBuffered = size_t{64} << 10;
+
+  void Flush() {
+    Write(buffer_.data(), buffer_.size());
+    buffer_.clear();
+  }
+  void Write(const char* at, size_t size) {
     while (size > 0 && ok_) {
       const ssize_t written = ::write(descriptor_, at, size);
       if (written < 0 && errno == EINTR) continue;
@@ -29,126 +88,69 @@ class ModelWriter {
       if (ok_) at += written, size -= static_cast<size_t>(written);
     }
   }
-  template <typename Vector>
-  void All(const Vector& values) {
-    const uint64_t count = values.size();
-    Bytes(&count, sizeof(count));
-    Bytes(values.data(), count * sizeof(values[0]));
-  }
 
- private:
   const int descriptor_;
+  std::string buffer_;
   bool ok_ = true;
 };
 
 class ModelReader {
  public:
-  ModelReader(const char* at, size_t size) : at_(at), left_(size) {}
+  explicit ModelReader(const TakeBytes& take) : take_(take) {}
   bool ok() const { return ok_; }
 
-  void Bytes(void* out, size_t size) {
-    ok_ &= size <= left_;
-    if (!ok_ || size == 0) return;
-    std::memcpy(out, at_, size);
-    at_ += size;
-    left_ -= size;
+  void Bytes(void* out, size_t size) { ok_ = ok_ && (size == 0 || take_(out, size)); }
+  template <typename Number>
+  Number Value() {
+    Number number = {};
+    Bytes(&number, sizeof(number));
+    return ok_ ? number : Number{};
   }
-  template <typename Vector>
-  void All(Vector* values) {
-    uint64_t count = 0;
-    Bytes(&count, sizeof(count));
-    ok_ &= count <= left_ / sizeof((*values)[0]);
-    if (!ok_) return;
-    values->resize(count);
-    Bytes(values->data(), count * sizeof((*values)[0]));
+  bool Flag() { return Value<uint8_t>() != 0; }
+  // The number of a list's items, of which `most` are possible.
+  uint64_t Count(uint64_t most) {
+    const auto count = Value<uint64_t>();
+    ok_ = ok_ && count <= most;
+    return ok_ ? count : 0;
+  }
+  template <typename Values>
+  void All(Values* values, uint64_t most) {
+    const uint64_t count = Count(most);
+    // Untouched memory is only address space, so what a list claims costs nothing until it arrives.
+    values->reserve(count);
+    constexpr size_t kSome = kChunk / sizeof((*values)[0]);
+    while (ok_ && values->size() < count) {
+      const size_t from = values->size(), some = std::min<uint64_t>(kSome, count - from);
+      values->resize(from + some);
+      Bytes(values->data() + from, some * sizeof((*values)[0]));
+    }
+  }
+  std::string Text() {
+    std::string text;
+    All(&text, kMostTextBytes);
+    return text;
+  }
+  // An enumeration whose last enumerator is `last`.
+  template <typename Enum>
+  Enum OneOf(Enum last) {
+    const auto number = Value<uint8_t>();
+    ok_ = ok_ && number <= static_cast<uint8_t>(last);
+    return ok_ ? static_cast<Enum>(number) : Enum{};
   }
 
  private:
-  const char* at_;
-  size_t left_;
+  const TakeBytes& take_;
   bool ok_ = true;
 };
 
-void WriteVolume(const SampledVolume& volume, ModelWriter& writer) {
-  const uint8_t has_window = volume.window.has_value();
-  writer.Bytes(&volume.size, sizeof(volume.size));
-  writer.Bytes(&volume.corners, sizeof(volume.corners));
-  writer.Bytes(&has_window, 1);
-  if (has_window) writer.Bytes(&*volume.window, sizeof(*volume.window));
-  writer.All(volume.samples);
-  writer.All(volume.colors);
+void WriteStatus(const absl::Status& status, ModelWriter& writer) {
+  writer.Bytes(kMarker.data(), kMarker.size());
+  writer.Value(static_cast<uint32_t>(status.code()));
+  if (!status.ok()) writer.Text(status.message());
 }
-
-SampledVolume ReadVolume(ModelReader& reader) {
-  SampledVolume volume;
-  uint8_t has_window = 0;
-  reader.Bytes(&volume.size, sizeof(volume.size));
-  reader.Bytes(&volume.corners, sizeof(volume.corners));
-  reader.Bytes(&has_window, 1);
-  if (has_window != 0) reader.Bytes(&volume.window.emplace(), sizeof(*volume.window));
-  reader.All(&volume.samples);
-  reader.All(&volume.colors);
-  return volume;
-}
-
-}  // namespace
-
-bool WriteModel(const absl::StatusOr<Model>& model, int descriptor) {
-  ModelWriter writer(descriptor);
-  const int code = model.status().raw_code();
-  writer.Bytes(&code, sizeof(code));
-  if (!model.ok()) {
-    writer.All(std::string(model.status().message()));
-    return writer.ok();
-  }
-  const uint64_t parts = model->parts.size(), volumes = model->volumes.size();
-  writer.All(model->path);
-  writer.All(model->format);
-  writer.All(model->note);
-  const uint64_t kinds = model->left_out.size();
-  writer.Bytes(&kinds, sizeof(kinds));
-  for (const LeftOut& one : model->left_out) {
-    writer.All(one.kind);
-    writer.Bytes(&one.count, sizeof(one.count));
-  }
-  writer.Bytes(&model->up, sizeof(model->up));
-  writer.Bytes(&model->globe, sizeof(model->globe));
-  writer.Bytes(&model->molecule, sizeof(model->molecule));
-  writer.Bytes(&model->lit_already, sizeof(model->lit_already));
-  writer.Bytes(&parts, sizeof(parts));
-  for (const Part& part : model->parts) {
-    writer.Bytes(&part.kind, sizeof(part.kind));
-    writer.Bytes(&part.thickness, sizeof(part.thickness));
-    writer.All(part.positions);
-    writer.All(part.normals);
-    writer.All(part.colors);
-    writer.All(part.indices);
-    writer.All(part.texture_coordinates);
-    writer.Bytes(&part.picture, sizeof(part.picture));
-    const uint64_t attributes = part.attributes.size();
-    writer.Bytes(&attributes, sizeof(attributes));
-    for (const Attribute& attribute : part.attributes) {
-      writer.All(attribute.name);
-      writer.All(attribute.values);
-    }
-  }
-  writer.Bytes(&volumes, sizeof(volumes));
-  for (const SampledVolume& volume : model->volumes) WriteVolume(volume, writer);
-  const uint64_t pictures = model->pictures.size();
-  writer.Bytes(&pictures, sizeof(pictures));
-  for (const std::string& picture : model->pictures) writer.All(picture);
-  return writer.ok();
-}
-
-absl::Status Spoilt(const SourceFile& file, absl::string_view how) {
-  return FileError(file, absl::StrCat("the library that reads it ", how),
-                   "the file is damaged or not what its name says");
-}
-
-namespace {
 
 // One of those that readers use.
-absl::StatusCode CodeOf(int code) {
+absl::StatusCode CodeOf(uint32_t code) {
   switch (static_cast<absl::StatusCode>(code)) {
     case absl::StatusCode::kNotFound:
     case absl::StatusCode::kPermissionDenied:
@@ -161,72 +163,162 @@ absl::StatusCode CodeOf(int code) {
   }
 }
 
+// The beginning of an answer: the error that was written, or OK if what was asked for follows.
+absl::Status ReadStatus(const SourceFile& file, ModelReader& reader, absl::Status* written) {
+  std::array<char, kMarker.size()> marker = {};
+  reader.Bytes(marker.data(), marker.size());
+  if (!reader.ok()) return Spoilt(file, "gave up");
+  if (std::equal(marker.begin(), marker.end() - 1, kMarker.begin()) &&
+      marker.back() != kMarker.back()) {
+    return absl::FailedPreconditionError(
+        absl::StrCat(EscapeForTerminal(file.path), kOfAnotherRelease));
+  }
+  if (marker != kMarker) return Spoilt(file, "gave an answer that is none");
+  const auto code = reader.Value<uint32_t>();
+  if (code != 0) *written = absl::Status(CodeOf(code), reader.Text());
+  return reader.ok() ? absl::OkStatus() : Spoilt(file, "gave up");
+}
+
+void WritePart(Part part, ModelWriter& writer) {
+  writer.Value(part.kind);
+  writer.Value(part.thickness);
+  writer.All(std::move(part.positions));
+  writer.All(std::move(part.normals));
+  writer.All(std::move(part.colors));
+  writer.All(std::move(part.indices));
+  writer.All(std::move(part.texture_coordinates));
+  writer.Value(part.picture);
+  writer.Value(uint64_t{part.attributes.size()});
+  for (Attribute& attribute : part.attributes) {
+    writer.Text(attribute.name);
+    writer.All(std::move(attribute.values));
+  }
+}
+
+Part ReadPart(ModelReader& reader) {
+  Part part;
+  part.kind = reader.OneOf(Kind::kTriangles);
+  part.thickness = reader.Value<double>();
+  reader.All(&part.positions, kMaxModelVertices);
+  reader.All(&part.normals, kMaxModelVertices);
+  reader.All(&part.colors, kMaxModelVertices);
+  reader.All(&part.indices, kMaxModelIndices);
+  reader.All(&part.texture_coordinates, kMaxModelVertices);
+  part.picture = reader.Value<uint32_t>();
+  const uint64_t attributes = reader.Count(kMostItems);
+  for (uint64_t i = 0; i < attributes && reader.ok(); ++i) {
+    Attribute& attribute = part.attributes.emplace_back();
+    attribute.name = reader.Text();
+    reader.All(&attribute.values, kMaxModelVertices);
+  }
+  return part;
+}
+
+void WriteVolume(SampledVolume volume, ModelWriter& writer) {
+  writer.Value(volume.size);
+  writer.Value(volume.corners);
+  writer.Value(static_cast<uint8_t>(volume.window.has_value()));
+  if (volume.window) writer.Value(*volume.window);
+  writer.All(std::move(volume.samples));
+  writer.All(std::move(volume.colors));
+}
+
+SampledVolume ReadVolume(ModelReader& reader) {
+  SampledVolume volume;
+  volume.size = reader.Value<decltype(volume.size)>();
+  volume.corners = reader.Value<decltype(volume.corners)>();
+  if (reader.Flag()) volume.window = reader.Value<std::array<double, 2>>();
+  reader.All(&volume.samples, kMaxModelSamples);
+  reader.All(&volume.colors, kMaxModelSamples);
+  return volume;
+}
+
 }  // namespace
 
-absl::StatusOr<Model> ReadModel(const SourceFile& file, const char* bytes, size_t size) {
-  ModelReader reader(bytes, size);
-  int code = 0;
-  reader.Bytes(&code, sizeof(code));
-  if (code != 0) {
-    std::string message;
-    reader.All(&message);
-    if (!reader.ok() || message.size() > kMostMessageBytes) return Spoilt(file, "gave up");
-    return absl::Status(CodeOf(code), message);
+absl::Status Spoilt(const SourceFile& file, absl::string_view how) {
+  return FileError(file, absl::StrCat("the library that reads it ", how),
+                   "the file is damaged or not what its name says");
+}
+
+bool WriteModel(absl::StatusOr<Model> model, int descriptor) {
+  ModelWriter writer(descriptor);
+  WriteStatus(model.status(), writer);
+  if (!model.ok()) return writer.Finish();
+  writer.Text(model->path);
+  writer.Text(model->format);
+  writer.Text(model->note);
+  writer.Value(uint64_t{model->left_out.size()});
+  for (const LeftOut& one : model->left_out) {
+    writer.Text(one.kind);
+    writer.Value(one.count);
   }
-  Model model;
-  uint64_t parts = 0, volumes = 0;
-  uint8_t up = 0, globe = 0, molecule = 0, lit_already = 0;
-  reader.All(&model.path);
-  reader.All(&model.format);
-  reader.All(&model.note);
-  uint64_t kinds = 0;
-  reader.Bytes(&kinds, sizeof(kinds));
+  writer.Value(model->up);
+  for (const bool flag : {model->globe, model->molecule, model->lit_already})
+    writer.Value(static_cast<uint8_t>(flag));
+  writer.Value(uint64_t{model->parts.size()});
+  for (Part& part : model->parts) WritePart(std::move(part), writer);
+  writer.Value(uint64_t{model->volumes.size()});
+  for (SampledVolume& volume : model->volumes) WriteVolume(std::move(volume), writer);
+  writer.Value(uint64_t{model->pictures.size()});
+  for (std::string& picture : model->pictures) writer.All(std::move(picture));
+  return writer.Finish();
+}
+
+bool WriteFrameCount(const absl::StatusOr<int64_t>& count, int descriptor) {
+  ModelWriter writer(descriptor);
+  WriteStatus(count.status(), writer);
+  if (count.ok()) writer.Value(*count);
+  return writer.Finish();
+}
+
+absl::Status ReadModel(const SourceFile& file, const TakeBytes& take,
+                       absl::StatusOr<Model>* model) {
+  ModelReader reader(take);
+  absl::Status error;
+  if (absl::Status status = ReadStatus(file, reader, &error); !status.ok()) return status;
+  if (!error.ok()) {
+    *model = std::move(error);
+    return absl::OkStatus();
+  }
+  Model read;
+  read.path = reader.Text();
+  read.format = reader.Text();
+  read.note = reader.Text();
+  const uint64_t kinds = reader.Count(kMostItems);
   for (uint64_t i = 0; i < kinds && reader.ok(); ++i) {
-    LeftOut one;
-    reader.All(&one.kind);
-    reader.Bytes(&one.count, sizeof(one.count));
-    model.left_out.push_back(std::move(one));
+    LeftOut& one = read.left_out.emplace_back();
+    one.kind = reader.Text();
+    one.count = reader.Value<uint64_t>();
   }
-  reader.Bytes(&up, 1);
-  reader.Bytes(&globe, 1);
-  reader.Bytes(&molecule, 1);
-  reader.Bytes(&lit_already, 1);
-  if (up > static_cast<uint8_t>(Up::kZ)) return Spoilt(file, "gave up halfway");
-  model.up = static_cast<Up>(up);
-  model.globe = globe != 0;
-  model.molecule = molecule != 0;
-  model.lit_already = lit_already != 0;
-  reader.Bytes(&parts, sizeof(parts));
-  for (uint64_t i = 0; i < parts && reader.ok(); ++i) {
-    Part part;
-    uint8_t kind = 0;
-    reader.Bytes(&kind, 1);
-    if (kind > static_cast<uint8_t>(Kind::kTriangles)) return Spoilt(file, "gave up halfway");
-    part.kind = static_cast<Kind>(kind);
-    reader.Bytes(&part.thickness, sizeof(part.thickness));
-    reader.All(&part.positions);
-    reader.All(&part.normals);
-    reader.All(&part.colors);
-    reader.All(&part.indices);
-    reader.All(&part.texture_coordinates);
-    reader.Bytes(&part.picture, sizeof(part.picture));
-    uint64_t attributes = 0;
-    reader.Bytes(&attributes, sizeof(attributes));
-    for (uint64_t a = 0; a < attributes && reader.ok(); ++a) {
-      Attribute attribute;
-      reader.All(&attribute.name);
-      reader.All(&attribute.values);
-      part.attributes.push_back(std::move(attribute));
-    }
-    model.parts.push_back(std::move(part));
-  }
-  reader.Bytes(&volumes, sizeof(volumes));
-  for (uint64_t i = 0; i < volumes && reader.ok(); ++i) model.volumes.push_back(ReadVolume(reader));
-  uint64_t pictures = 0;
-  reader.Bytes(&pictures, sizeof(pictures));
-  for (uint64_t i = 0; i < pictures && reader.ok(); ++i) reader.All(&model.pictures.emplace_back());
+  read.up = reader.OneOf(Up::kZ);
+  read.globe = reader.Flag();
+  read.molecule = reader.Flag();
+  read.lit_already = reader.Flag();
+  const uint64_t parts = reader.Count(kMaxModelVertices);
+  for (uint64_t i = 0; i < parts && reader.ok(); ++i) read.parts.push_back(ReadPart(reader));
+  const uint64_t volumes = reader.Count(kMostItems);
+  for (uint64_t i = 0; i < volumes && reader.ok(); ++i) read.volumes.push_back(ReadVolume(reader));
+  const uint64_t pictures = reader.Count(kMostItems);
+  for (uint64_t i = 0; i < pictures && reader.ok(); ++i)
+    reader.All(&read.pictures.emplace_back(), kMostPictureBytes);
   if (!reader.ok()) return Spoilt(file, "gave up halfway");
-  return model;
+  *model = std::move(read);
+  return absl::OkStatus();
+}
+
+absl::Status ReadFrameCount(const SourceFile& file, const TakeBytes& take,
+                            absl::StatusOr<int64_t>* count) {
+  ModelReader reader(take);
+  absl::Status error;
+  if (absl::Status status = ReadStatus(file, reader, &error); !status.ok()) return status;
+  const auto read = error.ok() ? reader.Value<int64_t>() : 0;
+  if (!reader.ok()) return Spoilt(file, "gave up");
+  if (error.ok()) {
+    *count = read;
+  } else {
+    *count = std::move(error);
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace voxeld::voxelctl

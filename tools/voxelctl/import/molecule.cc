@@ -29,7 +29,7 @@ constexpr double kRodDiameter = 0.3,
 // Atoms in a cell: twenty times as many to a cubic ångström as in a crystal with its hydrogens.
 constexpr double kMostDense = 2.2, kMostSparse = 16;
 
-constexpr float kNoAtomValue = std::numeric_limits<float>::quiet_NaN();
+constexpr double kNoAtomValue = std::numeric_limits<double>::quiet_NaN();
 
 // Finds bonds by distance with a grid whose cells are as large as the longest bond, so that only neighbouring cells are compared.
 class BondSearch {
@@ -314,9 +314,8 @@ absl::Status XyzReader::ReadAtom(const XyzWords& words) {
     const size_t column = layout_.others[i].first;
     const std::optional<double> value =
         column < words.size() ? XyzNumber(words[column]) : std::nullopt;
-    // Also a number that a float cannot hold is none.
-    const bool is_held = value && std::abs(*value) <= std::numeric_limits<float>::max();
-    molecule_.attributes[i].values.push_back(is_held ? static_cast<float>(*value) : kNoAtomValue);
+    molecule_.attributes[i].values.push_back(value && std::isfinite(*value) ? *value
+                                                                            : kNoAtomValue);
   }
   return absl::OkStatus();
 }

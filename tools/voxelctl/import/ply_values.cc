@@ -226,7 +226,7 @@ absl::StatusOr<PlyVertices> ReadPlyVertices(const SourceFile& file, const PlyEle
         return CutOff(file, "vertex", i, vertex.count);
       if (coordinates[p] >= 0) at[coordinates[p]] = value;
       if (number < numbers.size() && numbers[number] == p)
-        out.attributes[number++].values.push_back(static_cast<float>(value));
+        out.attributes[number++].values.push_back(value);
       if (const int channel = colors.ChannelOf(p); channel >= 0) color[channel] = value;
     }
     out.positions.push_back({at[0], at[1], at[2]});

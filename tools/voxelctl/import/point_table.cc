@@ -109,7 +109,7 @@ absl::Status PointTable::Add(const SourceFile& file, const PointRow& row, absl::
   }
   part_.positions.push_back(at);
   for (size_t i = 0; i < part_.attributes.size(); ++i)
-    part_.attributes[i].values.push_back(static_cast<float>(attributes[i]));
+    part_.attributes[i].values.push_back(attributes[i]);
   if (Has(PointColumn::kNormalX) && Has(PointColumn::kNormalY) && Has(PointColumn::kNormalZ)) {
     part_.normals.push_back(
         UnitOrZero({Of(row, PointColumn::kNormalX), Of(row, PointColumn::kNormalY),

@@ -31,8 +31,6 @@ namespace {
 
 [[maybe_unused]] constexpr rlim_t kMostMemory = rlim_t{4} << 30, kOfFile = 4;
 constexpr rlim_t kMostDescriptors = 64;
-// Limit of what the reader may write: more than the largest model (kMaxModelVertices and the others).
-constexpr rlim_t kMostModelBytes = rlim_t{5} << 30;
 
 // What libraries read from the environment could change what a file looks like, or load code. These are for fonts of the user's own, for
 // programs that find their libraries so, and for sanitizers.
@@ -72,40 +70,34 @@ bool ReadNumber(int descriptor, int64_t* number) {
   return got == sizeof(*number);
 }
 
-// A few bytes, of which a socket takes all or none.
-bool WriteNumber(int descriptor, int64_t number) {
-  return ::write(descriptor, &number, sizeof(number)) == sizeof(number);
-}
-
 }  // namespace
 
-bool ConfineReader(const SourceFile& file, Answers answers,
-                   const std::vector<std::string>& folders) {
-  if (answers == Answers::kModel) {  // for frames, the parent limits the time of each
-    ::alarm(kMostReadingSeconds);
-    Limit(RLIMIT_CPU, kMostProcessorSeconds);
-  }
+bool ConfineReader(const SourceFile& file, const std::vector<std::string>& folders) {
+  const Sandbox& sandbox = Sandbox::Get();  // writes a file in memory when it is made
   Limit(RLIMIT_CORE, 0);
   Limit(RLIMIT_NOFILE, kMostDescriptors);
-  Limit(RLIMIT_FSIZE, kMostModelBytes);
+  Limit(RLIMIT_FSIZE, 0);
 #if !defined(VOXELD_SHADOW_MEMORY)
   Limit(RLIMIT_AS, AddressSpace() + kMostMemory + kOfFile * file.bytes.size());
 #endif
   // For a file of the user's own the sandbox is a second line: without Landlock the first remains.
-  return Sandbox::Get().Enter(Readable(file), folders).ok() ||
-         file.other_files != OtherFiles::kNone;
+  return sandbox.Enter(Readable(file), folders).ok() || file.other_files != OtherFiles::kNone;
 }
 
-ReaderMain ReaderOf(const SourceFile& file, std::function<absl::StatusOr<Model>()> read) {
+ReaderMain ReaderOf(SourceFile& file, std::function<absl::StatusOr<Model>()> read) {
   return [&file, read = std::move(read)] {
-    if (!ConfineReader(file, Answers::kModel)) ::_exit(kNotConfined);
-    AnswerModel(read);
+    if (!ConfineReader(file)) ::_exit(kNotConfined);
+    AnswerModel([&] {
+      absl::StatusOr<Model> model = read();
+      file.bytes = std::string();
+      return model;
+    });
   };
 }
 
 ReaderMain FramesOf(SourceFile file, OpenFrames open) {
   return [file = std::move(file), open = std::move(open)] {
-    if (!ConfineReader(file, Answers::kFrames)) ::_exit(kNotConfined);
+    if (!ConfineReader(file)) ::_exit(kNotConfined);
     ServeFrames([&] { return open(file); });
   };
 }
@@ -132,7 +124,7 @@ ReaderMain ProgramOf(std::vector<std::string> command) {
 void AnswerModel(const std::function<absl::StatusOr<Model>()>& read) {
   bool good = false;
   try {
-    good = WriteModel(read(), kModelDescriptor);
+    good = WriteModel(read(), kAnswerDescriptor);
   } catch (const std::exception&) {
   }
   ::_exit(good ? 0 : 1);
@@ -142,12 +134,11 @@ void ServeFrames(const std::function<absl::StatusOr<std::unique_ptr<FrameSource>
   bool good = true;
   try {
     const absl::StatusOr<std::unique_ptr<FrameSource>> source = open();
-    if (!source.ok()) good = WriteModel(source.status(), kModelDescriptor);
-    good = good && WriteNumber(kChannelDescriptor, source.ok() ? (*source)->count() : -1);
-    for (int64_t frame = 0; good && source.ok() && ReadNumber(kChannelDescriptor, &frame);) {
-      good = WriteModel((*source)->Read(frame), kModelDescriptor) &&
-             WriteNumber(kChannelDescriptor, 0);
-    }
+    good =
+        WriteFrameCount(source.ok() ? absl::StatusOr<int64_t>((*source)->count()) : source.status(),
+                        kAnswerDescriptor);
+    for (int64_t frame = 0; good && source.ok() && ReadNumber(kAnswerDescriptor, &frame);)
+      good = WriteModel((*source)->Read(frame), kAnswerDescriptor);
   } catch (const std::exception&) {
     good = false;
   }

@@ -15,27 +15,21 @@
 
 namespace voxeld::voxelctl {
 
-// Descriptors of a reader: where it writes models (WriteModel), and the socket of one that serves frames.
-inline constexpr int kModelDescriptor = 3, kChannelDescriptor = 4;
+// The descriptor of a reader's socket: it writes its answers there (model_bytes.h), and one that serves frames reads their numbers.
+inline constexpr int kAnswerDescriptor = 3;
 
 // Exit statuses of a reader, beside 0 and 1.
 inline constexpr int kNotConfined = 2, kNotStarted = 3;
 
-// Limits of a reader: processor time of one file or frame, and time from its start to its end or from frame to frame; in seconds.
-inline constexpr unsigned kMostProcessorSeconds = 120, kMostReadingSeconds = 600;
-
 using OpenFrames = std::function<absl::StatusOr<std::unique_ptr<FrameSource>>(SourceFile file)>;
 
-// One model, or as many frames as are asked for.
-enum class Answers : uint8_t { kModel, kFrames };
+// Confines this process permanently, as ReadContained describes. Those `folders` that exist stay readable, for data that libraries need.
+// Returns: false if files cannot be confined and the file is a stranger's, so that it must not be read.
+bool ConfineReader(const SourceFile& file, const std::vector<std::string>& folders = {});
 
-// Confines this process permanently, as ReadContained describes, before it sends `answers`. Those `folders` that exist stay readable, for data
-// that libraries need. Returns: false if files cannot be confined and the file is a stranger's, so that it must not be read.
-bool ConfineReader(const SourceFile& file, Answers answers,
-                   const std::vector<std::string>& folders = {});
-
-// A reader that confines itself and answers with the model that `read` returns.
-ReaderMain ReaderOf(const SourceFile& file, std::function<absl::StatusOr<Model>()> read);
+// A reader that confines itself and answers with the model that `read` returns. It releases the bytes of `file`, which must outlive the
+// result, before it answers.
+ReaderMain ReaderOf(SourceFile& file, std::function<absl::StatusOr<Model>()> read);
 
 // A reader that confines itself, opens a source and serves its frames.
 ReaderMain FramesOf(SourceFile file, OpenFrames open);
@@ -46,8 +40,8 @@ ReaderMain ProgramOf(std::vector<std::string> command);
 // Reads once, and ends the process.
 [[noreturn]] void AnswerModel(const std::function<absl::StatusOr<Model>()>& read);
 
-// Opens the source and answers with the number of its frames; on an error, writes that with WriteModel and answers -1. Then, for each
-// frame number that it receives, writes the frame and answers 0. Exits when the channel is closed.
+// Opens the source and answers with the number of its frames, or with the error. Then it answers each frame number that it receives (an
+// i64) with the frame. Exits when the socket is closed.
 [[noreturn]] void ServeFrames(
     const std::function<absl::StatusOr<std::unique_ptr<FrameSource>>()>& open);
 
