@@ -99,12 +99,15 @@ const std::vector<Reader>& Readers() {
         "atoms of the first model, bonds listed in the file and bonds inferred from distance; also "
         "with .gz; "
         "b_factor, occupancy, charge, chain, residue and element by --color-by",
-        "further models, alternate locations, ribbons, assemblies and symmetry", "pymol-data: 16"},
+        "further models, alternate locations, ribbons, assemblies and symmetry",
+        "pymol-data, rdkit-data, apbs-data and others: 89 of 96 (others have no atoms, or damaged "
+        "columns)"},
        [](const SourceFile& file, const ImportOptions& options) {
          return ReadMolecule(file, options.style, options.attributes);
        }},
       {{"molecules", "mmCIF, components, crystals", ".cif .mmcif", "gemmi 0.5", "as PDB", "as PDB",
-        "–"},
+        "libavogadro-data, python-biopython-doc and others: 528 of 539 (others are damaged, or "
+        "have no coordinates)"},
        [](const SourceFile& file, const ImportOptions& options) {
          return ReadMolecule(file, options.style, options.attributes);
        }},
@@ -120,7 +123,8 @@ const std::vector<Reader>& Readers() {
         "SVG 1.1 and parts of 2, with CSS, texts, gradients, patterns, clips, masks, markers and "
         "embedded PNG and JPEG pictures",
         "scripts, animations, filters, foreign objects, SVG fonts, other files",
-        "846 of the 848 files on a Debian system"},
+        "846 of the 848 files on a Debian system; gromacs-data and others: 4,151 of 4,152 (one "
+        "holds only a font)"},
        [](const SourceFile& file, const ImportOptions& options) {
          return ReadSvgDrawing(file, options.pixels);
        }},

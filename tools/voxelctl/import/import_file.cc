@@ -178,7 +178,8 @@ const std::vector<Format>& OwnFormats() {
        "positions, colours, intensities and normals by the names or the number of columns, the "
        "other "
        "columns by --color-by; chemistry's XYZ as a molecule",
-       "frames after the first", "–"},
+       "frames after the first",
+       "votca-data, apbs-data, quantum-espresso-data and others: 59 .xyz"},
       {"maps", "GeoJSON, TopoJSON", ".geojson .topojson .json", "",
        "lines, points and the outlines of areas, simplestyle's colours; numbers of properties by "
        "--color-by; --globe puts them on a sphere",
