@@ -1,5 +1,6 @@
 #include "tools/import/assimp_scene.h"
 
+#include <assimp/BaseImporter.h>
 #include <assimp/config.h>
 #include <assimp/material.h>
 #include <assimp/postprocess.h>
@@ -26,6 +27,7 @@
 #include "absl/strings/string_view.h"
 #include "common/text/printable.h"
 #include "tools/import/assimp_files.h"
+#include "tools/import/mesh_beginning.h"
 #include "tools/import/three_mf_colors.h"
 
 namespace voxeld::voxelctl {
@@ -495,6 +497,13 @@ absl::StatusOr<const aiScene*> Load(const SourceFile& file, Assimp::Importer* im
   importer->SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, aiComponent_TANGENTS_AND_BITANGENTS);
   importer->SetPropertyFloat(AI_CONFIG_PP_GSN_MAX_SMOOTHING_ANGLE, kSmoothingDegrees);
   importer->SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
+  // It looks at what a file holds, whatever its name says, and these readers of it are known to crash.
+  for (const char* const extension : {"obj", "ply", "stl", "gltf", "glb"}) {
+    while (Assimp::BaseImporter* const reader = importer->GetImporter(extension)) {
+      if (importer->UnregisterLoader(reader) != aiReturn_SUCCESS) break;
+      delete reader;
+    }
+  }
   importer->SetIOHandler(new AssimpFiles(file));  // which it deletes
   // Steps after reading trust the indices; so they come after a check of our own.
   const aiScene* scene = importer->ReadFile(file.path, 0);
@@ -566,6 +575,20 @@ void CountUnread(const SourceFile& file, Model* model) {
              model);
 }
 
+// The library shows what there is of a truncated file. Adds a note if the end is missing.
+void NoteMissingEnd(const SourceFile& file, Model* model) {
+  static constexpr std::pair<absl::string_view, absl::string_view> kEnds[] = {
+      {"ifc", "END-ISO-10303-21"}, {"dxf", "EOF"}};
+  constexpr size_t kTail = 4096;
+  const absl::string_view text = file.bytes;
+  for (const auto& [extension, end] : kEnds) {
+    if (extension != file.extension ||
+        absl::StrContains(text.substr(text.size() - std::min(kTail, text.size())), end))
+      continue;
+    AddNote(absl::StrCat("it ends without ", end, ", so some of it may be missing"), model);
+  }
+}
+
 // Adds a note if rounding is over half a voxel where the model fills 256.
 void NoteSinglePrecision(double rounding, Model* model) {
   Point3 least = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, most = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
@@ -577,12 +600,13 @@ void NoteSinglePrecision(double rounding, Model* model) {
   }
   const double size = std::max({most.x - least.x, most.y - least.y, most.z - least.z});
   if (!(rounding > size / 512)) return;
-  model->note = absl::StrCat(
-      "its coordinates are so large that single precision, in which files of this format are read, "
-      "moves them by up to ",
-      absl::StrFormat("%.2g", rounding),
-      " of its units, over half a voxel of 256; move the model "
-      "to its origin, or export it as glTF or OBJ");
+  AddNote(absl::StrCat("its coordinates are so large that single precision, in which files of this "
+                       "format are read, "
+                       "moves them by up to ",
+                       absl::StrFormat("%.2g", rounding),
+                       " of its units, over half a voxel of 256; move the model "
+                       "to its origin, or export it as glTF or OBJ"),
+          model);
 }
 
 }  // namespace
@@ -610,6 +634,7 @@ absl::StatusOr<Model> ModelOf(const SourceFile& file, const aiScene& scene, cons
   AddLeftOut("lights", scene.mNumLights, &model);
   if (pose == nullptr) AddLeftOut("animations", scene.mNumAnimations, &model);
   CountUnread(file, &model);
+  NoteMissingEnd(file, &model);
   if (scene.mNumMeshes == 0) {
     Part bones = Bones(*scene.mRootNode, pose);
     if (bones.positions.empty())

@@ -293,10 +293,16 @@ class Walker {
           file_, absl::StrCat("has ", bits, " bits for each ", colors ? "colour" : "pixel"),
           colors || palette ? "8 or 16 are read" : "8, 16, 32 or, uncompressed, 1 are read");
     }
+    const bool run_lengths = facts_.transfer_syntax == kRunLengths;
     // The library that decodes them mixes the colours up.
-    if (colors && bits == 16 && facts_.transfer_syntax == kRunLengths) {
+    if (colors && bits == 16 && run_lengths) {
       return FileError(file_, "has colours of 16 bits, compressed by run lengths",
                        "8 bits, or another compression, are read");
+    }
+    // It also reads beyond these, whose channels are of different sizes.
+    if (photometric == "YBR_FULL_422" && run_lengths) {
+      return FileError(file_, "has colours in YBR_FULL_422, compressed by run lengths",
+                       "RGB or YBR_FULL is expected");
     }
     if (absl::Status status = palette ? CheckPalette() : absl::OkStatus(); !status.ok())
       return status;
@@ -333,10 +339,46 @@ class Walker {
       return FileError(file_, "has no fragment of its compressed pixels",
                        "at least one is expected");
     }
+    if (run_lengths && facts_.pixels.size() - 1 != facts_.frames) {
+      return FileError(file_,
+                       absl::StrCat("has ", facts_.pixels.size() - 1, " fragments for ",
+                                    facts_.frames, " frames, compressed by run lengths"),
+                       "one for each frame is expected");
+    }
     for (size_t i = 1; i < facts_.pixels.size(); ++i) {
-      const auto& [at, length] = facts_.pixels[i];
-      if (absl::Status status = CheckPicture(bytes_.substr(at, length)); !status.ok())
-        return status;
+      const absl::string_view fragment =
+          bytes_.substr(facts_.pixels[i].first, facts_.pixels[i].second);
+      const absl::Status status =
+          run_lengths ? CheckRunLengths(fragment, facts_.samples_per_pixel * bits / 8)
+                      : CheckPicture(fragment);
+      if (!status.ok()) return status;
+    }
+    return absl::OkStatus();
+  }
+
+  // The head of a frame compressed by run lengths (DICOM PS3.5, G.5): the number of its segments, one for each byte of a pixel, and where
+  // each begins.
+  absl::Status CheckRunLengths(absl::string_view frame, uint64_t segments) const {
+    constexpr size_t kHead = 64, kMostSegments = 15;
+    const auto number = [frame](size_t i) {
+      uint32_t value = 0;
+      std::memcpy(&value, frame.data() + 4 * i, sizeof(value));
+      return value;
+    };
+    if (frame.size() < kHead || segments > kMostSegments || number(0) != segments) {
+      return FileError(file_,
+                       absl::StrCat("has a frame of ", frame.size() < kHead ? 0 : number(0),
+                                    " segments of run lengths"),
+                       absl::StrCat(segments, " are expected, one for each byte of a pixel"));
+    }
+    for (size_t i = 1; i <= segments; ++i) {
+      const uint64_t begin = number(i), before = i == 1 ? kHead : number(i - 1);
+      if (begin < before || begin > frame.size()) {
+        return FileError(
+            file_,
+            absl::StrCat("has a segment of run lengths at byte ", begin, " of ", frame.size()),
+            "the file is damaged");
+      }
     }
     return absl::OkStatus();
   }

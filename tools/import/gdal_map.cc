@@ -3,6 +3,7 @@
 #include <cpl_conv.h>
 #include <cpl_error.h>
 #include <cpl_vsi.h>
+#include <libxml/xmlreader.h>
 #include <ogr_featurestyle.h>
 #include <ogr_spatialref.h>
 #include <ogr_srs_api.h>
@@ -34,10 +35,11 @@ namespace {
 constexpr char kProjFolder[] = "/usr/share/proj";
 constexpr char kFolder[] = "/vsimem/map/";
 constexpr int kDeepest = 100;
-// Fields that LIBKML makes of what is not data.
-constexpr absl::string_view kNoData[] = {"Name",       "description",  "timestamp",  "begin",
-                                         "end",        "altitudeMode", "tessellate", "extrude",
-                                         "visibility", "drawOrder",    "icon",       "snippet"};
+// LIBKML makes fields of what is not data, too. They get this prefix, so that data may have any name.
+constexpr char kKmlElement[] = "voxeld:";
+constexpr const char* kKmlElements[] = {"NAME",       "DESCRIPTION",  "TIMESTAMP",  "BEGIN",
+                                        "END",        "ALTITUDEMODE", "TESSELLATE", "EXTRUDE",
+                                        "VISIBILITY", "DRAWORDER",    "ICON",       "SNIPPET"};
 
 // Environment variables are GDAL's and PROJ's configuration, too.
 void ForgetEnvironment() {
@@ -62,6 +64,10 @@ void PrepareGdal() {
     CPLSetConfigOption("SHAPE_RESTORE_SHX", "YES");
     CPLSetConfigOption("GPX_ELE_AS_25D", "YES");
     CPLSetConfigOption("LIBKML_RESOLVE_STYLE", "YES");
+    for (const char* const element : kKmlElements) {
+      CPLSetConfigOption(absl::StrCat("LIBKML_", element, "_FIELD").c_str(),
+                         absl::StrCat(kKmlElement, element).c_str());
+    }
     RegisterOGRShape();
     RegisterOGRGPX();
     RegisterOGRLIBKML();
@@ -150,6 +156,43 @@ std::string WithRoot(absl::string_view text) {
   return "";
 }
 
+// GDAL takes a place that is no number for 0. InvalidArgument with the line of the first.
+absl::Status CheckPlacesOfGpx(const SourceFile& file) {
+  const std::unique_ptr<xmlTextReader, decltype(&xmlFreeTextReader)> reader(
+      xmlReaderForMemory(file.bytes.data(), static_cast<int>(file.bytes.size()), nullptr, nullptr,
+                         XML_PARSE_NONET | XML_PARSE_NOERROR | XML_PARSE_NOWARNING),
+      &xmlFreeTextReader);
+  if (reader == nullptr) return absl::OkStatus();  // GDAL says what is wrong with it
+  while (xmlTextReaderRead(reader.get()) == 1) {
+    if (xmlTextReaderNodeType(reader.get()) != XML_READER_TYPE_ELEMENT) continue;
+    const absl::string_view element =
+        reinterpret_cast<const char*>(xmlTextReaderConstLocalName(reader.get()));
+    if (element != "wpt" && element != "rtept" && element != "trkpt") continue;
+    for (const auto& [name, most] : {std::pair("lat", 90.0), std::pair("lon", 180.0)}) {
+      const std::unique_ptr<xmlChar, void (*)(void*)> text(
+          xmlTextReaderGetAttribute(reader.get(), reinterpret_cast<const xmlChar*>(name)),
+          [](void* one) { xmlFree(one); });
+      double value = 0;
+      if (text != nullptr && absl::SimpleAtod(reinterpret_cast<const char*>(text.get()), &value) &&
+          std::abs(value) <= most)
+        continue;
+      return FileError(
+          file,
+          absl::StrCat(
+              "line ", xmlTextReaderGetParserLineNumber(reader.get()), " has a <", element, "> ",
+              text == nullptr
+                  ? absl::StrCat("without ", name)
+                  : absl::StrCat("with ", name, "=\"",
+                                 EscapeForTerminal(
+                                     absl::string_view(reinterpret_cast<const char*>(text.get()))
+                                         .substr(0, 40)),
+                                 "\"")),
+          absl::StrCat("degrees from -", most, " to ", most, " are expected"));
+    }
+  }
+  return absl::OkStatus();
+}
+
 class GdalMapReader {
  public:
   GdalMapReader(const SourceFile& file, bool globe, bool attributes)
@@ -175,13 +218,13 @@ class GdalMapReader {
 };
 
 bool IsHidden(const OGRFeature& feature) {
-  const int field = feature.GetFieldIndex("visibility");
+  const int field = feature.GetFieldIndex("voxeld:VISIBILITY");
   return field >= 0 && feature.IsFieldSetAndNotNull(field) && feature.GetFieldAsInteger(field) == 0;
 }
 
 // A picture on the ground, of which LIBKML has the outline.
 bool IsOverlay(const OGRFeature& feature) {
-  const int field = feature.GetFieldIndex("icon");
+  const int field = feature.GetFieldIndex("voxeld:ICON");
   return field >= 0 && feature.IsFieldSetAndNotNull(field) &&
          *feature.GetFieldAsString(field) != '\0';
 }
@@ -227,9 +270,7 @@ void GdalMapReader::AddNumbers(const OGRFeature& feature, MapFeature* style) con
   for (int i = 0; i < feature.GetFieldCount(); ++i) {
     const OGRFieldDefn& field = *feature.GetFieldDefnRef(i);
     const absl::string_view name = field.GetNameRef();
-    if (!feature.IsFieldSetAndNotNull(i) ||
-        (is_kml && std::find(std::begin(kNoData), std::end(kNoData), name) != std::end(kNoData)))
-      continue;
+    if (!feature.IsFieldSetAndNotNull(i) || absl::StartsWith(name, kKmlElement)) continue;
     const OGRFieldType type = field.GetType();
     double value = 0;
     if (type == OFTInteger || type == OFTInteger64 || type == OFTReal) {
@@ -373,6 +414,9 @@ absl::StatusOr<Model> GdalMapReader::Read() {
   if (is_xml && ElementDepth(file_.bytes) > kDeepest) {
     return FileError(file_, absl::StrCat("nests elements more than ", kDeepest, " deep"),
                      "maps do not need that");
+  }
+  if (file_.extension == "gpx") {
+    if (absl::Status status = CheckPlacesOfGpx(file_); !status.ok()) return status;
   }
   PrepareGdal();
   const QuietErrors quiet;

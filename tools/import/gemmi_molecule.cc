@@ -427,7 +427,10 @@ class CifTokens {
     at_ = end;
     type_ = Type::kValue;
   }
-  static bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+  // Some programs end a file with NUL characters.
+  static bool IsBlank(char c) {
+    return c == ' ' || c == '\t' || c == '\n' || c == '\r' || c == '\0';
+  }
 
   const SourceFile& file_;
   string_view text_, token_;
@@ -635,7 +638,8 @@ struct CifBlock {
 
 class CifReader {
  public:
-  CifReader(const SourceFile& file, string_view text) : file_(file), tokens_(file, text) {}
+  CifReader(const SourceFile& file, string_view text)
+      : file_(file), text_(text), tokens_(file, text) {}
 
   absl::Status Read(Builder* builder, Model* model);
 
@@ -660,6 +664,7 @@ class CifReader {
   };
 
   const SourceFile& file_;
+  const string_view text_;
   CifTokens tokens_;
   CifBlock block_;  // the first with atoms, when all are read
   std::optional<CifBlock> first_;
@@ -729,7 +734,7 @@ absl::Status CifReader::ReadBlocks() {
   absl::Status status = tokens_.Next();
   if (!status.ok()) return status;
   if (tokens_.type() != Type::kData && tokens_.type() != Type::kOther) {
-    return FileError(file_, absl::StrCat("is ", DescribeContents(file_.bytes)),
+    return FileError(file_, absl::StrCat("is ", DescribeContents(text_)),
                      "a CIF file begins with data_ and a name");
   }
   while (status.ok() && tokens_.type() != Type::kEnd) {

@@ -4,8 +4,12 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
+#include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
@@ -18,20 +22,19 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "values are read in place");
 
 // Of the public header block, where its fields begin.
-constexpr size_t kMinor = 25, kOffsetToPoints = 96, kFormat = 104, kRecordLength = 105,
-                 kOldCount = 107, kScales = 131, kOffsets = 155, kHeaderBytes = 227, kCount14 = 247,
-                 kHeaderBytes14 = 375;
+constexpr size_t kMinor = 25, kHeaderSize = 94, kOffsetToPoints = 96, kRecords = 100, kFormat = 104,
+                 kRecordLength = 105, kOldCount = 107, kScales = 131, kOffsets = 155,
+                 kHeaderBytes = 227, kCount14 = 247, kHeaderBytes14 = 375;
 
-// A point record format's least length, where its colours are (0: it has none), and where its flags.
+// A point record format's least length, and where its colours, time and waveform are (0: it has none).
 struct PointFormat {
-  size_t bytes, color, flags;
-  uint8_t withheld;
+  size_t bytes, color, time, waveform;
 };
-constexpr PointFormat kPointFormats[] = {{20, 0, 15, 0x80},  {28, 0, 15, 0x80},  {26, 20, 15, 0x80},
-                                         {34, 28, 15, 0x80}, {57, 0, 15, 0x80},  {63, 28, 15, 0x80},
-                                         {30, 0, 15, 0x04},  {36, 30, 15, 0x04}, {38, 30, 15, 0x04},
-                                         {59, 0, 15, 0x04},  {67, 30, 15, 0x04}};
-constexpr size_t kIntensity = 12;
+constexpr PointFormat kPointFormats[] = {{20, 0, 0, 0},   {28, 0, 20, 0},  {26, 20, 0, 0},
+                                         {34, 28, 20, 0}, {57, 0, 20, 28}, {63, 28, 20, 34},
+                                         {30, 0, 22, 0},  {36, 30, 22, 0}, {38, 30, 22, 0},
+                                         {59, 0, 22, 30}, {67, 30, 22, 38}};
+constexpr size_t kIntensity = 12, kNearInfrared = 36;
 
 template <typename T>
 T Take(absl::string_view bytes, size_t at) {
@@ -40,12 +43,153 @@ T Take(absl::string_view bytes, size_t at) {
   return value;
 }
 
+// Types of numbers, as the specification numbers those of extra bytes.
+enum NumberType : uint8_t { kU8 = 1, kI8, kU16, kI16, kU32, kI32, kU64, kI64, kF32, kF64 };
+constexpr size_t kNumberBytes[] = {0, 1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
+
+double NumberAt(absl::string_view bytes, size_t at, NumberType type) {
+  switch (type) {
+    case kU8:
+      return Take<uint8_t>(bytes, at);
+    case kI8:
+      return Take<int8_t>(bytes, at);
+    case kU16:
+      return Take<uint16_t>(bytes, at);
+    case kI16:
+      return Take<int16_t>(bytes, at);
+    case kU32:
+      return Take<uint32_t>(bytes, at);
+    case kI32:
+      return Take<int32_t>(bytes, at);
+    case kU64:
+      return static_cast<double>(Take<uint64_t>(bytes, at));
+    case kI64:
+      return static_cast<double>(Take<int64_t>(bytes, at));
+    case kF32:
+      return Take<float>(bytes, at);
+    case kF64:
+      return Take<double>(bytes, at);
+  }
+  return 0;
+}
+
+// A number of each point, beside its place and colour.
+struct Dimension {
+  std::string name;
+  NumberType type = kU8;
+  size_t at = 0;  // in the record
+  // Bits of a byte of which it has some; 0: all of its bytes.
+  int shift = 0, bits = 0;
+  double scale = 1, offset = 0;
+  std::optional<double> no_data = std::nullopt;
+
+  double ValueAt(absl::string_view points, size_t point) const {
+    if (bits > 0) return (Take<uint8_t>(points, point + at) >> shift) & ((1 << bits) - 1);
+    const double number = NumberAt(points, point + at, type);
+    return no_data == number ? std::nan("") : number * scale + offset;
+  }
+  // Whether any point has another number than 0, given the bitwise OR of all records.
+  bool IsUsed(absl::string_view all) const {
+    if (bits > 0) return ValueAt(all, 0) != 0;
+    return all.substr(at, kNumberBytes[type]).find_first_not_of('\0') != absl::string_view::npos;
+  }
+};
+
+// LAS 1.4, tables 7 (formats before 6) and 10.
+std::vector<Dimension> DimensionsOf(size_t format) {
+  std::vector<Dimension> all = {{"intensity", kU16, kIntensity}};
+  if (format < 6) {
+    all.insert(all.end(), {{"classification", kU8, 15, 0, 5},
+                           {"return", kU8, 14, 0, 3},
+                           {"source", kU16, 18},
+                           {"returns", kU8, 14, 3, 3},
+                           {"scan_direction", kU8, 14, 6, 1},
+                           {"edge", kU8, 14, 7, 1},
+                           {"synthetic", kU8, 15, 5, 1},
+                           {"key_point", kU8, 15, 6, 1},
+                           {"scan_angle", kI8, 16},
+                           {"user_data", kU8, 17}});
+  } else {
+    all.insert(all.end(), {{"classification", kU8, 16},
+                           {"return", kU8, 14, 0, 4},
+                           {"source", kU16, 20},
+                           {"returns", kU8, 14, 4, 4},
+                           {"synthetic", kU8, 15, 0, 1},
+                           {"key_point", kU8, 15, 1, 1},
+                           {"overlap", kU8, 15, 3, 1},
+                           {"scanner_channel", kU8, 15, 4, 2},
+                           {"scan_direction", kU8, 15, 6, 1},
+                           {"edge", kU8, 15, 7, 1},
+                           {"user_data", kU8, 17},
+                           {"scan_angle", kI16, 18, 0, 0, 0.006}});
+  }
+  const size_t time = kPointFormats[format].time;
+  if (time != 0) all.push_back({"gps_time", kF64, time});
+  if (format == 8 || format == 10) all.push_back({"near_infrared", kU16, kNearInfrared});
+  return all;
+}
+
 struct LasHeader {
   PointFormat format;
   size_t points_at = 0, record = 0;
   uint64_t count = 0;
   double scale[3] = {}, offset[3] = {};
+  std::vector<Dimension> dimensions;
+  size_t unnamed_at = 0;  // in the record: extra bytes that nothing describes begin here
+  uint8_t withheld_flags = 15, withheld_bit = 0x80;
 };
+
+// Adds the extra bytes that the file describes (LAS 1.4, table 24). Those of a type that is not known end the list.
+void AddExtraBytes(absl::string_view descriptors, LasHeader* header) {
+  constexpr size_t kDescriptor = 192, kType = 2, kOptions = 3, kName = 4, kNameBytes = 32,
+                   kNoData = 40, kScale = 112, kOffset = 136;
+  constexpr uint8_t kHasNoData = 0x01, kHasScale = 0x08, kHasOffset = 0x10;
+  for (; descriptors.size() >= kDescriptor; descriptors.remove_prefix(kDescriptor)) {
+    const auto code = Take<uint8_t>(descriptors, kType);
+    const auto options = Take<uint8_t>(descriptors, kOptions);
+    const absl::string_view padded = descriptors.substr(kName, kNameBytes);
+    const absl::string_view name = padded.substr(0, padded.find('\0'));
+    if (code == 0) {  // so many bytes without a type
+      header->unnamed_at = std::min(header->unnamed_at + options, header->record);
+      continue;
+    }
+    // Types from 11 on are pairs, and from 21 on triples.
+    const size_t several = (code - 1u) / 10 + 1;
+    const auto type = static_cast<NumberType>((code - 1u) % 10 + 1);
+    if (several > 3 || header->unnamed_at + several * kNumberBytes[type] > header->record) return;
+    for (size_t i = 0; i < several; ++i) {
+      Dimension one = {several == 1 ? std::string(name) : absl::StrCat(name, "_", i + 1), type,
+                       header->unnamed_at};
+      if ((options & kHasScale) != 0) one.scale = Take<double>(descriptors, kScale + 8 * i);
+      if ((options & kHasOffset) != 0) one.offset = Take<double>(descriptors, kOffset + 8 * i);
+      if ((options & kHasNoData) != 0) {
+        // It is as wide as can be: an integer of eight bytes, or a double.
+        const NumberType wide = type >= kF32 ? kF64 : type % 2 == 1 ? kU64 : kI64;
+        one.no_data = NumberAt(descriptors, kNoData + 8 * i, wide);
+      }
+      header->dimensions.push_back(std::move(one));
+      header->unnamed_at += kNumberBytes[type];
+    }
+  }
+}
+
+// Goes through the variable length records for the one that describes extra bytes.
+void ReadExtraBytes(absl::string_view bytes, LasHeader* header) {
+  constexpr size_t kRecordHeader = 54, kUser = 2, kUserBytes = 16, kId = 18, kLength = 20;
+  constexpr uint16_t kExtraBytes = 4;
+  const absl::string_view before = bytes.substr(0, header->points_at);
+  size_t at = Take<uint16_t>(bytes, kHeaderSize);
+  for (uint32_t left = Take<uint32_t>(bytes, kRecords);
+       left > 0 && at + kRecordHeader <= before.size(); --left) {
+    const size_t length = Take<uint16_t>(before, at + kLength);
+    const absl::string_view user = before.substr(at + kUser, kUserBytes);
+    if (Take<uint16_t>(before, at + kId) == kExtraBytes &&
+        user.substr(0, user.find('\0')) == "LASF_Spec") {
+      AddExtraBytes(before.substr(at + kRecordHeader, length), header);
+    }
+    at += kRecordHeader + length;
+  }
+}
 
 absl::StatusOr<LasHeader> ReadLasHeader(const SourceFile& file) {
   const absl::string_view bytes = file.bytes;
@@ -60,7 +204,8 @@ absl::StatusOr<LasHeader> ReadLasHeader(const SourceFile& file) {
   if (format >= std::size(kPointFormats)) {
     return FileError(file, absl::StrCat("has point format ", format), "0 to 10 are read");
   }
-  LasHeader out{kPointFormats[format]};
+  LasHeader out;
+  out.format = kPointFormats[format];
   out.points_at = Take<uint32_t>(bytes, kOffsetToPoints);
   out.record = Take<uint16_t>(bytes, kRecordLength);
   out.count = Take<uint32_t>(bytes, kOldCount);
@@ -86,15 +231,22 @@ absl::StatusOr<LasHeader> ReadLasHeader(const SourceFile& file) {
                      absl::StrCat("format ", format, " has ", out.format.bytes,
                                   " bytes or more each; the file is truncated or damaged"));
   }
+  out.dimensions = DimensionsOf(format);
+  if (format >= 6) out.withheld_bit = 0x04;
+  out.unnamed_at = out.format.bytes;
+  ReadExtraBytes(bytes, &out);
   return out;
 }
 
-// Offsets of what a point has besides, by its kind of format: before and from 6 on.
-struct OtherFields {
-  uint32_t return_bits, classification, classification_bits, source;
-};
-constexpr OtherFields kOthersBefore6 = {0x07, 15, 0x1F, 18}, kOthersFrom6 = {0x0F, 16, 0xFF, 20};
-constexpr size_t kReturns = 14;
+// The bitwise OR of all records.
+std::string AnyOf(absl::string_view points, const LasHeader& header) {
+  std::string any(header.record, '\0');
+  for (uint64_t i = 0; i < header.count; ++i) {
+    const char* const record = points.data() + i * header.record;
+    for (size_t k = 0; k < header.record; ++k) any[k] = static_cast<char>(any[k] | record[k]);
+  }
+  return any;
+}
 
 }  // namespace
 
@@ -120,17 +272,21 @@ absl::StatusOr<Model> ReadLasPoints(const SourceFile& file, bool attributes) {
   table->Reserve(header->count);
   std::vector<double> values;
   if (attributes) {
-    table->SetAttributes({"intensity", "classification", "return", "source"});
-    values.resize(4);
+    std::vector<std::string> names;
+    for (const Dimension& one : header->dimensions) names.push_back(one.name);
+    table->SetAttributes(std::move(names));
+    values.resize(header->dimensions.size());
   }
-  const OtherFields& others = header->format.withheld == 0x80 ? kOthersBefore6 : kOthersFrom6;
-  uint64_t withheld = 0;
+  uint64_t withheld = 0, waveforms = 0;
   for (uint64_t i = 0; i < header->count; ++i) {
     const size_t at = i * header->record;
-    if ((Take<uint8_t>(points, at + header->format.flags) & header->format.withheld) != 0) {
+    if ((Take<uint8_t>(points, at + header->withheld_flags) & header->withheld_bit) != 0) {
       ++withheld;
       continue;
     }
+    // The number of its descriptor; 0: this point has none.
+    if (header->format.waveform != 0)
+      waveforms += Take<uint8_t>(points, at + header->format.waveform) != 0 ? 1 : 0;
     PointRow row = {};
     for (size_t a = 0; a < 3; ++a) {
       row[a] = Take<int32_t>(points, at + 4 * a) * header->scale[a] + header->offset[a];
@@ -140,13 +296,8 @@ absl::StatusOr<Model> ReadLasPoints(const SourceFile& file, bool attributes) {
       }
     }
     row[static_cast<size_t>(PointColumn::kIntensity)] = Take<uint16_t>(points, at + kIntensity);
-    if (attributes) {
-      values = {row[static_cast<size_t>(PointColumn::kIntensity)],
-                static_cast<double>(Take<uint8_t>(points, at + others.classification) &
-                                    others.classification_bits),
-                static_cast<double>(Take<uint8_t>(points, at + kReturns) & others.return_bits),
-                static_cast<double>(Take<uint16_t>(points, at + others.source))};
-    }
+    for (size_t k = 0; k < values.size(); ++k)
+      values[k] = header->dimensions[k].ValueAt(points, at);
     if (absl::Status status = table->Add(file, row, absl::StrCat("point ", i), values);
         !status.ok()) {
       return status;
@@ -157,6 +308,18 @@ absl::StatusOr<Model> ReadLasPoints(const SourceFile& file, bool attributes) {
   }
   Model model = std::move(*table).Finish(file, "LAS points");
   AddLeftOut("points marked as withheld", withheld, &model);
+  AddLeftOut("waveforms", waveforms, &model);
+  const std::string any = AnyOf(points, *header);
+  if (!attributes) {
+    const auto others = std::count_if(
+        header->dimensions.begin(), header->dimensions.end(), [&](const Dimension& one) {
+          return one.IsUsed(any) && (colored || one.name != "intensity");
+        });
+    AddLeftOut("other dimensions", static_cast<uint64_t>(others), &model);
+  }
+  const absl::string_view unnamed = absl::string_view(any).substr(header->unnamed_at);
+  if (unnamed.find_first_not_of('\0') != absl::string_view::npos)
+    AddLeftOut("bytes of each point that nothing describes", unnamed.size(), &model);
   return model;
 }
 

@@ -6,9 +6,12 @@
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
+#include "common/text/printable.h"
 #include "tools/import/nesting.h"
 
 namespace voxeld::voxelctl {
@@ -63,8 +66,9 @@ uint64_t TakeCount(absl::string_view* text) {
   return value;
 }
 
-// The library allocates all the vertices and faces that an OFF file declares before it reads the first one.
-absl::Status CheckOffCounts(const SourceFile& file) {
+// The library allocates all the vertices and faces that an OFF file declares before it reads the first one. It does not miss corners that are not
+// there.
+absl::Status CheckOff(const SourceFile& file) {
   absl::string_view text = file.bytes;
   // [ST][C][N][4][n]OFF; the counts may follow at once.
   for (const absl::string_view option : {"ST", "C", "N", "4"}) absl::ConsumePrefix(&text, option);
@@ -79,6 +83,60 @@ absl::Status CheckOffCounts(const SourceFile& file) {
                      absl::StrCat("declares ", vertices, " vertices and ", faces,
                                   " faces but has only ", bytes, " bytes"),
                      "the file is truncated or damaged");
+  }
+  // The number of edges, and what else stands in its line.
+  text.remove_prefix(std::min(text.find_first_of("\r\n"), text.size()));
+  uint64_t lines = 0;
+  for (absl::string_view line : absl::StrSplit(text, absl::ByAnyChar("\r\n"))) {
+    line = absl::StripAsciiWhitespace(line.substr(0, line.find('#')));
+    if (line.empty() || ++lines <= vertices || lines > vertices + faces) continue;
+    const std::vector<absl::string_view> words =
+        absl::StrSplit(line, absl::ByAnyChar(" \t"), absl::SkipEmpty());
+    uint64_t corners = 0;
+    if (!absl::SimpleAtoi(words[0], &corners) || corners >= words.size()) {
+      return FileError(
+          file,
+          absl::StrCat("face ", lines - vertices, " of ", faces, " has ", words.size() - 1,
+                       " corners of ", EscapeForTerminal(words[0].substr(0, 24))),
+          "the file is truncated or damaged");
+    }
+  }
+  if (lines < vertices + faces) {
+    return FileError(file,
+                     absl::StrCat("has no line for face ",
+                                  lines < vertices ? 1 : lines - vertices + 1, " of ", faces),
+                     "the file is truncated or damaged");
+  }
+  return absl::OkStatus();
+}
+
+// The numbers of the entities that a STEP file defines ("#12=…") or refers to ("#12"), outside texts and comments. The library follows a
+// reference to an entity that is missing to address 0.
+absl::Status CheckStepReferences(const SourceFile& file) {
+  absl::string_view text = file.bytes;
+  std::vector<uint64_t> defined, used;
+  for (size_t at = 0; at < text.size(); ++at) {
+    if (text[at] == '\'') {
+      at = std::min(text.find('\'', at + 1), text.size());
+    } else if (text.substr(at, 2) == "/*") {
+      at = std::min(text.find("*/", at + 2), text.size());
+    } else if (text[at] == '#') {
+      absl::string_view rest = text.substr(at + 1);
+      uint64_t number = 0;
+      size_t digits = 0;
+      while (digits < rest.size() && digits < 19 &&
+             absl::ascii_isdigit(static_cast<unsigned char>(rest[digits])))
+        number = number * 10 + static_cast<uint64_t>(rest[digits++] - '0');
+      rest = absl::StripLeadingAsciiWhitespace(rest.substr(digits));
+      if (digits > 0) (absl::StartsWith(rest, "=") ? defined : used).push_back(number);
+    }
+  }
+  std::sort(defined.begin(), defined.end());
+  for (const uint64_t number : used) {
+    if (!std::binary_search(defined.begin(), defined.end(), number)) {
+      return FileError(file, absl::StrCat("refers to #", number, ", which it does not define"),
+                       "the file is truncated or damaged");
+    }
   }
   return absl::OkStatus();
 }
@@ -109,7 +167,10 @@ absl::Status CheckMeshBeginning(const SourceFile& file) {
       return FileError(file, absl::StrCat("is ", DescribeContents(file.bytes)), b.expected);
   }
   if (file.extension == "off") {
-    if (absl::Status status = CheckOffCounts(file); !status.ok()) return status;
+    if (absl::Status status = CheckOff(file); !status.ok()) return status;
+  }
+  if (file.extension == "ifc") {
+    if (absl::Status status = CheckStepReferences(file); !status.ok()) return status;
   }
   if (const int depth = NestingOf(file); depth > kMostNesting) {
     return FileError(file, absl::StrCat("is nested ", depth, " levels deep"),

@@ -6,8 +6,8 @@
 
 namespace voxeld::voxelctl {
 
-// InvalidArgument unless an .off, .fbx, .3mf, .dae, .blend, .ifc or .bvh begins as such a file does and has 512 MiB at most. Others
-// may begin as they like.
+// InvalidArgument unless an .off, .fbx, .3mf, .dae, .blend, .ifc or .bvh begins as such a file does and has 512 MiB at most, an .off has
+// the faces that it declares, and an .ifc defines what it refers to. Others may begin as they like.
 absl::Status CheckMeshBeginning(const SourceFile& file);
 
 }  // namespace voxeld::voxelctl

@@ -59,7 +59,7 @@ const std::vector<Reader>& Readers() {
          return ReadPcdPoints(file, options.attributes);
        }},
       {{"points", "LAS", ".las .laz", "",
-        "point formats 0 to 10, colours, intensities; classification, return and source by "
+        "point formats 0 to 10, colours, intensities; the other dimensions and extra bytes by "
         "--color-by",
         "compressed files (.laz), waveforms", "–"},
        [](const SourceFile& file, const ImportOptions& options) {

@@ -211,6 +211,66 @@ TEST_F(AssimpFormats, FbxTextures) {
   EXPECT_EQ(model.parts[0].texture_coordinates.size(), model.parts[0].positions.size());
 }
 
+// The library shows what there is of them.
+TEST_F(AssimpFormats, FilesThatEndTooEarlyAreSaidToDo) {
+  const std::string faces =
+      "0\nSECTION\n2\nENTITIES\n0\n3DFACE\n8\n0\n10\n0\n20\n0\n30\n0\n11\n1\n21\n0\n"
+      "31\n0\n12\n1\n22\n1\n32\n0\n13\n1\n23\n1\n33\n0\n0\nENDSEC\n";
+  EXPECT_EQ(Good("a.dxf", faces + "0\nEOF\n").note, "");
+  EXPECT_THAT(Good("a.dxf", faces).note, HasSubstr("it ends without EOF"));
+  const std::string house = ReadAll(std::string(VOXELD_MODELS_DIR) + "/IFC/AC14-FZK-Haus.ifc");
+  EXPECT_EQ(Good("a.ifc", house).note, "");
+  EXPECT_THAT(Good("a.ifc", house.substr(0, house.rfind("ENDSEC"))).note,
+              HasSubstr("it ends without END-ISO-10303-21"));
+}
+
+// The library takes a corner that is missing for the first one.
+TEST_F(AssimpFormats, FacesOfOffThatAreCutOff) {
+  const std::string off = "OFF\n# a comment\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n\n3 0 1 2\n";
+  EXPECT_THAT(Good("a.off", off + "3 0 2 3 1 0 0").parts, testing::SizeIs(1));
+  for (const std::string last : {"", "3", "3 0", "3 0 2", "3 0 2 # 3"}) {
+    const auto model = ReadHere(folder_.Write("a.off", off + last), {});
+    EXPECT_FALSE(model.ok()) << last;
+    EXPECT_THAT(std::string(model.status().message()), HasSubstr("face 2 of 2")) << last;
+  }
+}
+
+// The library follows a reference to what is missing to address 0.
+TEST_F(AssimpFormats, IfcThatRefersToWhatIsMissing) {
+  const auto error = [this](const std::string& data) {
+    const std::string text =
+        absl::StrCat("ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('IFC2X3'));\nENDSEC;\nDATA;\n", data,
+                     "\nENDSEC;\nEND-ISO-10303-21;\n");
+    return std::string(ReadHere(folder_.Write("a.ifc", text), {}).status().message());
+  };
+  EXPECT_THAT(error("#1=IFCPROJECT(#2);"), HasSubstr("refers to #2, which it does not define"));
+  EXPECT_THAT(error("#1 = IFCPROJECT(#12);\n#2=IFCX(#1);"), HasSubstr("refers to #12"));
+  // Texts and comments refer to nothing.
+  EXPECT_THAT(error("#1=IFCPROJECT('#7','it''s #8'); /* #9 */"),
+              testing::Not(HasSubstr("refers to")));
+}
+
+// It looks at what a file holds; its own readers of these formats crash where ours do not.
+TEST_F(AssimpFormats, FormatsOfOtherReadersUnderAnotherName) {
+  const std::pair<const char*, const char*> files[] = {
+      {"ply",
+       "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
+       "float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 "
+       "0\n0 1 0\n3 0 1 2\n"},
+      {"obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"},
+      {"stl",
+       "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 "
+       "0\nendloop\nendfacet\nendsolid a\n"}};
+  for (const auto& [extension, bytes] : files) {
+    EXPECT_THAT(ReadHere(folder_.Write(absl::StrCat("a.", extension), bytes), {}), IsOk());
+    for (const char* const other : {"xml", "smd"}) {
+      const auto model = ReadHere(folder_.Write(absl::StrCat("a.", other), bytes), {});
+      EXPECT_FALSE(model.ok()) << extension << " as " << other;
+      EXPECT_THAT(std::string(model.status().message()), testing::Not(HasSubstr("crashed")));
+    }
+  }
+}
+
 TEST_F(AssimpFormats, FramesOfBvhBeyondTheAnnouncedNumber) {
   const std::string bvh =
       "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\nEnd "

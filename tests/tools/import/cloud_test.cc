@@ -396,7 +396,8 @@ TEST_F(Clouds, LasColoursOfEightBitsAndPointsThatAreWithheld) {
       "a.las", Las(2, 2, 26, 20, {{0, 0, 0, 1, 0, {255, 16, 0}}, {1, 0, 0, 1, 0x80, {1, 1, 1}}}));
   ASSERT_THAT(model, IsOk());
   EXPECT_THAT(model->parts[0].colors, ElementsAre(Rgb{255, 16, 0}));
-  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"points marked as withheld", 1}}));
+  EXPECT_EQ(model->left_out,
+            (std::vector<LeftOut>{{"points marked as withheld", 1}, {"other dimensions", 1}}));
   const auto newer =
       Import("b.las", Las(4, 6, 30, 0, {{0, 0, 0, 1, 4, {}}, {1, 0, 0, 1, 0x80, {}}}));
   ASSERT_THAT(newer, IsOk());
@@ -459,14 +460,149 @@ TEST_F(Clouds, FieldsOfLasAreAttributes) {
   before[227 + 15] = '\x46';  // class 6, key point
   before[227 + 18] = '\x05';
   EXPECT_THAT(AttributesOf(folder_.Write("a.las", before)),
-              ElementsAre("intensity: 77", "classification: 6", "return: 2", "source: 5"));
+              ElementsAre("intensity: 77", "classification: 6", "return: 2", "source: 5",
+                          "returns: 1", "scan_direction: 0", "edge: 0", "synthetic: 0",
+                          "key_point: 1", "scan_angle: 0", "user_data: 0"));
   std::string from = Las(4, 6, 30, 0, {{0, 0, 0, 78, 0, {}}});
   const size_t at = from.size() - 30;
   from[at + 14] = '\x29';  // the ninth of two
   from[at + 16] = '\x88';
   from[at + 20] = '\x07';
+  from[at + 15] = '\xe9';  // an edge, backwards, channel 2, overlap, synthetic
+  from[at + 17] = '\x11';
+  from[at + 19] = '\xff';  // an angle of -256 times 0.006°
+  Put<double>(&from, at + 22, 25.25);
   EXPECT_THAT(AttributesOf(folder_.Write("b.las", from)),
-              ElementsAre("intensity: 78", "classification: 136", "return: 9", "source: 7"));
+              ElementsAre("intensity: 78", "classification: 136", "return: 9", "source: 7",
+                          "returns: 2", "synthetic: 1", "key_point: 0", "overlap: 1",
+                          "scanner_channel: 2", "scan_direction: 1", "edge: 1", "user_data: 17",
+                          "scan_angle: -1.536", "gps_time: 25.25"));
+  const auto plain = ReadHere(folder_.Path("b.las"));
+  ASSERT_THAT(plain, IsOk());
+  // Intensity is shown; two others are 0.
+  EXPECT_EQ(plain->left_out, (std::vector<LeftOut>{{"other dimensions", 12}}));
+}
+
+// A descriptor of extra bytes (LAS 1.4, table 24).
+std::string ExtraBytes(uint8_t type, uint8_t options, const std::string& name, double scale = 0,
+                       double offset = 0, int64_t no_data = 0) {
+  std::string out(192, '\0');
+  Put(&out, 2, type);
+  Put(&out, 3, options);
+  out.replace(4, name.size(), name);
+  Put(&out, 40, no_data);
+  Put(&out, 112, scale);
+  Put(&out, 136, offset);
+  return out;
+}
+
+// A LAS file of format 0 with one point, which has `extra` bytes that `descriptors` describe.
+std::string LasWithExtraBytes(const std::string& descriptors, const std::string& extra) {
+  std::string las = Las(2, 0, static_cast<uint16_t>(20 + extra.size()), 0, {{0, 0, 0, 1, 0, {}}});
+  std::string record(54, '\0');
+  record.replace(2, 9, "LASF_Spec");
+  Put<uint16_t>(&record, 18, 4);
+  Put(&record, 20, static_cast<uint16_t>(descriptors.size()));
+  record += descriptors;
+  Put<uint16_t>(&las, 94, 227);
+  Put<uint32_t>(&las, 96, static_cast<uint32_t>(227 + record.size()));
+  Put<uint32_t>(&las, 100, 1);
+  las.replace(las.size() - extra.size(), extra.size(), extra);
+  las.insert(227, record);
+  return las;
+}
+
+TEST_F(Clouds, ExtraBytesOfLas) {
+  std::string extra;
+  Put<int16_t>(&extra, 0, -200);
+  Put<float>(&extra, 2, 1.5f);
+  Put<uint8_t>(&extra, 6, 255);
+  Put<uint16_t>(&extra, 7, 3);
+  Put<uint16_t>(&extra, 9, 4);
+  extra += "??";
+  const std::string descriptors = ExtraBytes(4, 0x18, "range", 0.01, 5) +
+                                  ExtraBytes(9, 0, "width") + ExtraBytes(1, 1, "class", 0, 0, 255) +
+                                  ExtraBytes(13, 0, "pair") + ExtraBytes(0, 1, "");
+  const std::string path = folder_.Write("a.las", LasWithExtraBytes(descriptors, extra));
+  const auto all = ReadHere(path, {.attributes = true});
+  ASSERT_THAT(all, IsOk());
+  std::vector<std::string> texts;
+  for (const Attribute& one : all->parts.at(0).attributes)
+    texts.push_back(absl::StrCat(one.name, ": ", absl::StrJoin(one.values, " ")));
+  EXPECT_THAT(std::vector<std::string>(texts.end() - 5, texts.end()),
+              ElementsAre("range: 3", "width: 1.5", "class: nan", "pair_1: 3", "pair_2: 4"));
+  EXPECT_EQ(all->left_out,
+            (std::vector<LeftOut>{{"bytes of each point that nothing describes", 1}}));
+  const auto plain = ReadHere(path);
+  ASSERT_THAT(plain, IsOk());
+  EXPECT_EQ(plain->left_out,
+            (std::vector<LeftOut>{{"other dimensions", 5},
+                                  {"bytes of each point that nothing describes", 1}}));
+}
+
+TEST_F(Clouds, DescriptorsOfLasThatAreWrong) {
+  for (const std::string& descriptors :
+       {ExtraBytes(10, 0, "too long"), ExtraBytes(31, 0, "no type"), ExtraBytes(0, 255, ""),
+        std::string(100, '\x01')}) {
+    const auto model = ReadHere(folder_.Write("a.las", LasWithExtraBytes(descriptors, "abcd")),
+                                {.attributes = true});
+    ASSERT_THAT(model, IsOk());
+    EXPECT_EQ(model->parts.at(0).attributes.size(), 11u);
+  }
+  std::string far = LasWithExtraBytes(ExtraBytes(1, 0, "a"), "a");
+  Put<uint16_t>(&far, 227 + 20, 65535);  // the record's length
+  EXPECT_THAT(ReadHere(folder_.Write("a.las", far), {.attributes = true}), IsOk());
+  Put<uint16_t>(&far, 94, 65535);  // the header's
+  EXPECT_THAT(ReadHere(folder_.Write("a.las", far), {.attributes = true}), IsOk());
+}
+
+// The first byte of a wave packet is the number of its descriptor; 0: there is none.
+TEST_F(Clouds, WaveformsOfLasAreCounted) {
+  for (const auto& [format, record, at] : {std::array{4, 57, 28}, std::array{5, 63, 34},
+                                           std::array{9, 59, 30}, std::array{10, 67, 38}}) {
+    std::string las = Las(4, static_cast<uint8_t>(format), static_cast<uint16_t>(record), 0,
+                          {{0, 0, 0, 1, 0, {}}, {1, 0, 0, 1, 0, {}}});
+    las[las.size() - static_cast<size_t>(record - at)] = '\1';
+    const auto model = ReadHere(folder_.Write("a.las", las));
+    ASSERT_THAT(model, IsOk());
+    EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"waveforms", 1}})) << format;
+  }
+}
+
+// Single precision would take the first two of these times for one.
+TEST_F(Clouds, TimesKeepTheirPrecision) {
+  const auto model =
+      ReadHere(folder_.Write("a.csv", "x,y,z,time\n0,0,0,1764500000\n1,0,0,1764500001\n"),
+               {.attributes = true});
+  ASSERT_THAT(model, IsOk());
+  EXPECT_THAT(model->parts.at(0).attributes.at(0).values, ElementsAre(1764500000, 1764500001));
+}
+
+// Whatever a table writes for a number that is missing.
+TEST_F(Clouds, PointsWhoseNumbersAreMissing) {
+  for (const std::string none : {"", "nan", "NaN", "NA", "n/a", "null", "None", "-"}) {
+    const auto model = ReadHere(
+        folder_.Write("a.csv", absl::StrCat("x,y,z,r,g,b\n1,", none, ",3,9,9,9\n1,2,3,255,", none,
+                                            ",0\n4,5,6,0,255,0\n")));
+    ASSERT_THAT(model, IsOk()) << none;
+    EXPECT_THAT(model->parts.at(0).positions, ElementsAre(Point3{1, 2, 3}, Point3{4, 5, 6}))
+        << none;
+    EXPECT_THAT(model->parts[0].colors, ElementsAre(Rgb{255, 255, 255}, Rgb{0, 255, 0})) << none;
+    EXPECT_EQ(
+        model->left_out,
+        (std::vector<LeftOut>{{"points that are not a number", 1},
+                              {"colours and intensities that are not a number (shown white)", 1}}))
+        << none;
+  }
+  // They are no part of the range of intensities either.
+  const auto grey = ReadHere(folder_.Write("a.csv", "x,y,z,i\n1,2,3,10\n1,2,4,nan\n1,2,5,20\n"));
+  ASSERT_THAT(grey, IsOk());
+  EXPECT_THAT(grey->parts.at(0).colors,
+              ElementsAre(Rgb{0, 0, 0}, Rgb{255, 255, 255}, Rgb{255, 255, 255}));
+  // A first line of them does not name columns.
+  EXPECT_THAT(Points("a.xyz", "nan nan nan\n1 2 3\n").positions, ElementsAre(Point3{1, 2, 3}));
+  EXPECT_THAT(Error("a.csv", "x,y,z\nNA,NA,NA\n"),
+              HasSubstr("no point whose x, y and z are numbers"));
 }
 
 }  // namespace cloud_test

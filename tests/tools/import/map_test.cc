@@ -251,6 +251,34 @@ TEST_F(Maps, TracksOfGpx) {
   EXPECT_THAT(model->left_out, IsEmpty());
 }
 
+TEST_F(Maps, PlacesOfGpxThatAreNone) {
+  const auto error = [this](const std::string& point) {
+    return std::string(ReadHere(folder_.Write("a.gpx", Gpx(point)), {}).status().message());
+  };
+  EXPECT_THAT(
+      error("\n<wpt lat=\"abc\" lon=\"9\"/>"),
+      HasSubstr("line 2 has a <wpt> with lat=\"abc\"; degrees from -90 to 90 are expected"));
+  EXPECT_THAT(error(R"(<rte><rtept lat="1" lon=""/></rte>)"), HasSubstr("<rtept> with lon=\"\""));
+  EXPECT_THAT(error(R"(<trk><trkseg><trkpt lat="1"/></trkseg></trk>)"),
+              HasSubstr("<trkpt> without lon; degrees from -180 to 180"));
+  EXPECT_THAT(error(R"(<wpt lat="91" lon="9"/>)"), HasSubstr("with lat=\"91\""));
+  EXPECT_THAT(error(R"(<wpt lat="nan" lon="9"/>)"), HasSubstr("with lat=\"nan\""));
+}
+
+// The library gives elements and data the same names.
+TEST_F(Maps, DataOfKmlMayHaveTheNamesOfElements) {
+  for (const std::string name : {"icon", "visibility", "begin", "drawOrder", "Name"}) {
+    const auto model = Import(
+        "a.kml", Kml(absl::StrCat("<Placemark><ExtendedData><Data name=\"", name,
+                                  "\"><value>0</value></Data></ExtendedData>"
+                                  "<Point><coordinates>1,2</coordinates></Point></Placemark>")));
+    ASSERT_THAT(model, IsOk()) << name;
+    ASSERT_EQ(model->parts.size(), 1u) << name;
+    EXPECT_THAT(ValuesOf(model->parts[0], name), ElementsAre(0)) << name;
+    EXPECT_THAT(model->left_out, IsEmpty()) << name;
+  }
+}
+
 TEST_F(Maps, HeightsThatNothingShowsAreCounted) {
   const auto model = ReadHere(
       folder_.Write("a.gpx", Gpx(R"(<trk><trkseg><trkpt lat="48" lon="9"><ele>300</ele></trkpt>)"

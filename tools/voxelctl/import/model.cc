@@ -19,6 +19,11 @@ void AddLeftOut(std::string_view kind, uint64_t count, Model* model) {
   }
 }
 
+void AddNote(std::string_view text, Model* model) {
+  model->note += model->note.empty() ? "" : "; ";
+  model->note += text;
+}
+
 std::string NoteOf(const Model& model) {
   const std::string prefix = absl::StrCat(model.path, ": ");
   std::string text = model.note;

@@ -89,6 +89,9 @@ struct Model {
 // Counts `count` things of `kind` that are left out; 0 changes nothing.
 void AddLeftOut(std::string_view kind, uint64_t count, Model* model);
 
+// Adds `text` to the note, behind what stands there.
+void AddNote(std::string_view text, Model* model);
+
 // "PATH: NOTE; left out: cameras (2), lights (1)", without the parts that are empty; empty if there is nothing to say.
 std::string NoteOf(const Model& model);
 

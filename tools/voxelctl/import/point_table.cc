@@ -99,6 +99,10 @@ void PointTable::SetAttributes(std::vector<std::string> names) {
 absl::Status PointTable::Add(const SourceFile& file, const PointRow& row, absl::string_view what,
                              std::span<const double> attributes) {
   const Point3 at{Of(row, PointColumn::kX), Of(row, PointColumn::kY), Of(row, PointColumn::kZ)};
+  if (std::isnan(at.x) || std::isnan(at.y) || std::isnan(at.z)) {
+    ++nowhere_;
+    return absl::OkStatus();
+  }
   if (!std::isfinite(at.x) || !std::isfinite(at.y) || !std::isfinite(at.z)) {
     return FileError(file, absl::StrCat(what, " is (", at.x, ", ", at.y, ", ", at.z, ")"),
                      "coordinates must be finite");
@@ -116,23 +120,37 @@ absl::Status PointTable::Add(const SourceFile& file, const PointRow& row, absl::
                     Of(row, PointColumn::kNormalZ)}));
   }
   if (Has(PointColumn::kRed) && Has(PointColumn::kGreen) && Has(PointColumn::kBlue)) {
-    part_.colors.push_back({Byte(Of(row, PointColumn::kRed) / full_scale_),
-                            Byte(Of(row, PointColumn::kGreen) / full_scale_),
-                            Byte(Of(row, PointColumn::kBlue) / full_scale_)});
+    const double red = Of(row, PointColumn::kRed), green = Of(row, PointColumn::kGreen),
+                 blue = Of(row, PointColumn::kBlue);
+    if (std::isnan(red) || std::isnan(green) || std::isnan(blue)) {
+      ++uncolored_;
+      part_.colors.push_back({255, 255, 255});
+    } else {
+      part_.colors.push_back(
+          {Byte(red / full_scale_), Byte(green / full_scale_), Byte(blue / full_scale_)});
+    }
   } else if (Has(PointColumn::kIntensity)) {
     const double intensity = Of(row, PointColumn::kIntensity);
-    intensities_.push_back(std::isfinite(intensity) ? static_cast<float>(intensity) : 0);
+    intensities_.push_back(static_cast<float>(intensity));
   }
   return absl::OkStatus();
 }
 
 Model PointTable::Finish(const SourceFile& file, std::string format) && {
   if (!intensities_.empty()) {
-    const auto [least, greatest] = std::ranges::minmax(intensities_);
+    float least = std::numeric_limits<float>::max(), greatest = -least;
+    for (const float intensity : intensities_) {
+      if (!std::isfinite(intensity)) continue;
+      least = std::min(least, intensity);
+      greatest = std::max(greatest, intensity);
+    }
     // All alike: white.
     const double span = greatest > least ? double{greatest} - double{least} : 0;
     for (const float intensity : intensities_) {
-      const uint8_t grey = span > 0 ? Byte((double{intensity} - double{least}) / span) : 255;
+      const bool is_known = std::isfinite(intensity);
+      uncolored_ += is_known ? 0 : 1;
+      const uint8_t grey =
+          is_known && span > 0 ? Byte((double{intensity} - double{least}) / span) : 255;
       part_.colors.push_back({grey, grey, grey});
     }
   }
@@ -141,6 +159,8 @@ Model PointTable::Finish(const SourceFile& file, std::string format) && {
   model.format = std::move(format);
   model.up = Up::kZ;
   model.lit_already = !part_.colors.empty();
+  AddLeftOut("points that are not a number", nowhere_, &model);
+  AddLeftOut("colours and intensities that are not a number (shown white)", uncolored_, &model);
   model.parts.push_back(std::move(part_));
   return model;
 }

@@ -55,8 +55,9 @@ class PointTable {
   void Reserve(uint64_t count);
   // Names the further numbers that Add gets of each point. Call it before the first Add.
   void SetAttributes(std::vector<std::string> names);
-  // InvalidArgument: a coordinate is not finite, or there are more than kMaxModelVertices; `what` names
-  // the row, as in "point 3" or "line 17". `attributes`: one of each name.
+  // A point with a coordinate that is not a number is left out and counted; one whose colour is none is white, and counted too.
+  // InvalidArgument: a coordinate is infinite, or there are more than kMaxModelVertices; `what` names the row, as in "point 3" or
+  // "line 17". `attributes`: one of each name.
   absl::Status Add(const SourceFile& file, const PointRow& row, absl::string_view what,
                    std::span<const double> attributes = {});
   size_t size() const { return part_.positions.size(); }
@@ -70,6 +71,7 @@ class PointTable {
   double full_scale_ = 1;
   Part part_;
   std::vector<float> intensities_;
+  uint64_t nowhere_ = 0, uncolored_ = 0;  // points without a place or colour
 };
 
 }  // namespace voxeld::voxelctl

@@ -28,7 +28,7 @@ struct Column {
   bool operator==(const Column&) const = default;
 };
 using Columns = std::vector<Column>;
-constexpr size_t kMostColumns = 256;
+constexpr size_t kMostColumns = 4096;
 
 // Where a comment begins, outside quotation marks; npos: there is none.
 size_t CommentBegin(absl::string_view line) {
@@ -94,6 +94,13 @@ std::optional<double> Number(absl::string_view word) {
   return PlainNumber(with_point);
 }
 
+// What tables write where a number is missing.
+bool IsMissing(absl::string_view word) {
+  static constexpr absl::string_view kMissing[] = {"", "na", "n/a", "nan", "null", "none", "-"};
+  return std::ranges::any_of(
+      kMissing, [word](absl::string_view one) { return absl::EqualsIgnoreCase(word, one); });
+}
+
 // Parts words at a mark, between two of which there may be nothing, or at blanks (' '). A word in quotation marks may contain the mark.
 Words SplitAt(absl::string_view line, char mark) {
   Words words;
@@ -130,7 +137,8 @@ bool IsPoint(const Words& words) {
 
 bool IsNames(const Words& words) {
   return std::ranges::none_of(words,
-                              [](absl::string_view word) { return Number(word).has_value(); });
+                              [](absl::string_view word) { return Number(word).has_value(); }) &&
+         !std::ranges::all_of(words, IsMissing);
 }
 
 // What parts the words of a file: the first of these at which its first line of three numbers or more falls into numbers, so
@@ -288,6 +296,10 @@ absl::StatusOr<Model> ReadTextPoints(const SourceFile& file, bool attributes) {
   absl::string_view line;
   const absl::StatusOr<Columns> columns = ReadHead(file, mark, &lines, &line);
   if (!columns.ok()) return columns.status();
+  if (columns->size() >= kMostColumns) {
+    return FileError(file, absl::StrCat("has ", kMostColumns, " columns or more"),
+                     absl::StrCat("at most ", kMostColumns - 1, " are read"));
+  }
   std::array<bool, kPointColumns> has = {};
   std::vector<size_t> numbers;  // the columns that are attributes
   std::vector<std::string> names;
@@ -316,7 +328,8 @@ absl::StatusOr<Model> ReadTextPoints(const SourceFile& file, bool attributes) {
     beyond += words.size() - std::min(words.size(), columns->size());
     for (size_t c = 0; c < columns->size(); ++c) {
       if (!(*columns)[c].known.has_value()) continue;
-      const std::optional<double> value = c < words.size() ? Number(words[c]) : std::nullopt;
+      std::optional<double> value = c < words.size() ? Number(words[c]) : std::nullopt;
+      if (!value && c < words.size() && IsMissing(words[c])) value = std::nan("");
       if (!value.has_value()) {
         return FileError(
             file,
@@ -347,6 +360,9 @@ absl::StatusOr<Model> ReadTextPoints(const SourceFile& file, bool attributes) {
       return status;
     }
   } while (lines.Next(&line));
+  if (table->size() == 0) {
+    return FileError(file, "has no point whose x, y and z are numbers", "at least one is expected");
+  }
   Model model =
       std::move(*table).Finish(file, file.extension == "csv" ? "CSV points" : "XYZ points");
   if (!attributes) AddLeftOut("other columns", others, &model);
