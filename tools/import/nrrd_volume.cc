@@ -428,7 +428,10 @@ class NrrdReader {
     Point3 first;
     const std::vector<absl::string_view> directions = Words("spacedirections"),
                                          spacings = Words("spacings"), mins = Words("axismins"),
-                                         maxs = Words("axismaxs"), centers = Words("centers");
+                                         maxs = Words("axismaxs");
+    // The format has two names for the field.
+    const std::vector<absl::string_view> centers =
+        Words(Field("centers").empty() ? "centerings" : "centers");
     for (size_t i = 0; i < axes_.size(); ++i) {
       if (!directions.empty()) {
         const std::optional<Point3> step =

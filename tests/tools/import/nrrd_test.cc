@@ -44,6 +44,13 @@ TEST_F(Volumes, NrrdInItsWays) {
                     .samples,
                 ElementsAre(7))
         << type;
+    EXPECT_THAT(Read("t.nrrd", absl::StrCat("NRRD0001\nType: ", type,
+                                            "\ndimension: 3\nsizes: 1 1 1\nendian: big\n"
+                                            "encoding: raw\n\n") +
+                                   std::string("\0\0\0\0\0\0\1\7", 8))
+                    .samples,
+                ElementsAre(263))
+        << type;
   }
   EXPECT_THAT(Read("c.nrrd", head + "encoding: ascii\n\n1 2\n3  4\n").samples,
               ElementsAre(1, 2, 3, 4));
@@ -72,13 +79,14 @@ TEST_F(Volumes, NrrdInHexAndBetweenAxisEnds) {
               ElementsAre(1, 255, 10, 11));
   EXPECT_THAT(Error("h.nrrd", head + "encoding: hex\n\n01 fg"),
               HasSubstr("has \"g\" behind 1 bytes of samples in hex"));
-  // Two cells from 0 to 4; two nodes, at 0 and 3.
-  const SampledVolume volume =
-      Read("m.nrrd", head +
-                         "axis mins: 0 0 0\naxis maxs: 4 1 3\ncenters: cell "
-                         "cell node\nencoding: ascii\n\n1 2 3 4");
-  EXPECT_EQ(volume.corners[7].x - volume.corners[0].x, 4);
-  EXPECT_EQ(volume.corners[7].z - volume.corners[0].z, 6);
+  // Two cells from 0 to 4; two nodes, at 0 and 3. The format has two names for the field.
+  for (const char* name : {"centers", "centerings"}) {
+    const SampledVolume volume =
+        Read("m.nrrd", absl::StrCat(head, "axis mins: 0 0 0\naxis maxs: 4 1 3\n", name,
+                                    ": cell cell node\nencoding: ascii\n\n1 2 3 4"));
+    EXPECT_EQ(volume.corners[7].x - volume.corners[0].x, 4) << name;
+    EXPECT_EQ(volume.corners[7].z - volume.corners[0].z, 6) << name;
+  }
 }
 
 TEST_F(Volumes, NrrdOfMoreThanOneNumber) {
