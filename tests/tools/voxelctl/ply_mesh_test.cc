@@ -99,6 +99,14 @@ TEST(PlyMesh, StripsOfTrianglesKeepTheirWinding) {
   for (size_t i = 0; i < 6; ++i) EXPECT_EQ(part.normals[part.indices[i]], (Point3{0, -1, 0}));
 }
 
+TEST(PlyMesh, ACloudMayDeclareFacesThatAreNotThere) {
+  const absl::StatusOr<Model> model = Ply(AsciiPly(
+      VertexElement(4) + "element face 0\nproperty list uchar int vertex_indices\n", kSquare));
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(model->format, "PLY points");
+  EXPECT_EQ(model->parts[0].positions.size(), 4u);
+}
+
 struct Binary {
   const char* name;
   bool big = false;
@@ -155,6 +163,33 @@ INSTANTIATE_TEST_SUITE_P(Types, PlyMeshBinary,
                                          Binary{"uints", false, "uint", "uint"}),
                          [](const auto& info) { return info.param.name; });
 
+// Faces with colors of floats before vertices, and a strip behind both.
+TEST_P(PlyMeshBinary, IsReadInAnyOrderOfElements) {
+  const auto& [name, big, count_type, index_type] = GetParam();
+  std::string bytes = absl::StrCat(
+      "ply\nformat ", big ? "binary_big_endian" : "binary_little_endian",
+      " 1.0\nelement face 1\nproperty float red\nproperty float green\nproperty float blue\n",
+      "property list ", count_type, " ", index_type,
+      " vertex_indices\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n",
+      "element tristrips 1\nproperty list int ", index_type, " vertex_indices\nend_header\n");
+  for (const float channel : {1.f, 0.5f, 0.f}) bytes += Swapped(channel, big);
+  bytes += OfType(count_type, 3, big);
+  for (const int index : {0, 1, 2}) bytes += OfType(index_type, index, big);
+  for (const float value : {0.f, 0.f, 0.f, 4.f, 0.f, 0.f, 0.f, 0.f, 1.f, 4.f, 0.f, 1.f})
+    bytes += Swapped(value, big);
+  const bool restarts = index_type != std::string("uchar") && index_type != std::string("ushort");
+  bytes += Swapped<int32_t>(restarts ? 7 : 3, big);
+  // −1 begins a strip; as a number without a sign it has the same bits.
+  for (const int index : {0, 1, 2}) bytes += OfType(index_type, index, big);
+  for (const int index : {-1, 1, 3, 2}) bytes += restarts ? OfType(index_type, index, big) : "";
+  const absl::StatusOr<Model> model = Ply(bytes);
+  ASSERT_THAT(model, IsOk());
+  ASSERT_EQ(model->parts.size(), 2u);
+  EXPECT_EQ(model->parts[0].colors, std::vector<Rgb>(3, Rgb{255, 128, 0}));
+  EXPECT_NEAR(AreaOf(model->parts[0]), 4, 1e-9);
+  EXPECT_NEAR(AreaOf(model->parts[1]), restarts ? 8 : 4, 1e-9);
+}
+
 TEST(PlyMesh, AFacesColorGoesBeforeItsVertices) {
   const absl::StatusOr<Model> model = Ply(AsciiPly(
       VertexElement(4) + "property uchar red\nproperty uchar green\nproperty uchar blue\n" +
@@ -180,6 +215,17 @@ TEST(PlyMesh, FloatColorsOfFacesGoTo1OrTo255) {
   };
   EXPECT_EQ(*color("1 0.5 0"), (Rgb{255, 128, 0}));
   EXPECT_EQ(*color("255 64 0"), (Rgb{255, 64, 0}));
+}
+
+TEST(PlyMesh, WholeColorsOfFacesGoTo255WhereNoneIsGreater) {
+  const absl::StatusOr<Model> model = Ply(AsciiPly(
+      VertexElement(4) + "element face 2\nproperty list uchar int vertex_indices\nproperty ushort "
+                         "red\nproperty ushort green\nproperty ushort blue\n",
+      absl::StrCat(kSquare, "3 0 1 2 255 64 0\n3 0 2 3 0 0 200\n")));
+  ASSERT_THAT(model, IsOk());
+  const Part& part = model->parts[0];
+  EXPECT_EQ(part.colors[part.indices[0]], (Rgb{255, 64, 0}));
+  EXPECT_EQ(part.colors[part.indices[5]], (Rgb{0, 0, 200}));
 }
 
 TEST(PlyMesh, NormalsOfTheFileAreTaken) {

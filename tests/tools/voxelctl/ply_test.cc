@@ -129,6 +129,68 @@ TEST(PlyPoints, FloatColorsGoTo255WhereOneIsGreaterThan1) {
   EXPECT_EQ(colors("0 0 0 1 0 0\n1 1 1 0.5 1 0\n"), (std::vector<Rgb>{{255, 0, 0}, {128, 255, 0}}));
 }
 
+// Exporters write 0 to 255 in whatever type they have; the scale is that of the whole file.
+TEST(PlyPoints, WholeColorsGoTo255WhereNoneIsGreater) {
+  TempFolder folder;
+  const auto colors = [&](const std::string& type, const std::string& body) {
+    const std::string properties = absl::StrCat(kXyz, "property ", type, " red\nproperty ", type,
+                                                " green\nproperty ", type, " blue\n");
+    const absl::StatusOr<Model> model =
+        ReadHere(folder.Write("a.ply", Header("ascii", "2", properties) + body), {});
+    EXPECT_THAT(model, IsOk());
+    return model.ok() ? model->parts.at(0).colors : std::vector<Rgb>();
+  };
+  const std::vector<Rgb> two = {{255, 0, 128}, {1, 64, 0}};
+  for (const char* type : {"uchar", "uint8", "short", "ushort", "uint16", "int", "uint", "int32"}) {
+    EXPECT_EQ(colors(type, "0 0 0 255 0 128\n1 1 1 1 64 0\n"), two) << type;
+  }
+  const std::string wide = "0 0 0 65535 0 32896\n1 1 1 257 16448 0\n";
+  for (const char* type : {"ushort", "int", "uint"}) EXPECT_EQ(colors(type, wide), two) << type;
+  EXPECT_EQ(colors("short", "0 0 0 32767 0 16448\n1 1 1 128 8224 0\n"), two);
+  EXPECT_EQ(colors("uint", "0 0 0 4294967295 0 2155905152\n1 1 1 16843009 1077952576 0\n"), two);
+  EXPECT_EQ(colors("ushort", "0 0 0 256 0 0\n1 1 1 255 0 0\n"),
+            (std::vector<Rgb>{{1, 0, 0}, {1, 0, 0}}))
+      << "dark";
+  EXPECT_EQ(colors("int", "0 0 0 -5 300 0\n1 1 1 0 0 65535\n"),
+            (std::vector<Rgb>{{0, 1, 0}, {0, 0, 255}}));
+}
+
+// All in one file: bytes, whole numbers that go to 255, fractions.
+TEST(PlyPoints, EachChannelHasTheScaleOfItsType) {
+  TempFolder folder;
+  const absl::StatusOr<Model> model =
+      ReadHere(folder.Write("a.ply", Header("ascii", "2",
+                                            absl::StrCat(kXyz,
+                                                         "property int red\nproperty double "
+                                                         "green\nproperty uchar blue\n")) +
+                                         "0 0 0 255 0.5 7\n1 1 1 0 1 255\n"),
+               {});
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(model->parts[0].colors, (std::vector<Rgb>{{255, 128, 7}, {0, 255, 255}}));
+}
+
+// NaN in every spelling and byte order.
+TEST(PlyPoints, NotANumberInEverySpelling) {
+  TempFolder folder;
+  for (const char* nan : {"nan", "NaN", "-nan", "-nan(ind)", "nan(0x400)"}) {
+    const absl::StatusOr<Model> model = ReadHere(
+        folder.Write("a.ply", Header("ascii", "2", kXyz) + absl::StrCat("0 ", nan, " 0\n1 2 3\n")),
+        {});
+    ASSERT_THAT(model, IsOk()) << nan;
+    EXPECT_EQ(model->parts[0].positions, (std::vector<Point3>{{1, 2, 3}})) << nan;
+  }
+  for (const bool big : {false, true}) {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    std::string bytes = Header(big ? "binary_big_endian" : "binary_little_endian", "2",
+                               "property double x\nproperty double y\nproperty double z\n");
+    for (const double value : {1.0, 2.0, 3.0, 1.0, 2.0, nan}) bytes += Bytes(value, big);
+    const absl::StatusOr<Model> model = ReadHere(folder.Write("a.ply", bytes), {});
+    ASSERT_THAT(model, IsOk());
+    EXPECT_EQ(model->parts[0].positions, (std::vector<Point3>{{1, 2, 3}}));
+    EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"points that are not a number", 1}}));
+  }
+}
+
 std::string Lines(int count, const std::string& line) {
   std::string lines;
   for (int i = 0; i < count; ++i) absl::StrAppend(&lines, line, "\n");

@@ -62,7 +62,7 @@ absl::Status TooManyIndices(const SourceFile& file) {
                    "so large a model is not read; simplify it first");
 }
 
-// Reads "face" or "tristrips", in which −1 begins a new strip.
+// Reads "face" or "tristrips", in which −1 begins a new strip, or its bits as a number without a sign.
 absl::StatusOr<PlyFaces> ReadFaces(const SourceFile& file, const PlyElement& element,
                                    uint64_t vertices, bool strips, PlyValues* values) {
   const std::optional<size_t> list = IndexList(element);
@@ -73,13 +73,11 @@ absl::StatusOr<PlyFaces> ReadFaces(const SourceFile& file, const PlyElement& ele
                      "\"property list uchar int vertex_indices\" is expected");
   }
   if (element.count > kMaxModelIndices) return TooManyIndices(file);
-  const PlyColorProperties colors(element);
+  PlyColors colors(element);
   PlyFaces faces;
   for (size_t p = 0; p < element.properties.size(); ++p) {
     if (p != *list && colors.ChannelOf(p) < 0) ++faces.others;
   }
-  std::vector<float> floating;  // colors until their range is known
-  bool to_255 = false;
   const auto cut = [&](uint64_t number) {
     return FaceError(file, element, number, "is cut off or no number",
                      "the file is truncated or damaged");
@@ -105,7 +103,7 @@ absl::StatusOr<PlyFaces> ReadFaces(const SourceFile& file, const PlyElement& ele
         double index = 0;
         if (!values->Next(property.type, &index)) return cut(i);
         if (!indices) continue;
-        const bool restart = strips && index == -1;
+        const bool restart = strips && (index == -1 || index == kRestart);
         if (!restart &&
             !(index >= 0 && index < static_cast<double>(vertices) && index == std::floor(index))) {
           return FaceError(file, element, i, absl::StrCat("refers to vertex ", index),
@@ -115,16 +113,9 @@ absl::StatusOr<PlyFaces> ReadFaces(const SourceFile& file, const PlyElement& ele
         faces.vertices.push_back(restart ? kRestart : static_cast<uint32_t>(index));
       }
     }
-    if (!colors.found()) continue;
-    if (!colors.floating()) {
-      faces.colors.push_back(colors.ColorOf(color, false));
-      continue;
-    }
-    for (const double channel : color) floating.push_back(static_cast<float>(channel));
-    to_255 |= colors.IsBeyond1(color);
+    if (colors.found()) colors.Add(color);
   }
-  for (size_t i = 0; i + 2 < floating.size(); i += 3)
-    faces.colors.push_back(colors.ColorOf({floating[i], floating[i + 1], floating[i + 2]}, to_255));
+  faces.colors = std::move(colors).Finish();
   return faces;
 }
 

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
@@ -147,41 +148,66 @@ bool PlyValues::NextBinary(PlyType type, double* value) {
   return true;
 }
 
-PlyColorProperties::PlyColorProperties(const PlyElement& element) {
+PlyColors::PlyColors(const PlyElement& element) {
   for (size_t p = 0; p < element.properties.size(); ++p) {
     const PlyProperty& property = element.properties[p];
     const int channel = property.is_list ? -1 : ChannelByName(property.name);
     if (channel < 0 || at_[channel] >= 0) continue;
     at_[channel] = static_cast<int>(p);
     full_scale_[channel] = LargestOf(property.type);
-    floating_ |= IsFloating(property.type);
+    scales_[channel] = IsFloating(property.type)    ? Scale::kFractions
+                       : PlySize(property.type) > 1 ? Scale::kWholeNumbers
+                                                    : Scale::kOfType;
+    is_known_ &= scales_[channel] == Scale::kOfType;
   }
 }
 
-int PlyColorProperties::ChannelOf(size_t property) const {
+int PlyColors::ChannelOf(size_t property) const {
   for (int channel = 0; channel < 3; ++channel) {
     if (at_[channel] == static_cast<int>(property)) return channel;
   }
   return -1;
 }
 
-bool PlyColorProperties::IsBeyond1(const double (&channels)[3]) const {
-  bool beyond = false;
-  for (int c = 0; c < 3; ++c) beyond |= full_scale_[c] == 1 && channels[c] > 1;
-  return beyond;
+void PlyColors::Reserve(size_t entries) {
+  is_known_ ? colors_.reserve(entries) : numbers_.reserve(3 * entries);
 }
 
-Rgb PlyColorProperties::ColorOf(const double (&channels)[3], bool to_255) const {
-  const auto channel = [&](int c) {
-    const bool wide = to_255 && full_scale_[c] == 1;
-    return PlyChannel(channels[c], wide ? 255 : full_scale_[c]);
-  };
-  return {channel(0), channel(1), channel(2)};
+void PlyColors::Add(const double (&channels)[3]) {
+  if (is_known_) {
+    colors_.push_back(ColorOf(channels));
+    return;
+  }
+  for (int c = 0; c < 3; ++c) {
+    numbers_.push_back(static_cast<float>(channels[c]));
+    if (scales_[c] == Scale::kOfType || !std::isfinite(channels[c])) continue;
+    double& most = scales_[c] == Scale::kWholeNumbers ? most_whole_ : most_fraction_;
+    most = std::max(most, channels[c]);
+  }
+}
+
+Rgb PlyColors::ColorOf(const double (&channels)[3]) const {
+  return {PlyChannel(channels[0], full_scale_[0]), PlyChannel(channels[1], full_scale_[1]),
+          PlyChannel(channels[2], full_scale_[2])};
+}
+
+std::vector<Rgb> PlyColors::Finish() && {
+  if (is_known_) return std::move(colors_);
+  for (int c = 0; c < 3; ++c) {
+    if (scales_[c] == Scale::kFractions && most_fraction_ > 1) full_scale_[c] = 255;
+    if (scales_[c] != Scale::kWholeNumbers) continue;
+    if (most_whole_ <= 65535) full_scale_[c] = std::min(full_scale_[c], 65535.0);
+    if (most_whole_ <= 255) full_scale_[c] = 255;
+  }
+  colors_.reserve(numbers_.size() / 3);
+  for (size_t i = 0; i + 2 < numbers_.size(); i += 3)
+    colors_.push_back(ColorOf({numbers_[i], numbers_[i + 1], numbers_[i + 2]}));
+  return std::move(colors_);
 }
 
 absl::StatusOr<PlyVertices> ReadPlyVertices(const SourceFile& file, const PlyElement& vertex,
                                             bool attributes, PlyValues* values) {
-  const PlyColorProperties colors(vertex);
+  PlyColors colors(vertex);
   const size_t count = vertex.properties.size();
   std::vector<int> coordinates(count, -1);
   bool has[6] = {};
@@ -211,13 +237,9 @@ absl::StatusOr<PlyVertices> ReadPlyVertices(const SourceFile& file, const PlyEle
     out.attributes.push_back({property.name, {}});
     out.attributes.back().values.reserve(vertex.count);
   }
-  std::vector<float> floating;  // colors until their range is known
   out.positions.reserve(vertex.count);
   if (normals) out.normals.reserve(vertex.count);
-  if (colors.found()) {
-    (colors.floating() ? floating.reserve(3 * vertex.count) : out.colors.reserve(vertex.count));
-  }
-  bool to_255 = false;
+  if (colors.found()) colors.Reserve(vertex.count);
   for (uint64_t i = 0; i < vertex.count; ++i) {
     double at[6] = {}, color[3] = {};
     for (size_t p = 0, number = 0; p < count; ++p) {
@@ -231,16 +253,9 @@ absl::StatusOr<PlyVertices> ReadPlyVertices(const SourceFile& file, const PlyEle
     }
     out.positions.push_back({at[0], at[1], at[2]});
     if (normals) out.normals.push_back(UnitOrZero({at[3], at[4], at[5]}));
-    if (!colors.found()) continue;
-    if (!colors.floating()) {
-      out.colors.push_back(colors.ColorOf(color, false));
-      continue;
-    }
-    for (const double channel : color) floating.push_back(static_cast<float>(channel));
-    to_255 |= colors.IsBeyond1(color);
+    if (colors.found()) colors.Add(color);
   }
-  for (size_t i = 0; i + 2 < floating.size(); i += 3)
-    out.colors.push_back(colors.ColorOf({floating[i], floating[i + 1], floating[i + 2]}, to_255));
+  out.colors = std::move(colors).Finish();
   return out;
 }
 

@@ -1,6 +1,7 @@
 // The body of a PLY file, value by value, and its vertices, which clouds and meshes share.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -32,25 +33,34 @@ class PlyValues {
   PlyHeader::Format format_;
 };
 
-// Where the values of an element's colors stand: of each channel the property's index, and the number that is as bright as can be.
-class PlyColorProperties {
+// The colors of an element's entries, in properties of any type. Numbers of 8 bits are as bright as can be at their greatest value.
+// The scale of others is that of the greatest number in the whole file: exporters write 0 to 255 in whatever type they have.
+class PlyColors {
  public:
-  explicit PlyColorProperties(const PlyElement& element);
-  // Whether there are all three.
+  explicit PlyColors(const PlyElement& element);
+  // Whether there are all three channels.
   bool found() const { return at_[0] >= 0 && at_[1] >= 0 && at_[2] >= 0; }
-  // Whether a channel is a floating-point number. Such colors go to 1, or to 255 where one of them is greater than 1.
-  bool floating() const { return floating_; }
   // 0 to 2; −1: the property is no channel.
   int ChannelOf(size_t property) const;
-  // Whether a floating-point channel is greater than 1, so that all of them go to 255.
-  bool IsBeyond1(const double (&channels)[3]) const;
-  // With `to_255` floating-point numbers go to 255.
-  Rgb ColorOf(const double (&channels)[3], bool to_255) const;
+  void Reserve(size_t entries);
+  // Takes the color of the next entry.
+  void Add(const double (&channels)[3]);
+  // Returns: the colors of all entries.
+  std::vector<Rgb> Finish() &&;
 
  private:
-  int at_[3] = {-1, -1, -1};
+  // Which number is as bright as can be.
+  enum class Scale : uint8_t { kOfType, kWholeNumbers, kFractions };
+
+  Rgb ColorOf(const double (&channels)[3]) const;
+
+  int at_[3] = {-1, -1, -1};  // of each channel the property's index
+  Scale scales_[3] = {};
   double full_scale_[3] = {1, 1, 1};
-  bool floating_ = false;
+  double most_whole_ = 0, most_fraction_ = 0;  // of all entries
+  bool is_known_ = true;                       // whether all scales are those of their types
+  std::vector<Rgb> colors_;
+  std::vector<float> numbers_;  // until the scales are known, instead of `colors_`
 };
 
 struct PlyVertices {
