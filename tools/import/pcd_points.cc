@@ -320,7 +320,7 @@ absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file, bool attributes) {
   absl::StatusOr<PcdHeader> header = ReadPcdHeader(file);
   if (!header.ok()) return header.status();
   std::array<bool, kPointColumns> has = {};
-  bool floats = false;  // colours whose scale depends on their greatest value
+  bool floats = false, wide = false;  // colours whose scale depends on their greatest value
   std::vector<std::string> names;
   uint64_t others = 0;
   for (Field& field : header->fields) {
@@ -337,7 +337,10 @@ absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file, bool attributes) {
       }
     } else if (const auto column = PointColumnOf(field.name)) {
       has[static_cast<size_t>(*column)] = true;
-      if (IsColor(*column) && field.type == 'F') floats = true;
+      if (IsColor(*column)) {
+        floats |= field.type == 'F';
+        wide |= field.type != 'F' && field.size > 1;
+      }
     }
   }
   std::string decompressed;
@@ -354,7 +357,7 @@ absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file, bool attributes) {
                       by_field, take);
   };
   double greatest = floats ? 0 : 255;
-  if (floats) {
+  if (floats || wide) {
     const absl::Status looked = read([&](const PcdPoint& point, uint64_t) {
       for (const PointColumn c : {PointColumn::kRed, PointColumn::kGreen, PointColumn::kBlue}) {
         greatest = std::max(greatest, point.row[static_cast<size_t>(c)]);

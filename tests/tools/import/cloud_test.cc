@@ -209,6 +209,75 @@ TEST_F(Clouds, PcdColoursByTheirGreatestValue) {
               ElementsAre(Rgb{255, 128, 0}, Rgb{0, 64, 255}));
   EXPECT_THAT(colors("U U U", "1 0 0", "0 1 1"), ElementsAre(Rgb{1, 0, 0}, Rgb{0, 1, 1}))
       << "whole numbers count to 255";
+  EXPECT_THAT(colors("U U U", "65535 0 32896", "0 257 65535"),
+              ElementsAre(Rgb{255, 0, 128}, Rgb{0, 1, 255}))
+      << "or to 65535";
+  // As bytes, and as numbers of 16 bits.
+  const auto binary = [&](const std::string& each, const std::string& rgb) {
+    return Points("b.pcd",
+                  absl::StrCat("FIELDS x y z r g b\nSIZE 4 4 4 ", each, " ", each, " ", each,
+                               "\nTYPE F F F U U U\nWIDTH 1\nHEIGHT 1\nDATA binary\n", Bytes(0.f),
+                               Bytes(0.f), Bytes(0.f), rgb))
+        .colors;
+  };
+  EXPECT_THAT(binary("1", "\xff\x80\x01"), ElementsAre(Rgb{255, 128, 1}));
+  EXPECT_THAT(binary("2", std::string("\xff\0\x80\0\x01\0", 6)), ElementsAre(Rgb{255, 128, 1}));
+  EXPECT_THAT(binary("2", std::string("\xff\xff\x80\x80\x01\x01", 6)),
+              ElementsAre(Rgb{255, 128, 1}));
+}
+
+// Padding that PCL calls "_", of one byte and of many, at every place in a point and in every way to write the data.
+TEST_F(Clouds, PcdPaddingIsPassedOver) {
+  const std::vector<Point3> positions = {{1, 2, 3}, {4, 5, 6}};
+  const std::vector<Rgb> colors = {{255, 0, 0}, {0, 128, 255}};
+  const std::string head =
+      "FIELDS _ x y z _ rgb _\nSIZE 1 4 4 4 1 4 2\nTYPE I F F F U U F\nCOUNT 3 1 1 1 4 1 6\nWIDTH "
+      "2\nHEIGHT 1\nPOINTS 2\nDATA ";
+  const auto expect = [&](const std::string& text) {
+    const auto model = Import("a.pcd", text);
+    ASSERT_THAT(model, IsOk());
+    EXPECT_EQ(model->parts[0].positions, positions);
+    EXPECT_EQ(model->parts[0].colors, colors);
+    EXPECT_THAT(model->left_out, IsEmpty());
+    const auto attributes = ReadHere(folder_.Path("a.pcd"), {.attributes = true});
+    ASSERT_THAT(attributes, IsOk());
+    EXPECT_THAT(attributes->parts[0].attributes, IsEmpty());
+  };
+  expect(head +
+         "ascii\n9 9 9 1 2 3 7 7 7 7 16711680 0 0 0 0 0 nan\n9 9 9 4 5 6 7 7 7 7 33023 1 1 1 1 1 "
+         "1\n");
+  const std::string before(3, '\x11'), between(4, '\x22'), behind(12, '\x33');
+  const std::vector<std::vector<std::string>> fields = {
+      {before, before},         {Bytes(1.f), Bytes(4.f)},
+      {Bytes(2.f), Bytes(5.f)}, {Bytes(3.f), Bytes(6.f)},
+      {between, between},       {Bytes(uint32_t{0xffff0000}), Bytes(uint32_t{0xff0080ff})},
+      {behind, behind}};
+  std::string rows, columns;
+  for (size_t point = 0; point < 2; ++point) {
+    for (const auto& field : fields) rows += field[point];
+  }
+  for (const auto& field : fields) columns += field[0] + field[1];
+  expect(head + "binary\n" + rows);
+  ASSERT_EQ(columns.size(), 70u);
+  // Runs of at most 32 bytes that stand as they are.
+  const std::string packed =
+      absl::StrCat(std::string(1, 31), columns.substr(0, 32), std::string(1, 31),
+                   columns.substr(32, 32), std::string(1, 5), columns.substr(64));
+  expect(head + "binary_compressed\n" + Bytes(static_cast<uint32_t>(packed.size())) +
+         Bytes(uint32_t{70}) + packed);
+}
+
+TEST_F(Clouds, PcdPackedColoursOfEveryTypeInBinary) {
+  for (const char* type : {"I", "U", "F"}) {
+    for (const char* name : {"rgb", "rgba"}) {
+      const Part part = Points(
+          "a.pcd", absl::StrCat("FIELDS x y z ", name, "\nSIZE 8 8 8 4\nTYPE F F F ", type,
+                                "\nCOUNT 1 1 1 1\nWIDTH 1\nHEIGHT 1\nDATA binary\n", Bytes(1.5),
+                                Bytes(-2.0), Bytes(1e9), Bytes(uint32_t{0xffff8000})));
+      EXPECT_THAT(part.positions, ElementsAre(Point3{1.5, -2, 1e9})) << type;
+      EXPECT_THAT(part.colors, ElementsAre(Rgb{255, 128, 0})) << name << " " << type;
+    }
+  }
 }
 
 TEST_F(Clouds, PcdPointsThatAreNowhereAreLeftOut) {
@@ -389,6 +458,20 @@ TEST_F(Clouds, LasInEveryPointFormat) {
       EXPECT_THAT(part.colors, ElementsAre(Rgb{0, 0, 0}, Rgb{255, 255, 255})) << int{c.format};
     }
   }
+}
+
+// Whether colours have 8 or 16 bits is a question of the whole file: a dark point of 16 bits stays dark.
+TEST_F(Clouds, LasColoursHaveTheBitsOfTheBrightest) {
+  const auto colors = [&](std::vector<LasPoint> points) {
+    return Points("a.las", Las(2, 2, 26, 20, points)).colors;
+  };
+  EXPECT_THAT(colors({{0, 0, 0, 1, 0, {65535, 0, 0}}, {1, 0, 0, 1, 0, {255, 200, 0}}}),
+              ElementsAre(Rgb{255, 0, 0}, Rgb{1, 1, 0}));
+  EXPECT_THAT(colors({{0, 0, 0, 1, 0, {255, 200, 0}}, {1, 0, 0, 1, 0, {0, 256, 0}}}),
+              ElementsAre(Rgb{1, 1, 0}, Rgb{0, 1, 0}))
+      << "one beyond 8 bits is enough, wherever it is";
+  EXPECT_THAT(colors({{0, 0, 0, 1, 0, {255, 200, 0}}, {1, 0, 0, 1, 0, {0, 64, 1}}}),
+              ElementsAre(Rgb{255, 200, 0}, Rgb{0, 64, 1}));
 }
 
 TEST_F(Clouds, LasColoursOfEightBitsAndPointsThatAreWithheld) {
