@@ -69,6 +69,45 @@ TEST(GeoJson, GeometriesWithoutCoordinatesAreCounted) {
   EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"geometries without coordinates", 7}}));
 }
 
+TEST(GeoJson, EmptyPartsOfAGeometryAreCounted) {
+  const absl::StatusOr<Model> model = ImportText(
+      R"({"type":"GeometryCollection","geometries":[{"type":"Polygon","coordinates":[[]]},)"
+      R"({"type":"MultiPolygon","coordinates":[[[]],[]]},)"
+      R"({"type":"MultiLineString","coordinates":[[],[[0,0],[10,0]]]}]})",
+      false);
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(Segments(model->parts[0]).size(), 1u);
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"geometries without coordinates", 4}}));
+}
+
+TEST(TopoJson, GeometriesWithoutArcsOrCoordinatesAreCounted) {
+  const absl::StatusOr<Model> model = ImportText(
+      R"({"type":"Topology","objects":{"a":{"type":"GeometryCollection","geometries":[{"type":null},)"
+      R"({"type":"LineString","arcs":[]},{"type":"Polygon","arcs":[]},{"type":"Polygon","arcs":[[]]},)"
+      R"({"type":"MultiPolygon","arcs":[[[]]]},{"type":"MultiLineString","arcs":[[],[0]]},)"
+      R"({"type":"Point","coordinates":[]},{"type":"MultiPoint","coordinates":[]}]}},)"
+      R"("arcs":[[[0,0],[10,0]]]})",
+      false, "map.topojson");
+  ASSERT_THAT(model, IsOk());
+  ASSERT_EQ(model->parts.size(), 1u);
+  EXPECT_EQ(Segments(model->parts[0]).size(), 1u);
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"geometries without coordinates", 8}}));
+}
+
+TEST(MapText, MayBeginWithAByteOrderMarkOfUtf8) {
+  const std::string topology =
+      R"({"type":"Topology","objects":{"a":{"type":"LineString","arcs":[0]}},"arcs":[[[0,0],[9,0]]]})";
+  for (const std::string& text : {Line("[[0,0],[9,0]]"), topology}) {
+    for (const char* name : {"map.geojson", "map.topojson", "map.json"}) {
+      for (const char* before : {"\xef\xbb\xbf", "\xef\xbb\xbf \r\n", " \n"}) {
+        const absl::StatusOr<Model> model = ImportText(before + text, false, name);
+        ASSERT_THAT(model, IsOk()) << name;
+        EXPECT_EQ(Segments(model->parts[0]).size(), 1u);
+      }
+    }
+  }
+}
+
 std::vector<double> ValuesOf(const Part& part, const std::string& name) {
   for (const Attribute& one : part.attributes) {
     if (one.name == name) return one.values;
@@ -336,6 +375,9 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         BadMap{"white", "   \n ", {"nothing but white space"}},
         BadMap{"picture", "GIF89a", {"a GIF picture", "JSON"}},
+        BadMap{"utf16", std::string("\xff\xfe{\0", 4), {"UTF-16 text", "UTF-8"}},
+        BadMap{"utf16_big", std::string("\xfe\xff\0{", 4), {"UTF-16 text", "UTF-8"}},
+        BadMap{"two_marks", "\xef\xbb\xbf\xef\xbb\xbf{}", {"JSON in UTF-8 is expected"}},
         BadMap{"truncated",
                R"({"type":"FeatureCollection","features":[{"type":)",
                {"unfinished", "truncated"}},

@@ -17,8 +17,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr char kNowhere[] = "geometries without coordinates";
-
 // Depth of what it walks is bounded by ParseJson.
 class GeoJsonReader {
  public:
@@ -56,6 +54,11 @@ absl::Status GeoJsonReader::ReadPosition(const json& position, const std::string
 // depth 0: one position; 1: a line of positions; more: arrays of such.
 absl::Status GeoJsonReader::ReadCoordinates(const json& coordinates, const std::string& where,
                                             int depth, bool closed, bool points) {
+  // RFC 7946, 3.1: an empty array means the same as null. Exporters write one for each empty part, too.
+  if (coordinates.is_array() && coordinates.empty()) {
+    lines_.LeaveOut(kNoCoordinates);
+    return absl::OkStatus();
+  }
   if (depth == 0) {
     LonLat point;
     absl::Status status = ReadPosition(coordinates, where, &point);
@@ -116,7 +119,7 @@ absl::Status GeoJsonReader::ReadObject(const json& object, const std::string& wh
     const auto properties = object.find("properties");
     lines_.BeginFeature(FeatureOf(properties == object.end() ? nullptr : &*properties, &lines_));
     if (!geometry->is_null()) return ReadObject(*geometry, absl::StrCat(where, ".geometry"));
-    lines_.LeaveOut(kNowhere);
+    lines_.LeaveOut(kNoCoordinates);
     return absl::OkStatus();
   }
   for (const Shape& shape : kShapes) {
@@ -124,11 +127,6 @@ absl::Status GeoJsonReader::ReadObject(const json& object, const std::string& wh
     const auto coordinates = object.find("coordinates");
     const std::string at = absl::StrCat(where, ".coordinates");
     if (coordinates == object.end()) return Wrong(at, "an array");
-    // RFC 7946, 3.1: an empty array means the same as null.
-    if (coordinates->is_array() && coordinates->empty()) {
-      lines_.LeaveOut(kNowhere);
-      return absl::OkStatus();
-    }
     return ReadCoordinates(*coordinates, at, shape.depth, shape.closed, shape.points);
   }
   return FileError(

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <string_view>
 
 #include "absl/status/statusor.h"
 #include "tools/voxelctl/import/map_lines.h"
@@ -9,6 +10,8 @@
 #include "tools/voxelctl/import/source_file.h"
 
 namespace voxeld::voxelctl {
+
+inline constexpr std::string_view kNoCoordinates = "geometries without coordinates";
 
 // Reads properties: the colours of simplestyle 1.1 (stroke, or else fill, and marker-color with their opacities) and all numbers. Counts
 // in `lines` what of a style is not drawn. Nothing if `properties` is null or not an object.

@@ -12,7 +12,8 @@ absl::StatusOr<nlohmann::json> ParseJson(const SourceFile& file, absl::string_vi
   if (absl::StartsWith(text, "\xef\xbb\xbf")) text.remove_prefix(3);
   const absl::string_view body = absl::StripLeadingAsciiWhitespace(text);
   if (body.empty() || (body.front() != '{' && body.front() != '[')) {
-    return FileError(file, absl::StrCat("is ", DescribeContents(text)), "JSON is expected");
+    return FileError(file, absl::StrCat("is ", DescribeContents(text)),
+                     "JSON in UTF-8 is expected");
   }
   if (const int depth = JsonDepth({text.data(), text.size()}); depth > kMaxJsonDepth) {
     return FileError(file, absl::StrCat("nests ", depth, " deep"),

@@ -134,6 +134,8 @@ std::string DescribeContents(absl::string_view bytes) {
       {"solid", "text as in an ASCII STL"},
       {"Kaydara FBX", "an FBX file"},
       {"BLENDER", "a Blender file"},
+      {"\xff\xfe", "UTF-16 text"},
+      {"\xfe\xff", "UTF-16 text"},
       {"<?xml", "XML text"},
       {"<!DOCTYPE", "an HTML page"},
       {"<html", "an HTML page"},

@@ -74,6 +74,7 @@ absl::Status TopoJsonReader::ReadTransform(const json& document) {
 absl::Status TopoJsonReader::MarkArcs(const json& arcs, const std::string& where,
                                       uint32_t feature) {
   if (arcs.is_array()) {
+    if (arcs.empty()) lines_.LeaveOut(kNoCoordinates);
     for (const json& item : arcs) {
       absl::Status status = MarkArcs(item, where, feature);
       if (!status.ok()) return status;
@@ -95,6 +96,7 @@ absl::Status TopoJsonReader::MarkArcs(const json& arcs, const std::string& where
 // One position, or an array of them. Positions are never deltas.
 absl::Status TopoJsonReader::ReadPoints(const json& coordinates, const std::string& where) {
   if (coordinates.is_array() && (coordinates.empty() || coordinates[0].is_array())) {
+    if (coordinates.empty()) lines_.LeaveOut(kNoCoordinates);
     for (const json& item : coordinates) {
       absl::Status status = ReadPoints(item, where);
       if (!status.ok()) return status;
@@ -111,7 +113,7 @@ absl::Status TopoJsonReader::ReadGeometry(const json& geometry, const std::strin
   if (!geometry.is_object()) return Wrong(where, "an object");
   const auto type = geometry.find("type");
   if (type == geometry.end() || type->is_null()) {
-    lines_.LeaveOut("geometries without coordinates");
+    lines_.LeaveOut(kNoCoordinates);
     return absl::OkStatus();
   }
   const auto member = [&](const char* key) -> const json* {
