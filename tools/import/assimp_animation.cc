@@ -135,7 +135,9 @@ class AnimationFrames final : public FrameSource {
     }
     animation_ = scene_->mAnimations[number - 1];
     const double ticks = animation_->mTicksPerSecond > 0 ? animation_->mTicksPerSecond : kTicks;
-    const double seconds = animation_->mDuration / ticks;
+    // In BVH every frame lasts a tick, the last one too; the library's duration ends where that one begins.
+    const bool has_last = file_.extension == "bvh" && animation_->mDuration > 0;
+    const double seconds = (animation_->mDuration + (has_last ? 1 : 0)) / ticks;
     if (!(seconds >= 0) || !(seconds * fps <= static_cast<double>(kMaxFrames))) {
       return FileError(
           file_, absl::StrCat("has an animation of ", seconds, " s"),

@@ -13,10 +13,12 @@
 #include <limits>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
 #include "tests/tools/import/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
@@ -26,6 +28,7 @@ namespace voxeld::voxelctl {
 namespace animation_test {
 
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 std::string ModelFile(const std::string& name) {
@@ -133,6 +136,82 @@ TEST(Animations, OfASkeletonAlone) {
     };
     EXPECT_NEAR(length(a), length(b), 1e-3 + 1e-3 * length(a)) << i;
   }
+}
+
+// A root that moves, a joint, and an end, 4 apart; `order` are the channels of turns of both, `frames` their numbers, 0.05 s each.
+std::string Bvh(const std::string& order, const std::vector<std::string>& frames) {
+  std::string text = absl::StrCat(
+      "HIERARCHY\nROOT hips\n{\n\tOFFSET 0 0 0\n\tCHANNELS 6 Xposition Yposition Zposition ", order,
+      "\n\tJOINT spine\n\t{\n\t\tOFFSET 0 4 0\n\t\tCHANNELS 3 ", order,
+      "\n\t\tEnd Site\n\t\t{\n\t\t\tOFFSET 0 4 0\n\t\t}\n\t}\n}\nMOTION\nFrames: ", frames.size(),
+      "\nFrame Time: 0.05\n");
+  for (const std::string& frame : frames) absl::StrAppend(&text, frame, "\n");
+  return text;
+}
+
+// Where the joint and the end are in each frame of a file, at so many frames a second.
+std::vector<std::pair<Point3, Point3>> Poses(const std::string& bytes, double fps) {
+  TempFolder folder;
+  const auto frames = OpenAnimation(folder.Write("a.bvh", bytes), 1, fps);
+  EXPECT_THAT(frames, IsOk());
+  std::vector<std::pair<Point3, Point3>> poses;
+  for (int64_t i = 0; frames.ok() && i < (*frames)->count(); ++i) {
+    const auto model = (*frames)->Read(i);
+    EXPECT_THAT(model, IsOk());
+    if (!model.ok()) break;
+    const std::vector<Point3>& at = model->parts.at(0).positions;
+    EXPECT_EQ(at.size(), 4u);
+    if (at.size() == 4) poses.emplace_back(at[1], at[3]);
+  }
+  return poses;
+}
+
+MATCHER_P2(AreNear, joint, end, "") {
+  const auto apart = [](const Point3& a, const Point3& b) {
+    return std::hypot(a.x - b.x, a.y - b.y, a.z - b.z);
+  };
+  return apart(arg.first, joint) < 1e-4 && apart(arg.second, end) < 1e-4;
+}
+
+// A frame lasts as long as the file says, the last one too.
+TEST(Animations, OfASkeletonShowEveryFrame) {
+  const auto upright = AreNear(Point3{0, 4, 0}, Point3{0, 8, 0}),
+             lying = AreNear(Point3{-4, 0, 0}, Point3{-8, 0, 0}),
+             far = AreNear(Point3{1, 6, 3}, Point3{1, 10, 3});
+  const double r = std::sqrt(0.5);
+  const auto between = AreNear(Point3{-4 * r, 4 * r, 0}, Point3{-8 * r, 8 * r, 0});
+  const std::string zxy = "Zrotation Xrotation Yrotation";
+  const std::string two = Bvh(zxy, {"0 0 0 0 0 0 0 0 0", "0 0 0 90 0 0 0 0 0"});
+  for (const std::string& bytes : {two, absl::StrReplaceAll(two, {{"\n", "\r\n"}})}) {
+    EXPECT_THAT(Poses(bytes, 20), ElementsAre(upright, lying));
+    EXPECT_THAT(Poses(bytes, 40), ElementsAre(upright, between, lying, lying));
+    EXPECT_THAT(Poses(bytes, 10), ElementsAre(upright));
+  }
+  EXPECT_THAT(Poses(Bvh(zxy, {"0 0 0 0 0 0 0 0 0", "0 0 0 90 0 0 0 0 0", "1 2 3 0 0 0 0 0 0"}), 20),
+              ElementsAre(upright, lying, far));
+  EXPECT_THAT(Poses(Bvh(zxy, {"1 2 3 0 0 0 0 0 0"}), 20), ElementsAre(far));
+}
+
+// Turns are applied from the last channel to the first, about the axes of what is above.
+TEST(Animations, OfASkeletonTurnInTheOrderOfItsChannels) {
+  const auto second = [](const std::string& order, const std::string& turns) {
+    const auto poses = Poses(Bvh(order, {"0 0 0 0 0 0 0 0 0", turns}), 20);
+    EXPECT_EQ(poses.size(), 2u);
+    return poses.empty() ? std::pair<Point3, Point3>() : poses.back();
+  };
+  // About x first: y becomes z, which a turn about z leaves where it is.
+  EXPECT_THAT(second("Zrotation Xrotation Yrotation", "1 2 3 90 90 0 0 0 0"),
+              AreNear(Point3{1, 2, 7}, Point3{1, 2, 11}));
+  // About z first: y becomes -x, which a turn about x leaves where it is.
+  EXPECT_THAT(second("Xrotation Yrotation Zrotation", "1 2 3 90 0 90 0 0 0"),
+              AreNear(Point3{-3, 2, 3}, Point3{-7, 2, 3}));
+  EXPECT_THAT(second("Yrotation Xrotation Zrotation", "0 0 0 90 90 0 0 0 0"),
+              AreNear(Point3{4, 0, 0}, Point3{8, 0, 0}));
+  // The joint alone.
+  EXPECT_THAT(second("Zrotation Xrotation Yrotation", "0 0 0 0 0 0 0 90 0"),
+              AreNear(Point3{0, 4, 0}, Point3{0, 4, 4}));
+  EXPECT_THAT(second("Zrotation Xrotation Yrotation", "0 0 0 90 0 0 0 90 0"),
+              AreNear(Point3{-4, 0, 0}, Point3{-4, 0, 4}));
 }
 
 TEST(Animations, OfAMeshOnItsBones) {
