@@ -206,8 +206,10 @@ class NiftiReader {
     }
     Model model;
     model.path = file_.path;
-    model.format = absl::StrCat(is_second_ ? "NIfTI-2" : "NIfTI", head_.apart ? ", two files" : "",
-                                packed ? ", compressed" : "");
+    model.format = absl::StrCat(is_analyze_  ? "ANALYZE 7.5"
+                                : is_second_ ? "NIfTI-2"
+                                             : "NIfTI",
+                                head_.apart ? ", two files" : "", packed ? ", compressed" : "");
     model.up = Up::kZ;
     const uint64_t times = head_.dim[0] >= 4 ? static_cast<uint64_t>(head_.dim[4]) : 1;
     AddLeftOut("further times", times - 1, &model);
@@ -235,12 +237,14 @@ class NiftiReader {
       head_ = HeadOf(first, !one);
       return absl::OkStatus();
     }
+    if (TakeAnalyze()) return absl::OkStatus();
     std::memcpy(&second, head->data(), std::min(head->size(), kHeader2));
     const bool both = std::memcmp(second.magic, "n+2", 4) == 0;
     if (head->size() < kHeader2 || (!both && std::memcmp(second.magic, "ni2", 4) != 0)) {
       return FileError(
           file_, absl::StrCat("is ", DescribeContents(*head)),
-          "a header of NIfTI is expected (magic \"n+1\" at byte 344, or \"n+2\" at 4)");
+          "a header of NIfTI is expected (magic \"n+1\" at byte 344, or \"n+2\" at 4), or in a "
+          "file .hdr one of ANALYZE 7.5");
     }
     is_second_ = true;
     code_.big_endian = second.sizeof_hdr != kHeader2;
@@ -248,6 +252,29 @@ class NiftiReader {
     if (second.sizeof_hdr != kHeader2) return WrongSize(second.sizeof_hdr, kHeader2);
     head_ = HeadOf(second, !both);
     return absl::OkStatus();
+  }
+
+  // ANALYZE 7.5, which NIfTI-1 was made from, has no magic: its header's size is known, and the extensions of its two files.
+  bool TakeAnalyze() {
+    const std::string path = absl::AsciiStrToLower(file_.path);
+    nifti_1_header header = first_;
+    const bool big_endian = header.sizeof_hdr != kHeader1;
+    if (big_endian) swap_nifti_header(&header, 0);
+    if (header.sizeof_hdr != kHeader1 ||
+        !(absl::EndsWith(path, ".hdr") || absl::EndsWith(path, ".hdr.gz"))) {
+      return false;
+    }
+    code_.big_endian = big_endian;
+    first_ = header;
+    head_ = HeadOf(first_, true);
+    is_analyze_ = true;
+    // It has other fields in their places, and x goes to the left (nifti1.h).
+    head_.slope = head_.intercept = 0;
+    first_.qform_code = first_.sform_code = 0;
+    first_.pixdim[0] = 1;
+    first_.pixdim[1] = first_.pixdim[1] == 0 ? -1 : -std::abs(first_.pixdim[1]);
+    std::memcpy(first_.magic, "ni1", sizeof(first_.magic));
+    return true;
   }
 
   absl::Status WrongSize(int says, size_t right) const {
@@ -305,11 +332,19 @@ class NiftiReader {
     return absl::OkStatus();
   }
 
+  // The standard leaves the steps along axes that a volume does not have without a meaning, and some programs write 0. The library
+  // takes those for steps of no length.
+  template <typename Header>
+  static Header WithSteps(Header header) {
+    for (auto axis = header.dim[0] + 1; axis <= 3; ++axis) header.pixdim[axis] = 1;
+    return header;
+  }
+
   // The library knows how quaternions become a matrix; it sees a header that has been checked, and nothing else.
   absl::Status Place(SampledVolume* volume) const {
     const std::unique_ptr<nifti_image, FreeImage> image(
-        is_second_ ? nifti_convert_n2hdr2nim(second_, nullptr)
-                   : nifti_convert_n1hdr2nim(first_, nullptr));
+        is_second_ ? nifti_convert_n2hdr2nim(WithSteps(second_), nullptr)
+                   : nifti_convert_n1hdr2nim(WithSteps(first_), nullptr));
     if (image == nullptr)
       return FileError(file_, "could not be read as NIfTI", "the header is damaged");
     const nifti_dmat44& m = image->sform_code > 0 ? image->sto_xyz : image->qto_xyz;
@@ -324,6 +359,7 @@ class NiftiReader {
   nifti_1_header first_ = {};
   alignas(8) nifti_2_header second_ = {};
   bool is_second_ = false;  // which of them the file has
+  bool is_analyze_ = false;
   SampleCode code_;
   size_t channels_ = 0;  // of colours; 0: numbers
   std::array<uint64_t, 3> size_ = {1, 1, 1};

@@ -6,11 +6,13 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -37,6 +39,24 @@ std::string Nifti(const std::vector<int16_t>& dim, int16_t type, const std::stri
   Put<float>(&out, 108, 352);
   std::memcpy(out.data() + 344, "n+1", 4);
   return out + samples;
+}
+
+// Reverses the bytes of `count` numbers of `each` bytes.
+void Turn(std::string* bytes, size_t at, size_t each, size_t count) {
+  for (size_t i = 0; i < count; ++i)
+    std::reverse(bytes->begin() + static_cast<std::ptrdiff_t>(at + i * each),
+                 bytes->begin() + static_cast<std::ptrdiff_t>(at + (i + 1) * each));
+}
+
+// The numbers of NIfTI-1's header that the reader uses.
+void TurnHeader(std::string* bytes) {
+  Turn(bytes, 0, 4, 1);
+  Turn(bytes, 40, 2, 8);
+  Turn(bytes, 70, 2, 1);
+  Turn(bytes, 76, 4, 11);  // pixdim, vox_offset, scl_slope, scl_inter
+  Turn(bytes, 124, 4, 2);
+  Turn(bytes, 252, 2, 2);
+  Turn(bytes, 256, 4, 18);
 }
 
 TEST_F(Volumes, NiftiOfEveryKind) {
@@ -101,22 +121,19 @@ TEST_F(Volumes, Nifti2) {
 
 // Every number of a big-endian header and of its samples lies the other way.
 TEST_F(Volumes, NiftiOfTheOtherEnd) {
-  const auto turn = [](std::string* bytes, size_t at, size_t each, size_t count) {
-    for (size_t i = 0; i < count; ++i)
-      std::reverse(bytes->begin() + static_cast<std::ptrdiff_t>(at + i * each),
-                   bytes->begin() + static_cast<std::ptrdiff_t>(at + (i + 1) * each));
-  };
   std::string one = Nifti({3, 2, 1, 1}, 4, std::string("\x01\x02\xff\xfe", 4));
-  turn(&one, 0, 4, 1);
-  turn(&one, 40, 2, 8);
-  turn(&one, 70, 2, 1);
-  turn(&one, 76, 4, 9);
+  TurnHeader(&one);
   EXPECT_THAT(Read("a.nii", one).samples, ElementsAre(258, -2));
+  std::string scaled = Nifti({3, 2, 1, 1}, 4, std::string("\x01\x02\xff\xfe", 4));
+  Put<float>(&scaled, 112, 2);
+  Put<float>(&scaled, 116, -5);
+  TurnHeader(&scaled);
+  EXPECT_THAT(Read("a.nii", scaled).samples, ElementsAre(511, -9));
   std::string two = Nifti2({3, 2, 1, 1}, 4, std::string("\x01\x02\xff\xfe", 4));
-  turn(&two, 0, 4, 1);
-  turn(&two, 12, 2, 1);
-  turn(&two, 16, 8, 8);
-  turn(&two, 104, 8, 9);
+  Turn(&two, 0, 4, 1);
+  Turn(&two, 12, 2, 1);
+  Turn(&two, 16, 8, 8);
+  Turn(&two, 104, 8, 9);
   EXPECT_THAT(Read("a.nii", two).samples, ElementsAre(258, -2));
 }
 
@@ -133,6 +150,48 @@ TEST_F(Volumes, NiftiInTwoFiles) {
   EXPECT_THAT(Error("a.img", "x56"), HasSubstr("a.img: has 2 bytes of samples"));
   folder_.Write("c.img.gz", Gzip("x5678"));
   EXPECT_THAT(Read("c.hdr", header).samples, ElementsAre('5', '6', '7', '8'));
+}
+
+// The header from which NIfTI's was made: without a magic, with other fields in the places of the slope, the turn and the matrix.
+TEST_F(Volumes, Analyze) {
+  std::string header = Nifti({4, 2, 2, 2, 1}, 4, "").substr(0, 348);
+  Put<float>(&header, 76, 0);
+  Put<float>(&header, 108, 0);
+  Put<float>(&header, 112, 7);
+  Put<float>(&header, 116, 9);
+  header.replace(252, 96, std::string(96, '\x01'));
+  header.replace(344, 4, std::string(4, '\0'));
+  std::string samples;
+  for (int16_t i = 0; i < 8; ++i)
+    Put<int16_t>(&samples, samples.size(), static_cast<int16_t>(i - 4));
+  const std::string big_endian_samples = [&] {
+    std::string bytes = samples;
+    Turn(&bytes, 0, 2, 8);
+    return bytes;
+  }();
+  folder_.Write("a.img", samples);
+  folder_.Write("b.img.gz", Gzip(big_endian_samples));
+  std::string turned = header;
+  Turn(&turned, 0, 4, 1);
+  Turn(&turned, 40, 2, 8);
+  Turn(&turned, 70, 2, 2);
+  Turn(&turned, 76, 4, 8);
+  for (const auto& [name, bytes, format] :
+       {std::tuple("a.hdr", header, "ANALYZE 7.5, two files"),
+        {"b.hdr", turned, "ANALYZE 7.5, two files, compressed"}}) {
+    const auto model = Import(name, bytes);
+    ASSERT_THAT(model, IsOk()) << name;
+    EXPECT_EQ(model->format, format);
+    const SampledVolume& volume = model->volumes[0];
+    EXPECT_THAT(volume.samples, ElementsAre(-4, -3, -2, -1, 0, 1, 2, 3));
+    // x goes to the left of the head, which is to the viewer's right.
+    EXPECT_EQ(volume.corners[0], (Point3{-0.5, 1, -1.5}));
+    EXPECT_EQ(volume.corners[7], (Point3{1.5, -3, 4.5}));
+  }
+  EXPECT_THAT(Read("a.img", samples).samples, ElementsAre(-4, -3, -2, -1, 0, 1, 2, 3));
+  EXPECT_THAT(Error("a.nii", header), HasSubstr("a header of NIfTI is expected"));
+  Put<int16_t>(&header, 40, 9);
+  EXPECT_THAT(Error("a.hdr", header), HasSubstr("has 9 dimensions"));
 }
 
 TEST_F(Volumes, NiftiOfColours) {
@@ -155,6 +214,115 @@ TEST_F(Volumes, NiftiLiesWhereItsMatrixSays) {
   EXPECT_EQ(volume.corners[0], (Point3{-9, -18.5, 28}));
   EXPECT_EQ(volume.corners[7], (Point3{-13, -24.5, 36}));
   EXPECT_EQ(volume.corners[1], (Point3{-13, -18.5, 28}));
+}
+
+// The standard's three methods: the steps alone, a turn as a quaternion, a matrix. Corners 0 and 7 of a volume of two samples an axis.
+TEST_F(Volumes, NiftiLiesWhereEachMethodSays) {
+  struct Method {
+    const char* name;
+    int16_t qform = 0, sform = 0;
+    float qfac = 1;
+    std::array<float, 3> quaternion = {}, offset = {};
+    std::array<float, 12> rows = {};
+    Point3 first, last;
+  };
+  const std::array<float, 12> matrix = {2, 0, 0, 10, 0, 3, 0, 20, 0, 0, 4, 30};
+  const std::array<float, 12> mirrored = {-2, 0, 0, 10, 0, 3, 0, 20, 0, 0, 4, 30};
+  for (const Method& method : {
+           // Steps of 1, 2 and 3. The reader turns x and y round.
+           Method{.name = "steps", .first = {0.5, 1, -1.5}, .last = {-1.5, -3, 4.5}},
+           Method{.name = "steps, without a qfac",
+           .qfac = 0,
+           .first = {0.5, 1, -1.5},
+           .last = {-1.5, -3, 4.5}},
+           // Method 1 knows no offset.
+           Method{.name = "steps beside an offset that has no code",
+           .offset = {10, 20, 30},
+           .first = {0.5, 1, -1.5},
+           .last = {-1.5, -3, 4.5}},
+           Method{.name = "a turn by nothing",
+           .qform = 1,
+           .offset = {10, 20, 30},
+           .first = {-9.5, -19, 28.5},
+           .last = {-11.5, -23, 34.5}},
+           Method{.name = "without a qfac",
+           .qform = 1,
+           .qfac = 0,
+           .offset = {10, 20, 30},
+           .first = {-9.5, -19, 28.5},
+           .last = {-11.5, -23, 34.5}},
+           Method{.name = "a third axis turned round",
+           .qform = 2,
+           .qfac = -1,
+           .offset = {10, 20, 30},
+           .first = {-9.5, -19, 31.5},
+           .last = {-11.5, -23, 25.5}},
+           // Half a turn about x: y and z go the other way.
+           Method{.name = "half a turn",
+           .qform = 1,
+           .quaternion = {1, 0, 0},
+           .offset = {10, 20, 30},
+           .first = {-9.5, -21, 31.5},
+           .last = {-11.5, -17, 25.5}},
+           Method{.name = "half a turn, a third axis turned round",
+           .qform = 1,
+           .qfac = -1,
+           .quaternion = {1, 0, 0},
+           .offset = {10, 20, 30},
+           .first = {-9.5, -21, 28.5},
+           .last = {-11.5, -17, 34.5}},
+           Method{.name = "a matrix",
+           .sform = 1,
+           .rows = matrix,
+           .first = {-9, -18.5, 28},
+           .last = {-13, -24.5, 36}},
+           Method{.name = "a mirror",
+           .sform = 1,
+           .rows = mirrored,
+           .first = {-11, -18.5, 28},
+           .last = {-7, -24.5, 36}},
+           Method{.name = "a matrix before a turn",
+           .qform = 1,
+           .sform = 4,
+           .offset = {1, 2, 3},
+           .rows = matrix,
+           .first = {-9, -18.5, 28},
+           .last = {-13, -24.5, 36}},
+       }) {
+    std::string bytes = Nifti({3, 2, 2, 2}, 2, "12345678");
+    Put<float>(&bytes, 76, method.qfac);
+    Put<int16_t>(&bytes, 252, method.qform);
+    Put<int16_t>(&bytes, 254, method.sform);
+    for (size_t i = 0; i < 3; ++i) {
+      Put<float>(&bytes, 256 + 4 * i, method.quaternion[i]);
+      Put<float>(&bytes, 268 + 4 * i, method.offset[i]);
+    }
+    for (size_t i = 0; i < 12; ++i) Put<float>(&bytes, 280 + 4 * i, method.rows[i]);
+    for (const bool big_endian : {false, true}) {
+      if (big_endian) TurnHeader(&bytes);
+      const SampledVolume volume = Read("a.nii", bytes);
+      EXPECT_EQ(volume.corners[0], method.first) << method.name << " " << big_endian;
+      EXPECT_EQ(volume.corners[7], method.last) << method.name << " " << big_endian;
+      EXPECT_THAT(volume.samples, ElementsAre('1', '2', '3', '4', '5', '6', '7', '8'));
+    }
+  }
+}
+
+// Of axes that are not there no step is known; some programs write 0.
+TEST_F(Volumes, NiftiOfOneSliceNeedsNoThirdStep) {
+  for (const bool both : {false, true}) {
+    std::string bytes = Nifti({2, 2, 2}, 2, "1234");
+    Put<float>(&bytes, 88, 0);
+    Put<int16_t>(&bytes, 252, both ? 1 : 0);
+    const SampledVolume volume = Read("a.nii", bytes);
+    EXPECT_THAT(volume.size, ElementsAre(2, 2, 1));
+    EXPECT_EQ(volume.corners[7].y - volume.corners[0].y, -4);
+    std::string second = Nifti2({1, 4}, 2, "1234");
+    Put<double>(&second, 120, 0);
+    Put<double>(&second, 128, 0);
+    Put<int32_t>(&second, 344, both ? 1 : 0);
+    EXPECT_THAT(Read("b.nii", second).samples, ElementsAre('1', '2', '3', '4'));
+  }
 }
 
 TEST_F(Volumes, NiftiOfSeveralVolumes) {
