@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -15,6 +16,7 @@
 #include "tests/tools/import/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
+#include "tools/voxelctl/scene/placement.h"
 
 namespace voxeld::voxelctl {
 namespace assimp_test {
@@ -123,6 +125,69 @@ TEST_F(AssimpFormats, SinglePrecisionIsReportedBeyondHalfAVoxel) {
   EXPECT_THAT(
       Good("a.off", "OFF\n3 1 0\n70000000 0 0\n70000032 0 0\n70000032 900 0\n3 0 1 2\n").note,
       HasSubstr("single precision"));
+}
+
+// Three corners 1, 2 and 3 from a fourth, along x, y and z: where each of them lies in the display (x right, -y front, z up).
+struct Axes {
+  Point3 x, y, z;
+};
+constexpr char kArrow[] = "0 0 0 1 0 0 0 2 0 0 0 3";
+
+Axes AxesInTheDisplay(Model model) {
+  PlaceModels({&model, 1}, DisplaySpace(), {});
+  // The corner that is nearest to the three others together, and those by how far from it they are.
+  std::vector<Point3> corners;
+  for (const Part& part : model.parts) {
+    for (const Point3& p : part.positions) {
+      const auto is_there = [&p](const Point3& q) {
+        return std::hypot(p.x - q.x, p.y - q.y, p.z - q.z) < 1e-6;
+      };
+      if (std::none_of(corners.begin(), corners.end(), is_there)) corners.push_back(p);
+    }
+  }
+  EXPECT_EQ(corners.size(), 4u);
+  if (corners.size() != 4) return {};
+  const auto apart = [](const Point3& a, const Point3& b) {
+    return std::hypot(a.x - b.x, a.y - b.y, a.z - b.z);
+  };
+  const auto sum = [&](const Point3& from) {
+    double all = 0;
+    for (const Point3& to : corners) all += apart(from, to);
+    return all;
+  };
+  std::sort(corners.begin(), corners.end(),
+            [&](const Point3& a, const Point3& b) { return sum(a) < sum(b); });
+  const Point3 from = corners[0];
+  std::sort(corners.begin(), corners.end(),
+            [&](const Point3& a, const Point3& b) { return apart(from, a) < apart(from, b); });
+  const double unit = apart(from, corners[1]);
+  const auto along = [&](size_t corner) {
+    const Point3& to = corners[corner];
+    const auto rounded = [&](double length) {
+      return std::round(length / unit * 1e5) / 1e5 / static_cast<double>(corner) + 0.0;
+    };
+    return Point3{rounded(to.x - from.x), rounded(to.y - from.y), rounded(to.z - from.z)};
+  };
+  return {along(1), along(2), along(3)};
+}
+
+void ExpectAxes(const Axes& axes, const Point3& x, const Point3& y, const Point3& z,
+                const std::string& what) {
+  EXPECT_EQ(axes.x, x) << what;
+  EXPECT_EQ(axes.y, y) << what;
+  EXPECT_EQ(axes.z, z) << what;
+}
+
+// COLLADA 1.4.1 names three axes for each: to the right, up, and to the viewer.
+TEST_F(AssimpFormats, ColladaSaysWhichAxisIsUp) {
+  const auto axes = [this](const std::string& up) {
+    return AxesInTheDisplay(
+        Good("a.dae", absl::StrReplaceAll(Dae("", kArrow), {{"<up_axis>Y_UP</up_axis>", up}})));
+  };
+  for (const char* y_up : {"<up_axis>Y_UP</up_axis>", ""})
+    ExpectAxes(axes(y_up), {1, 0, 0}, {0, 0, 1}, {0, -1, 0}, y_up);
+  ExpectAxes(axes("<up_axis>Z_UP</up_axis>"), {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, "Z_UP");
+  ExpectAxes(axes("<up_axis>X_UP</up_axis>"), {0, 0, 1}, {-1, 0, 0}, {0, -1, 0}, "X_UP");
 }
 
 std::string Fbx(const std::string& objects, const std::string& connections) {
@@ -271,6 +336,30 @@ TEST_F(AssimpFormats, FormatsOfOtherReadersUnderAnotherName) {
   }
 }
 
+TEST_F(AssimpFormats, FbxSaysWhichAxisIsUp) {
+  const auto axes = [this](const std::string& settings) {
+    return AxesInTheDisplay(Good(
+        "a.fbx",
+        absl::StrReplaceAll(Fbx("", ""),
+                            {{"0,0,0,1,0,0,1,0,4,0,0,4", absl::StrReplaceAll(kArrow, {{" ", ","}})},
+                             {"\tVersion: 1000\n\tProperties70:  {\n",
+                              absl::StrCat("\tVersion: 1000\n\tProperties70:  {\n", settings)}})));
+  };
+  const auto property = [](const char* name, int value) {
+    return absl::StrCat("\t\tP: \"", name, "\", \"int\", \"Integer\", \"\",", value, "\n");
+  };
+  // As Maya and as 3ds Max write them.
+  ExpectAxes(axes(property("UpAxis", 1) + property("UpAxisSign", 1) + property("FrontAxis", 2) +
+                  property("FrontAxisSign", 1)),
+             {1, 0, 0}, {0, 0, 1}, {0, -1, 0}, "y");
+  ExpectAxes(axes(property("UpAxis", 2) + property("UpAxisSign", 1) + property("FrontAxis", 1) +
+                  property("FrontAxisSign", -1)),
+             {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, "z");
+  EXPECT_EQ(axes(property("UpAxis", 0)).x, (Point3{0, 0, 1}));
+  ExpectAxes(axes(""), {1, 0, 0}, {0, 0, 1}, {0, -1, 0}, "nothing");
+  ExpectAxes(axes(property("UpAxis", 7)), {1, 0, 0}, {0, 0, 1}, {0, -1, 0}, "an axis that is none");
+}
+
 TEST_F(AssimpFormats, FramesOfBvhBeyondTheAnnouncedNumber) {
   const std::string bvh =
       "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\nEnd "
@@ -390,6 +479,32 @@ TEST_F(AssimpFormats, ThreeMfTextureGroups) {
   EXPECT_EQ(at(0), (std::array<float, 2>{0, 1}));
   EXPECT_EQ(at(1), (std::array<float, 2>{1, 1}));
   EXPECT_EQ(at(2), (std::array<float, 2>{0, 0.25}));
+}
+
+// The core specification writes vectors as rows: a component's matrix is applied before that of its item.
+TEST_F(AssimpFormats, ThreeMfItemsAndComponents) {
+  const Model model = Good(
+      "a.3mf",
+      ThreeMf(
+          "", "", {},
+          "<object id='2'><components><component objectid='1' transform='1 0 0 0 1 0 0 0 1 10 0 "
+          "0'/><component objectid='1' transform='3 0 0 0 3 0 0 0 3 20 0 0'/></components>"
+          "</object><object id='3'><components><component objectid='2' transform='1 0 0 0 1 0 0 "
+          "0 1 0 0 100'/></components></object>",
+          // x goes to y and y to -x, and then 7 up.
+          "/><item objectid='2' transform='0 1 0 -1 0 0 0 0 1 0 0 7'/><item objectid='3'"));
+  std::vector<std::string> boxes;
+  for (const Part& part : model.parts) {
+    Point3 least = part.positions.at(0), most = least;
+    for (const Point3& p : part.positions) {
+      least = {std::min(least.x, p.x), std::min(least.y, p.y), std::min(least.z, p.z)};
+      most = {std::max(most.x, p.x), std::max(most.y, p.y), std::max(most.z, p.z)};
+    }
+    boxes.push_back(
+        absl::StrCat(least.x, ",", least.y, ",", least.z, " ", most.x, ",", most.y, ",", most.z));
+  }
+  EXPECT_THAT(boxes, UnorderedElementsAre("0,0,0 1,1,1", "-1,10,7 0,11,8", "-3,20,7 0,23,10",
+                                          "10,0,100 11,1,101", "20,0,100 23,3,103"));
 }
 
 TEST_F(AssimpFormats, ThreeMfPlacesAndWhatIsNotShown) {
