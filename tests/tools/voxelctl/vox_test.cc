@@ -150,6 +150,28 @@ TEST_F(VoxFiles, NodesPutAndTurnModels) {
             Corners(-1, 6, 0, 0, 7, 1));
 }
 
+// `_r`: two bits for the column of row 0, two for that of row 1, and the signs of the three rows.
+TEST_F(VoxFiles, EveryTurnAndMirror) {
+  const std::string model = Model3(4, 4, 4, {{3, 2, 1, 1}});  // from (1, 0, -1) to (2, 1, 0)
+  const auto box = [&](int turn) {
+    return Box(Read(model + Transform(0, 1, {{"_r", absl::StrCat(turn)}}) + Shape(1, 0)));
+  };
+  const auto bits = [](int row0, int row1, int signs) { return row0 | row1 << 2 | signs << 4; };
+  EXPECT_EQ(box(bits(0, 1, 0)), Corners(1, 0, -1, 2, 1, 0)) << "as it is";
+  EXPECT_EQ(box(bits(0, 1, 1)), Corners(-2, 0, -1, -1, 1, 0)) << "a mirror along x";
+  EXPECT_EQ(box(bits(0, 1, 3)), Corners(-2, -1, -1, -1, 0, 0)) << "half a turn about z";
+  EXPECT_EQ(box(bits(0, 1, 7)), Corners(-2, -1, 0, -1, 0, 1)) << "through the middle";
+  EXPECT_EQ(box(bits(1, 0, 2)), Corners(0, -2, -1, 1, -1, 0)) << "the other quarter about z";
+  EXPECT_EQ(box(bits(0, 2, 2)), Corners(1, 0, 0, 2, 1, 1)) << "a quarter about x";
+  EXPECT_EQ(box(bits(2, 1, 4)), Corners(-1, 0, -2, 0, 1, -1)) << "a quarter about y";
+  EXPECT_EQ(box(bits(2, 0, 0)), Corners(-1, 1, 0, 0, 2, 1)) << "x to y to z";
+  EXPECT_EQ(box(bits(1, 2, 0)), Corners(0, -1, 1, 1, 0, 2)) << "z to y to x";
+  // The middle of an odd number of voxels is the corner before its middle voxel.
+  EXPECT_EQ(Box(Read(Model3(3, 1, 1, {{2, 0, 0, 1}}) +
+                     Transform(0, 1, {{"_r", absl::StrCat(bits(1, 0, 1))}}) + Shape(1, 0))),
+            Corners(-1, 1, 0, 0, 2, 1));
+}
+
 TEST_F(VoxFiles, GroupsHaveManyAndHiddenOnesAreNotShown) {
   const std::string model = Model3(2, 2, 2, {{1, 1, 1, 1}});
   const std::string rest = Group(1, {2, 4}) + Transform(2, 3, {}) + Shape(3, 0) +
@@ -219,6 +241,12 @@ TEST_F(VoxFiles, HiddenLayersAreNotShown) {
   EXPECT_EQ(model->parts.at(0).positions.size(), 6u * 4);
   EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"hidden nodes", 1}}));
   EXPECT_EQ(Read(models + nodes + layer(-1, "1")).positions.size(), 16u * 4) << "no layer";
+  // All of a group, whatever layers its members are on; the chunks come in any order.
+  const std::string group = Transform(0, 1, {}) + Group(1, {2, 6}) + on_layer(2, 3, 7) +
+                            Group(3, {4}) + on_layer(4, 5, 0) + Shape(5, 0) + on_layer(6, 8, 0) +
+                            Shape(8, 1);
+  EXPECT_EQ(Read(layer(7, "1") + group + models).positions.size(), 10u * 4);
+  EXPECT_EQ(Read(layer(7, "0") + group + models).positions.size(), 16u * 4);
   EXPECT_EQ(Read(models + nodes + layer(0, "0") + layer(1, "0")).positions.size(), 16u * 4);
 }
 
