@@ -242,6 +242,22 @@ TEST_F(GltfFiles, ColoursOfEveryTypeAreFactorsOfTheMaterial) {
   EXPECT_EQ(color(std::vector<uint8_t>{255, 255, 0, 9, 255, 255, 0, 9, 255, 255, 0, 9}, "VEC4",
                   normalized),
             (Rgb{255, 188, 0}));
+  // Three bytes or shorts a vertex, each vertex at a multiple of four bytes, as the format wants them.
+  const auto apart = [&](auto numbers, int type, int stride) {
+    Gltf gltf;
+    gltf.Add(kTriangle, "VEC3");
+    const int view = gltf.View(numbers, absl::StrCat(R"(,"byteStride":)", stride));
+    gltf.Accessor(absl::StrCat(R"({"bufferView":)", view, R"(,"componentType":)", type,
+                               R"(,"type":"VEC3","count":3,"normalized":true})"));
+    return Good(gltf.Text(kOneNode + Mesh(R"("attributes":{"POSITION":0,"COLOR_0":1})")))
+        .parts[0]
+        .colors;
+  };
+  const auto three = ElementsAre(Rgb{255, 0, 0}, Rgb{0, 255, 0}, Rgb{0, 0, 255});
+  EXPECT_THAT(apart(std::vector<uint8_t>{255, 0, 0, 9, 0, 255, 0, 9, 0, 0, 255, 9}, 5121, 4),
+              three);
+  EXPECT_THAT(apart(std::vector<uint16_t>{65535, 0, 0, 9, 0, 65535, 0, 9, 0, 0, 65535, 9}, 5123, 8),
+              three);
 }
 
 TEST_F(GltfFiles, EmissionIsAdded) {

@@ -2,7 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <variant>
 #include <vector>
@@ -136,6 +139,37 @@ TEST(PackedVolumes, AWindowIsFound) {
   const auto bytes = std::get<client::Array<uint8_t>>(grid.samples).view();
   EXPECT_EQ(bytes[1], 0);
   EXPECT_GT(bytes[0], 200);
+}
+
+TEST(PackedVolumes, AWindowShowsMasksRareSamplesAndNoBackground) {
+  const auto bytes_of = [](const SampledVolume& volume) {
+    const auto packed = PackVolume(volume, {}, {});
+    EXPECT_THAT(packed, IsOk());
+    if (!packed.ok()) return std::vector<int>();
+    const auto& grid = std::get<client::Volume>(packed->part.shape).grid;
+    const auto bytes = std::get<client::Array<uint8_t>>(grid.samples).view();
+    return std::vector<int>(bytes.begin(), bytes.end());
+  };
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const struct {
+    float dark, bright;
+  } pairs[] = {{0, 1}, {0, 255}, {0, 1e-6f}, {-1024, 3071}, {nan, 5}, {nan, -7}, {0, 65535}};
+  for (const auto& [dark, bright] : pairs) {
+    SampledVolume half = Ramp(8, 8, 8);
+    for (size_t i = 0; i < 512; ++i) half.samples[i] = i < 256 ? dark : bright;
+    const std::vector<int> halves = bytes_of(half);
+    ASSERT_EQ(halves.size(), 512u);
+    EXPECT_THAT(std::vector<int>(halves.begin(), halves.begin() + 256), testing::Each(0)) << bright;
+    EXPECT_THAT(std::vector<int>(halves.begin() + 256, halves.end()), testing::Each(255)) << bright;
+    // One sample of 32,768.
+    SampledVolume rare = Ramp(32, 32, 32);
+    std::fill(rare.samples.begin(), rare.samples.end(), dark);
+    rare.samples[12345] = bright;
+    const std::vector<int> alone = bytes_of(rare);
+    ASSERT_EQ(alone.size(), 32768u);
+    EXPECT_EQ(alone[12345], 255) << bright;
+    EXPECT_EQ(std::count(alone.begin(), alone.end(), 0), 32767) << bright;
+  }
 }
 
 TEST(PackedVolumes, ArePlacedByTheirCorners) {
