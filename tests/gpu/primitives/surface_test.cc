@@ -131,6 +131,70 @@ TEST(Surface, BoxesOfTrianglesOnCentresAndFacesAreNotCrossed) {
   }
 }
 
+// A cube from -1 to 1, each face cut into so many strips of two triangles.
+Mesh CubeOfStrips(int strips) {
+  Mesh m;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double side : {-1.0, 1.0}) {
+      for (int i = 0; i <= strips; ++i) {
+        for (const double end : {-1.0, 1.0}) {
+          double at[3];
+          at[axis] = side;
+          at[(axis + 1) % 3] = end;
+          at[(axis + 2) % 3] = 2.0 * i / strips - 1;
+          m.positions.insert(m.positions.end(), at, at + 3);
+        }
+        if (i == 0) continue;
+        const auto last = static_cast<uint32_t>(m.positions.size() / 3 - 1);
+        for (const uint32_t back : {3u, 2u, 1u, 2u, 0u, 1u}) m.indices.push_back(last - back);
+      }
+    }
+  }
+  return m;
+}
+
+TEST(Surface, CubesOfSliversAreNotCrossed) {
+  std::mt19937 random(2);
+  for (const int strips : {1, 7, 40, 500}) {
+    const Mesh mesh = CubeOfStrips(strips);
+    for (int i = 0; i < 3; ++i) {
+      const Affine map = RandomMap(random);
+      for (SurfaceRule rule : {SurfaceRule::kThin, SurfaceRule::kCover}) {
+        const VoxelSet set = Drawn(mesh, map, rule);
+        ASSERT_FALSE(set.contains(MiddleOf(map)));
+        EXPECT_FALSE(Connected(set, kBox, {0, 0, 0}, MiddleOf(map), Separation(rule)))
+            << strips << " strips, map " << i << ", rule " << static_cast<int>(rule);
+      }
+    }
+  }
+}
+
+// Sides along the axes, through no centre and no face of a voxel: the outermost voxels of a block, in whatever triangles.
+TEST(Surface, ACubeAlongTheAxesIsOneVoxelThick) {
+  for (const int strips : {1, 3, 100}) {
+    for (const double half : {5.7, 6.2}) {
+      Affine map;
+      for (int row = 0; row < 3; ++row) {
+        map.m[row * 5] = half;
+        map.m[row * 4 + 3] = 20.1;
+      }
+      const auto low = static_cast<int32_t>(20.1 - half), high = static_cast<int32_t>(20.1 + half);
+      VoxelSet shell;
+      for (int32_t z = low; z <= high; ++z) {
+        for (int32_t y = low; y <= high; ++y) {
+          for (int32_t x = low; x <= high; ++x) {
+            const bool is_outermost =
+                x == low || x == high || y == low || y == high || z == low || z == high;
+            if (is_outermost) shell.insert({x, y, z});
+          }
+        }
+      }
+      const VoxelSet set = Drawn(CubeOfStrips(strips), map, SurfaceRule::kCover);
+      EXPECT_EQ(set, shell) << strips << " " << half;
+    }
+  }
+}
+
 template <class Primitive>
 VoxelSet DrawnSolid(const Affine& map, SurfaceRule rule, Fill fill) {
   GeometryRecord record;
