@@ -9,6 +9,7 @@
 #include <initializer_list>
 #include <random>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -89,6 +90,36 @@ TEST_F(Volumes, BitsAboveTheStoredOnesAreNoPartOfTheNumbers) {
   EXPECT_THAT(Read("extended.dcm", stored(0xFFFC, 1)).samples,
               ElementsAre(-1008, -1006, -1004, -1002, -1000, -998))
       << "the same with them";
+}
+
+// -2 and 1 in as many bits as one likes, below ones that are no part of them, in bytes and in shorts.
+TEST_F(Volumes, AsManyBitsAsAreStored) {
+  for (const uint16_t allocated : {8, 16}) {
+    for (uint16_t bits = 3; bits <= allocated; ++bits) {
+      for (const bool is_filled : {false, true}) {
+        const uint32_t mask = (1u << bits) - 1, above = is_filled ? ~mask : 0;
+        std::string pixels;
+        for (int i = 0; i < 6; ++i) {
+          const auto number = static_cast<uint16_t>((i % 2 == 0 ? mask - 1 : 1u) | above);
+          pixels += allocated == 8 ? Short(number).substr(0, 1) : Short(number);
+        }
+        std::string file = Dicom("1.2", 0, 0);
+        for (const auto& [element, old, now] :
+             {std::tuple(uint16_t{0x100}, uint16_t{16}, allocated),
+              {0x101, 16, bits},
+              {0x102, 15, static_cast<uint16_t>(bits - 1)},
+              {0x103, 0, 1}}) {
+          const std::string before = Element(0x28, element, "US", Short(old));
+          file.replace(file.find(before), before.size(), Element(0x28, element, "US", Short(now)));
+        }
+        file.resize(file.find(Element(0x7FE0, 0x10, "OW", "").substr(0, 6)));
+        // The numbers are doubled, and 1,000 less.
+        EXPECT_THAT(Read("a.dcm", file + Element(0x7FE0, 0x10, "OW", pixels)).samples,
+                    ElementsAre(-1004, -998, -1004, -998, -1004, -998))
+            << allocated << " " << bits << " " << is_filled;
+      }
+    }
+  }
 }
 
 TEST_F(Volumes, ARealSlice) {

@@ -3,15 +3,19 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "tests/tools/import/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
+#include "tools/voxelctl/scene/placement.h"
 
 namespace voxeld::voxelctl {
 namespace obj_test {
@@ -111,11 +115,52 @@ TEST_F(ObjFiles, TrianglesWithoutAnAreaAreCounted) {
   EXPECT_THAT(model.left_out, ElementsAre(LeftOut{"triangles without an area", 1}));
 }
 
+// Thin is not empty: a turned square of a thousand slivers keeps its area.
+TEST_F(ObjFiles, SliversAreTriangles) {
+  for (const double width : {1e-3, 1e-6}) {
+    std::string text;
+    for (int i = 0; i <= 500; ++i) {
+      const double along = width * i, x = 0.6 * along, y = 0.8 * along;
+      absl::StrAppend(&text, absl::StrFormat("v %.17g %.17g 0\n", x, y),
+                      absl::StrFormat("v %.17g %.17g 0\n", x - 0.8, y + 0.6));
+    }
+    for (int i = 0; i < 500; ++i) {
+      const int at = 2 * i + 1;
+      absl::StrAppend(&text, "f ", at, " ", at + 2, " ", at + 1, "\nf ", at + 1, " ", at + 2, " ",
+                      at + 3, "\n");
+    }
+    const Model model = Good(text);
+    EXPECT_EQ(model.parts[0].indices.size(), 3000u) << width;
+    EXPECT_NEAR(AreaOf(model), 500 * width, 1e-9) << width;
+    EXPECT_THAT(model.left_out, IsEmpty()) << width;
+  }
+}
+
 TEST_F(ObjFiles, CoordinatesOfASurvey) {
   const Model model = Good(
       "v 500000.001 4600000.002 0\nv 500000.003 4600000.002 0\nv 500000.003 4600000.004 0\nf 1 2 "
       "3");
   EXPECT_NEAR(AreaOf(model), 2e-6, 1e-9);
+}
+
+TEST_F(ObjFiles, ASurveyIsPlacedAsTheSameAtZero) {
+  // A fan of a thousandth of a unit to four units, far from zero along each axis, and at zero.
+  const auto placed = [this](int64_t x, int64_t y, int64_t z) {
+    std::string text;
+    for (const auto& [u, v] :
+         {std::pair("000", "000"), {"001", "000"}, {"500", "250"}, {"000", "999"}})
+      absl::StrAppend(&text, "v ", x, ".", u, " ", y, ".", v, " ", z, ".", u, "\n");
+    Model model = Good(text + "f 1 2 3\nf 1 3 4\n");
+    PlaceModels({&model, 1}, DisplaySpace(), {});
+    return model.parts[0].positions;
+  };
+  const std::vector<Point3> near = placed(0, 0, 0), far = placed(500000, 4600000, 123456789);
+  ASSERT_EQ(near.size(), far.size());
+  for (size_t i = 0; i < near.size(); ++i) {
+    EXPECT_NEAR(near[i].x, far[i].x, 1e-6);
+    EXPECT_NEAR(near[i].y, far[i].y, 1e-6);
+    EXPECT_NEAR(near[i].z, far[i].z, 1e-6);
+  }
 }
 
 TEST_F(ObjFiles, ColoursOfVerticesAreFactorsOfTheMaterial) {
