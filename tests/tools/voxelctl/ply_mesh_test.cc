@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
 #include "tests/tools/voxelctl/read_here.h"
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tests/tools/voxelctl/temp_folder.h"
@@ -97,6 +98,24 @@ TEST(PlyMesh, StripsOfTrianglesKeepTheirWinding) {
   const Part& part = model->parts[0];
   ASSERT_EQ(part.indices.size(), 9u);
   for (size_t i = 0; i < 6; ++i) EXPECT_EQ(part.normals[part.indices[i]], (Point3{0, -1, 0}));
+}
+
+TEST(PlyMesh, LinesMayEndByEitherMarkOrBoth) {
+  const std::string text = AsciiPly(VertexElement(4) + kFace, absl::StrCat(kSquare, "4 0 1 2 3\n"));
+  for (const char* end : {"\n", "\r\n", "\r"})
+    ExpectSquare(Ply(absl::StrReplaceAll(text, {{"\n", end}})));
+  // Binary data may begin with a byte that is either mark.
+  for (const char* end : {"\n", "\r\n", "\r"}) {
+    for (const char first : {'\n', '\r'}) {
+      std::string data(12, '\0');
+      data[0] = first;
+      const std::string head =
+          absl::StrCat("ply\nformat binary_little_endian 1.0\n", VertexElement(1), "end_header\n");
+      const absl::StatusOr<Model> model = Ply(absl::StrReplaceAll(head, {{"\n", end}}) + data);
+      ASSERT_THAT(model, IsOk()) << static_cast<int>(first);
+      EXPECT_EQ(model->parts[0].positions.size(), 1u);
+    }
+  }
 }
 
 TEST(PlyMesh, ACloudMayDeclareFacesThatAreNotThere) {

@@ -84,6 +84,7 @@ TEST(StlBinary, AZeroNormalIsReplacedByTheWinding) { ExpectRectangle(Rectangle("
 TEST(StlAscii, IsReadInAnyCaseAndWithAnyLineEnds) {
   ExpectRectangle(Ascii());
   ExpectRectangle(absl::StrReplaceAll(absl::AsciiStrToUpper(Ascii()), {{"\n", "\r\n"}}));
+  ExpectRectangle(absl::StrReplaceAll(Ascii(), {{"\n", "\r"}}));
   ExpectRectangle(absl::StrReplaceAll(Ascii(), {{"\n", "\n\t  "}}));
   ExpectRectangle(absl::StrReplaceAll(Ascii(), {{" 4 ", " +4.0e+00 "}}));
 }
@@ -168,6 +169,13 @@ INSTANTIATE_TEST_SUITE_P(
     Table, BrokenStl,
     testing::Values(
         BadStl{"text", "hello, this is not a mesh\n", {"a.stl", "hello", "solid", "84 bytes"}},
+        BadStl{"utf16", "\xff\xfe" + std::string(200, 's'), {"UTF-16 text", "202 bytes"}},
+        BadStl{"lines_that_returns_end",
+               absl::StrReplaceAll(Ascii(), {{"vertex 4 0 0", "vertex inf 0 0"}, {"\n", "\r"}}),
+               {"line 5", "\"inf\""}},
+        BadStl{"lines_of_two_marks",
+               absl::StrReplaceAll(Ascii(), {{"vertex 4 0 0", "vertex inf 0 0"}, {"\n", "\r\n"}}),
+               {"line 5", "\"inf\""}},
         BadStl{"decimal_comma",
                absl::StrReplaceAll(Ascii(), {{"vertex 4 1 0", "vertex 4,0 1,0 0,0"}}),
                {"line 6", "\"4,0\"", "decimal marks"}},

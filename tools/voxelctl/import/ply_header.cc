@@ -195,8 +195,13 @@ absl::StatusOr<PlyHeader> ParsePlyHeader(const SourceFile& file, PlyCounts count
   PlyHeader header;
   bool formatted = false;
   size_t at = 0;
+  // The format's first description ends lines by carriage returns alone. Where a file does so, a line feed behind the header may be
+  // its first number.
+  const size_t first_end = text.find_first_of("\r\n");
+  const bool by_returns = first_end != absl::string_view::npos && text[first_end] == '\r' &&
+                          text.substr(first_end, 2) != "\r\n";
   for (int number = 1;; ++number) {
-    const size_t end = text.find('\n', at);
+    const size_t end = text.find(by_returns ? '\r' : '\n', at);
     if (end == absl::string_view::npos) {
       if (number == 1) {
         return FileError(file, absl::StrCat("is ", DescribeContents(file.bytes)),

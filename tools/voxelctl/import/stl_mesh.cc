@@ -130,7 +130,10 @@ class StlWords {
   // Empty at the end.
   absl::string_view Next() {
     while (!rest_.empty() && absl::ascii_isspace(static_cast<unsigned char>(rest_.front()))) {
-      line_ += rest_.front() == '\n' ? 1 : 0;
+      // A carriage return ends a line unless a line feed does.
+      const bool ends =
+          rest_.front() == '\n' || (rest_.front() == '\r' && !absl::StartsWith(rest_, "\r\n"));
+      line_ += ends ? 1 : 0;
       rest_.remove_prefix(1);
     }
     size_t length = 0;
@@ -142,7 +145,7 @@ class StlWords {
   }
 
   // The rest of the line is a name, which may hold any word.
-  void PassName() { rest_.remove_prefix(std::min(rest_.find('\n'), rest_.size())); }
+  void PassName() { rest_.remove_prefix(std::min(rest_.find_first_of("\r\n"), rest_.size())); }
 
   uint64_t line() const { return line_; }
 
@@ -260,7 +263,8 @@ absl::StatusOr<Model> ReadStlMesh(const SourceFile& file) {
   const bool is_text = bytes.substr(0, kAsciiProbe).find('\0') == absl::string_view::npos;
   if (is_text && absl::StartsWithIgnoreCase(absl::StripLeadingAsciiWhitespace(text), "solid"))
     return ReadAsciiStl(file, text);
-  if (bytes.size() < kBinaryHeader || is_text) {
+  const bool is_utf16 = absl::StartsWith(bytes, "\xff\xfe") || absl::StartsWith(bytes, "\xfe\xff");
+  if (bytes.size() < kBinaryHeader || is_text || (is_utf16 && bytes.size() < announced)) {
     return FileError(file,
                      absl::StrCat("is ", DescribeContents(bytes), ", ", bytes.size(), " bytes"),
                      "an STL begins with \"solid\", or is binary with a header of 84 bytes");
