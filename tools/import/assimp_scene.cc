@@ -535,6 +535,20 @@ Up UpOf(const aiScene& scene, Up otherwise) {
   return axis == 0 ? Up::kX : axis == 1 ? Up::kY : axis == 2 ? Up::kZ : otherwise;
 }
 
+// FBX may say that its up axis points down: then half a turn about another axis comes first.
+void TurnUpsideDown(const aiScene& scene, Model* model) {
+  int32_t sign = 1;
+  if (scene.mMetaData == nullptr || !scene.mMetaData->Get("UpAxisSign", sign) || sign != -1) return;
+  const auto turn = [about_z = model->up == Up::kX](Point3& p) {
+    p.y = -p.y;
+    (about_z ? p.x : p.z) *= -1;
+  };
+  for (Part& part : model->parts) {
+    std::for_each(part.positions.begin(), part.positions.end(), turn);
+    std::for_each(part.normals.begin(), part.normals.end(), turn);
+  }
+}
+
 // What the library passes over without a word, by how the file names it.
 void CountUnread(const SourceFile& file, Model* model) {
   static constexpr std::array<std::string_view, 3> kUnread[] = {
@@ -561,16 +575,12 @@ void CountUnread(const SourceFile& file, Model* model) {
     const size_t at = text.find(mark);
     if (at == absl::string_view::npos) return absl::string_view();
     text.remove_prefix(at + mark.size());
-    const size_t end = std::min(text.find('\n'), text.size());
-    const absl::string_view line = absl::StripAsciiWhitespace(text.substr(0, end));
-    text.remove_prefix(end);
-    return line;
+    return absl::StripAsciiWhitespace(TakeLine(&text));
   };
   uint64_t announced = 0, found = 0;
   if (!absl::SimpleAtoi(take_after("Frames:"), &announced)) return;
   take_after("Frame Time:");
-  for (const absl::string_view line : absl::StrSplit(text, '\n'))
-    found += absl::StripAsciiWhitespace(line).empty() ? 0 : 1;
+  while (!text.empty()) found += absl::StripAsciiWhitespace(TakeLine(&text)).empty() ? 0 : 1;
   AddLeftOut("frames beyond the announced number", found > announced ? found - announced : 0,
              model);
 }
@@ -642,6 +652,7 @@ absl::StatusOr<Model> ModelOf(const SourceFile& file, const aiScene& scene, cons
     // Of the bones as they stand in the file, so that it is the same in every pose.
     bones.thickness = kBoneThickness * LengthOf(Bones(*scene.mRootNode, nullptr));
     model.parts.push_back(std::move(bones));
+    TurnUpsideDown(scene, &model);
     return model;
   }
   const bool bare = file.extension == "off";
@@ -668,6 +679,7 @@ absl::StatusOr<Model> ModelOf(const SourceFile& file, const aiScene& scene, cons
     return part.kind == Kind::kTriangles && part.indices.empty();
   });
   NoteSinglePrecision(context.rounding, &model);
+  TurnUpsideDown(scene, &model);
   return model;
 }
 

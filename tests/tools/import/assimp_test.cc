@@ -355,6 +355,11 @@ TEST_F(AssimpFormats, FbxSaysWhichAxisIsUp) {
   ExpectAxes(axes(property("UpAxis", 2) + property("UpAxisSign", 1) + property("FrontAxis", 1) +
                   property("FrontAxisSign", -1)),
              {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, "z");
+  // Half a turn about x brings an axis that points down up.
+  ExpectAxes(axes(property("UpAxis", 1) + property("UpAxisSign", -1)), {1, 0, 0}, {0, 0, -1},
+             {0, 1, 0}, "-y");
+  ExpectAxes(axes(property("UpAxis", 2) + property("UpAxisSign", -1)), {1, 0, 0}, {0, -1, 0},
+             {0, 0, -1}, "-z");
   EXPECT_EQ(axes(property("UpAxis", 0)).x, (Point3{0, 0, 1}));
   ExpectAxes(axes(""), {1, 0, 0}, {0, 0, 1}, {0, -1, 0}, "nothing");
   ExpectAxes(axes(property("UpAxis", 7)), {1, 0, 0}, {0, 0, 1}, {0, -1, 0}, "an axis that is none");
@@ -367,6 +372,8 @@ TEST_F(AssimpFormats, FramesOfBvhBeyondTheAnnouncedNumber) {
   EXPECT_THAT(Good("a.bvh", bvh).left_out, ElementsAre(LeftOut{"animations", 1}));
   EXPECT_THAT(Good("a.bvh", bvh + "1 0 0\n2 0 0\n").left_out,
               Contains(LeftOut{"frames beyond the announced number", 2}));
+  EXPECT_THAT(Good("a.bvh", absl::StrReplaceAll(bvh + "1 0 0\n", {{"\n", "\r"}})).left_out,
+              Contains(LeftOut{"frames beyond the announced number", 1}));
 }
 
 // ------------------------------------------------------------------------------------------------ 3MF

@@ -661,6 +661,21 @@ TEST_F(Clouds, TimesKeepTheirPrecision) {
   EXPECT_THAT(model->parts.at(0).attributes.at(0).values, ElementsAre(1764500000, 1764500001));
 }
 
+TEST_F(Clouds, LinesEndAsEverySystemEndsThem) {
+  for (const std::string end : {"\n", "\r\n", "\r"}) {
+    EXPECT_THAT(Points("a.csv", absl::StrCat("x,y,z", end, "1,2,3", end, "4,5,6", end)).positions,
+                ElementsAre(Point3{1, 2, 3}, Point3{4, 5, 6}));
+    EXPECT_THAT(Error("a.csv", absl::StrCat("x,y,z", end, end, "1,2,3", end, "4,b,6", end)),
+                HasSubstr("line 4 has \"b\""));
+    const auto water = ReadHere(folder_.Write(
+        "a.xyz", absl::StrCat("2", end, "water", end, "O 0 0 0", end, "H 0 0 1", end)));
+    ASSERT_THAT(water, IsOk());
+    EXPECT_TRUE(water->molecule);
+  }
+  EXPECT_THAT(Error("a.csv", std::string("\xff\xfex\0,\0y\0,\0z\0", 12)),
+              HasSubstr("is UTF-16 text; UTF-8 is expected"));
+}
+
 // Whatever a table writes for a number that is missing.
 TEST_F(Clouds, PointsWhoseNumbersAreMissing) {
   for (const std::string none : {"", "nan", "NaN", "NA", "n/a", "null", "None", "-"}) {

@@ -177,9 +177,7 @@ class XyzLines {
   }
   bool Next(absl::string_view* line) {
     if (rest_.empty()) return false;
-    const size_t end = std::min(rest_.find('\n'), rest_.size());
-    *line = absl::StripAsciiWhitespace(rest_.substr(0, end));
-    rest_.remove_prefix(std::min(end + 1, rest_.size()));
+    *line = absl::StripAsciiWhitespace(TakeLine(&rest_));
     ++number_;
     return true;
   }

@@ -156,6 +156,14 @@ std::string DescribeContents(absl::string_view bytes) {
                       EscapeForTerminal(absl::StripTrailingAsciiWhitespace(line)), "\"");
 }
 
+absl::string_view TakeLine(absl::string_view* text) {
+  const size_t end = std::min(text->find_first_of("\r\n"), text->size());
+  const absl::string_view line = text->substr(0, end);
+  text->remove_prefix(end);
+  if (!absl::ConsumePrefix(text, "\r\n") && !text->empty()) text->remove_prefix(1);
+  return line;
+}
+
 std::string TextModeHint(absl::string_view bytes) {
   // In binary data of this size some LF follows a CR by chance.
   constexpr std::ptrdiff_t kTelling = 100;

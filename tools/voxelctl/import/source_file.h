@@ -44,6 +44,9 @@ absl::StatusOr<SourceFile> ReadOtherFile(const SourceFile& file, const std::stri
 // "text that begins with \"hello\"", "binary data".
 std::string DescribeContents(absl::string_view bytes);
 
+// Removes the first line of `text`, which is not empty, with its end: LF, CR LF, or CR alone. Returns: the line without its end.
+absl::string_view TakeLine(absl::string_view* text);
+
 // For binary contents that are too short: a clause that says so if every CR LF was turned into LF
 // on the way, which is what a transfer as text does to a file; otherwise empty.
 std::string TextModeHint(absl::string_view bytes);

@@ -52,9 +52,7 @@ class Lines {
   bool Next(absl::string_view* line) {
     while (!rest_.empty()) {
       ++number_;
-      const size_t end = std::min(rest_.find('\n'), rest_.size());
-      const absl::string_view all = absl::StripAsciiWhitespace(rest_.substr(0, end));
-      rest_.remove_prefix(std::min(end + 1, rest_.size()));
+      const absl::string_view all = absl::StripAsciiWhitespace(TakeLine(&rest_));
       const size_t begin = CommentBegin(all);
       *line = absl::StripAsciiWhitespace(all.substr(0, begin));
       if (!line->empty()) return true;
@@ -291,6 +289,8 @@ absl::StatusOr<Columns> ReadHead(const SourceFile& file, char mark, Lines* lines
 }  // namespace
 
 absl::StatusOr<Model> ReadTextPoints(const SourceFile& file, bool attributes) {
+  if (absl::StartsWith(file.bytes, "\xff\xfe") || absl::StartsWith(file.bytes, "\xfe\xff"))
+    return FileError(file, absl::StrCat("is ", DescribeContents(file.bytes)), "UTF-8 is expected");
   const char mark = MarkOf(file.bytes);
   Lines lines(file.bytes);
   absl::string_view line;
