@@ -90,7 +90,9 @@ class Layers(unittest.TestCase):
         self.assertNotIn('nothing of "draw 1"', said)
         self.assertRegex(said, r'nothing of "draw 2" can be seen on display sim: .*outside')
         self.assertRegex(said, r'nothing of "draw 3" can be seen on display sim: .*black')
-        told = json.loads(self.run_as("painter", "--json", "draw", "sphere radius=0.1 at=9,9,9").stdout)
+        # All of them are asked about, however many.
+        many = ["point 0,0,0"] * 20 + ["sphere radius=0.1 at=9,9,9"]
+        told = json.loads(self.run_as("painter", "--json", "draw", *many).stdout)
         self.assertEqual(len(told["unseen"]), 1)
 
     def test_a_recording_of_an_empty_scene_is_warned_of(self) -> None:

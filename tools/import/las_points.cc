@@ -240,12 +240,22 @@ absl::StatusOr<LasHeader> ReadLasHeader(const SourceFile& file) {
 
 // The bitwise OR of all records.
 std::string AnyOf(absl::string_view points, const LasHeader& header) {
-  std::string any(header.record, '\0');
+  // By words, because the records of a survey are many.
+  std::vector<uint64_t> words(header.record / sizeof(uint64_t));
+  std::string rest(header.record % sizeof(uint64_t), '\0');
+  const char* record = points.data();
   for (uint64_t i = 0; i < header.count; ++i) {
-    const char* const record = points.data() + i * header.record;
-    for (size_t k = 0; k < header.record; ++k) any[k] = static_cast<char>(any[k] | record[k]);
+    for (uint64_t& any : words) {
+      uint64_t word = 0;
+      std::memcpy(&word, record, sizeof(word));
+      any |= word;
+      record += sizeof(word);
+    }
+    for (char& any : rest) any = static_cast<char>(any | *record++);
   }
-  return any;
+  std::string all(words.size() * sizeof(uint64_t), '\0');
+  std::memcpy(all.data(), words.data(), all.size());
+  return all + rest;
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 #include "tools/voxelctl/commands/not_showing.h"
 
-#include <algorithm>
+#include <chrono>
 
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
@@ -26,20 +26,24 @@ std::vector<std::string> NotShowing(const v1::ListDisplaysResponse& displays) {
 
 std::vector<std::string> Unseen(uint64_t owner, const std::string& layer,
                                 const std::vector<std::string>& ids, Connection& connection) {
-  constexpr size_t kMost = 8;
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point until = Clock::now() + std::chrono::milliseconds(1500);
   const absl::StatusOr<v1::ListDisplaysResponse> displays = connection.ListDisplays();
   std::vector<std::string> sentences;
   if (!displays.ok()) return sentences;
-  for (size_t i = 0; i < std::min(ids.size(), kMost); ++i) {
+  for (const std::string& id : ids) {
     std::string why;
     bool seen = displays->displays().empty();
     for (const v1::DisplayDescription& display : displays->displays()) {
       v1::ExplainEntityRequest request;
       request.mutable_key()->set_owner(owner);
       request.mutable_key()->set_layer(layer);
-      request.mutable_key()->set_id(ids[i]);
+      request.mutable_key()->set_id(id);
       request.set_display(display.name());
-      const absl::StatusOr<v1::ExplainEntityResponse> answer = connection.ExplainEntity(request);
+      const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - Clock::now());
+      if (left.count() <= 0) return sentences;
+      const absl::StatusOr<v1::ExplainEntityResponse> answer =
+          connection.ExplainEntity(request, left);
       seen |= !answer.ok() || answer->visibility() == v1::VISIBILITY_SEEN ||
               answer->visibility() == v1::VISIBILITY_ERASES;
       if (seen) break;
@@ -47,7 +51,7 @@ std::vector<std::string> Unseen(uint64_t owner, const std::string& layer,
     }
     if (seen) continue;
     sentences.push_back(
-        EscapeForTerminal(absl::StrCat("nothing of \"", ids[i], "\" can be seen ", why)));
+        EscapeForTerminal(absl::StrCat("nothing of \"", id, "\" can be seen ", why)));
   }
   return sentences;
 }

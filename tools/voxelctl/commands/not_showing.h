@@ -14,8 +14,8 @@ namespace voxeld::voxelctl {
 std::vector<std::string> NotShowing(const v1::ListDisplaysResponse& displays);
 
 // Asks the server about the entities `ids` of a layer. Returns: a sentence for each of which nothing can be seen on any display, with the
-// reason on the first; fit for a terminal. Only the first few entities are asked about, since each costs the server a draw. What the server
-// does not answer is passed over.
+// reason on the first; fit for a terminal. Each answer costs the server a few draws, so what it does not answer within 1.5 s in all is passed
+// over.
 std::vector<std::string> Unseen(uint64_t owner, const std::string& layer,
                                 const std::vector<std::string>& ids, Connection& connection);
 

@@ -211,12 +211,12 @@ absl::StatusOr<v1::ListEntitiesResponse> Connection::ListEntities(v1::ListEntiti
 }
 
 absl::StatusOr<v1::ExplainEntityResponse> Connection::ExplainEntity(
-    const v1::ExplainEntityRequest& request) {
+    const v1::ExplainEntityRequest& request, std::optional<milliseconds> limit) {
   return impl_->Unary<v1::ExplainEntityResponse>(
       [&](grpc::ClientContext* context, v1::ExplainEntityResponse* response) {
         return impl_->scene().ExplainEntity(context, request, response);
       },
-      kDrawnTime);
+      limit.value_or(kDrawnTime));
 }
 
 absl::StatusOr<v1::ClearLayerResponse> Connection::ClearLayer(

@@ -1,8 +1,10 @@
 // The calls that voxelctl makes. This folder alone knows gRPC; its headers do not.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,7 +40,10 @@ class Connection {
   // All pages in one answer, or the first alone, which has all layers.
   absl::StatusOr<v1::ListEntitiesResponse> ListEntities(v1::ListEntitiesRequest request,
                                                         bool first_page_only = false);
-  absl::StatusOr<v1::ExplainEntityResponse> ExplainEntity(const v1::ExplainEntityRequest& request);
+  // DeadlineExceeded if it takes longer than `limit`, or without one as long as a drawing may take.
+  absl::StatusOr<v1::ExplainEntityResponse> ExplainEntity(
+      const v1::ExplainEntityRequest& request,
+      std::optional<std::chrono::milliseconds> limit = std::nullopt);
   absl::StatusOr<v1::ClearLayerResponse> ClearLayer(const v1::ClearLayerRequest& request);
   absl::StatusOr<v1::ListAssetsResponse> ListAssets();
   absl::StatusOr<v1::ListOwnersResponse> ListOwners();
