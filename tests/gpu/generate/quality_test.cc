@@ -1,5 +1,5 @@
 // What the generator's voxels are like: neighbours, duplicates, gaps, distance, the way back; beside the paper's
-// own definition, by its seven-neighbour search. `--gtest_filter=Quality.*` prints the figures of docs/fidelity.md.
+// own definition, by its seven-neighbour search. `--gtest_filter=Quality.*` prints the figures of docs/results/fidelity.md.
 #include <gtest/gtest.h>
 
 #include <algorithm>

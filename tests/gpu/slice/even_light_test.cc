@@ -1,5 +1,5 @@
 // Every display that is shipped: a solid of one colour is evenly bright, at as much light as can be had evenly, and each voxel
-// lights a pixel by itself. What is measured is printed: docs/fidelity.md has it.
+// lights a pixel by itself. What is measured is printed: docs/results/fidelity.md has it.
 #include <gtest/gtest.h>
 
 #include <cstdio>
