@@ -7,6 +7,7 @@
 import pathlib
 import re
 import sys
+import textwrap
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PROTO = ROOT / "proto/voxeld/v1/primitives.proto"
@@ -47,33 +48,31 @@ HEAD = """# Primitives
 
 <!-- Written by tools/primitives_doc.py from proto/voxeld/v1/primitives.proto, gpu/primitives/ and the gallery's examples. -->
 
-What can be drawn, by the name of its field in `Primitive`. Coordinates are in the entity's own space: its transform, its layer's and
-the display's view follow. Both engines cover the same voxels. `voxelctl draw "SHAPE NAME=VALUE …"` takes the same names, and of
+All shapes, by their field in `Primitive`. Coordinates are in the entity's own space, before its transform, its layer's and
+the display's view. Both engines cover the same voxels. `voxelctl draw "SHAPE NAME=VALUE …"` takes the same names, and for
 every shape
 
 | also | unit | default | |
 |---|---|---|---|
-| `color` | 0xRRGGBB | white | of everything without colours of its own; `#rrggbb` or a plain name |
+| `color` | 0xRRGGBB | white | for everything without colours of its own; `#rrggbb` or a plain name |
 | `color_scale` | – | none | colours by numbers: [ColorScale](#colorscale) |
 | `scale` | times | 1, 1, 1 | along each axis, first |
 | `turn` | degrees | 0, 0, 0 | about x, then y, then z |
-| `at` | length | 0, 0, 0 | by how much it is moved, last |
+| `at` | length | 0, 0, 0 | translation, last |
 | `priority` | 0 to 126 | 0 | the higher shows where several cover a voxel |
-| `erase` | – | false | takes away what is of lower or equal priority in its layer |
-| `lifetime` | seconds | it stays | |
+| `erase` | – | false | removes lower or equal priorities in its layer |
+| `lifetime` | seconds | unlimited | |
 | `label` | – | as it was typed | for people |
 
-How values are typed there: vectors `x,y,z`, or one number for all three; a box its corners, `x,y,z:x,y,z`; vertices `x,y,z x,y,z …`;
-what has spaces in quotes; thicknesses numbers of voxels, or of the shape's units with a `u` behind (`shell=0.16u`); enumerations their last
-word (`fill=solid`); colours `#rrggbb` or plain names; pictures the path of a PNG or JPEG file, or `base64:` and its bytes; numbers of grids
-and heights as many as there are samples, of the type given (`grid.type=u8`), or `file:` and the path of a raw file of that type,
-little-endian; a boundary `x,y,z` of each vertex, the axis and its form before them (`y b_spline 1,0,0 …`). Counts and element types
-of vertices follow of themselves.
+On the command line a vector is `x,y,z`, or one number for all three; a box `x,y,z:x,y,z`; vertices `x,y,z x,y,z …`; values with spaces
+are quoted; a thickness is in voxels, or in the shape's units with `u` (`shell=0.16u`); an enumeration is its last word (`fill=solid`);
+a colour `#rrggbb` or a name; a picture the path of a PNG or JPEG file, or `base64:` and its bytes; grids and heights are their numbers,
+or `file:` and the path of a little-endian raw file, of the type given (`grid.type=u8`); a boundary is its axis, form and vertices
+(`y b_spline 1,0,0 …`). Counts and element types of vertices are derived.
 
-**Units.** A *length* is in the entity's own units, as coordinates are; of a *direction* the length does not matter; *voxels* are the
-display's. *0 to 1* and the like are ranges, other words counts; – has none. **Defaults** are what holds where a field is not set;
-without what is *needed* a shape is refused. **Guarantees** are what the tests hold each shape to; h is half of a shell's thickness, in
-voxels. `voxelctl gallery` made the pictures, of what a display of 128³ voxels shows.
+**Units.** A *length* is in the entity's own units; the length of a *direction* does not matter; *voxels* are the display's.
+*0 to 1* and the like are ranges, other words counts; – has none. A shape without a *needed* field is refused. Tests check each
+**guarantee**; h is half of a shell's thickness, in voxels. `voxelctl gallery` made the pictures, of a display of 128³ voxels.
 
 ![Every shape, each as a display shows it](images/gallery.png)
 """
@@ -81,19 +80,18 @@ voxels. `voxelctl gallery` made the pictures, of what a display of 128³ voxels 
 
 BESIDE = """## Beside shapes
 
-`voxelctl draw` takes these as well, in any order, in the same command; each stands for a message of
+`voxelctl draw` accepts these, too, in any order; each is a message of
 [scene.proto](../proto/voxeld/v1/scene.proto).
 
 | | |
 |---|---|
-| `object NAME: SHAPE …` | a part of an object, which draws nothing itself; `instance object=NAME` draws it |
-| `mask: SHAPE …` | the others are seen only in voxels that such shapes cover; these are not seen themselves |
-| `clip_plane a= b= c= d=` | what lies where a·x + b·y + c·z + d < 0 is cut off |
-| `clip_box size=x,y,z` | what lies beyond the box is cut off; also `center`, and `scale`, `turn` and `at` as of shapes |
-| `clip_cylinder start=x,y,z end=x,y,z radius=` | what lies beyond the cylinder is cut off |
+| `object NAME: SHAPE …` | a part of an object; `instance object=NAME` draws it |
+| `mask: SHAPE …` | other shapes are visible only in voxels that these cover; these are invisible |
+| `clip_plane a= b= c= d=` | cuts off where a·x + b·y + c·z + d < 0 |
+| `clip_box size=x,y,z` | cuts off everything outside the box; also `center`, and `scale`, `turn` and `at` as of shapes |
+| `clip_cylinder start=x,y,z end=x,y,z radius=` | cuts off everything outside the cylinder |
 
-Clips and masks are of all shapes of the command; of several clips only what lies within all of them is left. Their coordinates are the
-scene's.
+Clips and masks apply to all shapes of the command; several clips intersect. Their coordinates are the scene's.
 
 ```
 voxelctl draw "sphere radius=0.9 fill=solid" "clip_box size=2,1,2 at=0,0.5,0" "clip_cylinder start=0,0,-1 end=0,0,1 radius=0.6"
@@ -103,6 +101,15 @@ voxelctl draw "sphere radius=0.9 fill=solid" "clip_box size=2,1,2 at=0,0.5,0" "c
 voxelctl draw "implicit surface='z = 0.3*sin(5*x)*cos(5*y)' level='z+0.5' colormap=viridis" "mask: sphere radius=0.8 fill=solid"
 ```
 """
+
+
+def wrapped(text: str) -> str:
+    """The same in lines of at most 140 characters, where it has longer ones; a list's lines are indented."""
+    lines = []
+    for line in text.split("\n"):
+        indent = "  " if line.startswith("- ") else re.match(r" *", line)[0]
+        lines += [line] if len(line) <= 140 else textwrap.wrap(line, 140, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+    return "\n".join(lines)
 
 
 def comment_above(lines: list[str], at: int) -> str:
@@ -201,7 +208,7 @@ def table(message: str, fields: list[tuple[str, str, str]], values: dict[str, li
             taken, said = allowed(of, said)
             said = "; ".join(filter(None, [words(taken), said]))
         if f"{message}.{kind}" in values:
-            own += [f"- `{value}`: {comment}" for value, comment in values[f"{message}.{kind}"][1:] if comment]
+            own += [wrapped(f"- `{value}`: {comment}") for value, comment in values[f"{message}.{kind}"][1:] if comment]
         row = [f"`{name}`", kind, unit, default, said or BY_NAME.get(name, "")]
         out.append("| " + " | ".join(cell.replace("|", chr(92) + "|") for cell in row) + " |")
     return [*out, "", *own, *([""] if own else [])]
@@ -264,7 +271,7 @@ def page() -> str:
         guarantees = [promised] if promised else []
         out.append(f"## {field}\n")
         if about:
-            out.append(about + "\n")
+            out.append(wrapped(about) + "\n")
         out += table(message, fields, values)
         elsewhere = []
         for path, said, promised in headers(message):
@@ -274,24 +281,27 @@ def page() -> str:
                 elsewhere.append(f"`{path}`, under [{pages[path]}](#{pages[path]})")
             else:
                 pages[path] = field
-                out.append(f"**What it covers** (`{path}`): {said}\n")
+                out.append(wrapped(f"**Coverage** (`{path}`): {said}") + "\n")
         if elsewhere:
-            out.append(f"**What it covers**, as others do: {'; '.join(elsewhere)}.\n")
+            out.append(wrapped(f"**Coverage**, shared with others: {'; '.join(elsewhere)}.") + "\n")
         if not guarantees:
             sys.exit(f"nothing says what {message} guarantees: a header's comment, or the message's, has \"Guarantee: …\"")
-        out.append(f"**Guarantee**: {' '.join(guarantees)}\n")
+        out.append(wrapped(f"**Guarantee**: {' '.join(guarantees)}") + "\n")
         for name, text in shown.get(field, []):
             shapes = " \\\n    ".join(f'"{shape}"' for shape in re.split(r"(?<!\\)\\n", text))
-            out.append(f"{picture(name)}\n\n```\nvoxelctl draw {shapes}\n```\n")
-    out.append("## Types that several have\n")
+            # A backslash at the end of a line continues it in the shell, within double quotes too.
+            command = "\n".join(" \\\n".join(textwrap.wrap(line, 138, break_long_words=False, break_on_hyphens=False, drop_whitespace=True))
+                                if len(line) > 140 else line for line in f"voxelctl draw {shapes}".split("\n"))
+            out.append(f"{picture(name)}\n\n```\n{command}\n```\n")
+    out.append("## Shared types\n")
     for message in ("Vertices", "Thickness", "Texture", "ColorScale", "Grid", "Transfer", "Expression", "Boundary"):
         above, fields = all_messages[message]
-        out.append(f"### {message}\n\n{above}\n")
+        out.append(f"### {message}\n\n{wrapped(above)}\n")
         if fields:
             out += table(message, fields, values)
     for name in ("Fill", "SurfaceRule", "LineSampling"):
-        out.append(f"### {name}\n\n{words(values[name][1:])}; `{unless_told(values[name])}` unless told.\n")
-        out += [*(f"- `{value}`: {comment}" for value, comment in values[name][1:] if comment), ""]
+        out.append(f"### {name}\n\n{words(values[name][1:])}; default `{unless_told(values[name])}`.\n")
+        out += [*(wrapped(f"- `{value}`: {comment}") for value, comment in values[name][1:] if comment), ""]
     out.append(BESIDE)
     out.append("[Expressions](expressions.md) have a page of their own; colour maps are those of "
                "`proto/voxeld/v1/colormaps.txt`.\n")

@@ -1,4 +1,4 @@
-// A shaft with a cone at its end: the union of two cones (cone.h).
+// A shaft with a conical head: the union of two cones (cone.h).
 //
 // Guarantee: as gpu/implicit/field.h has it, with shells mitred past the head's rim and the tip.
 #pragma once

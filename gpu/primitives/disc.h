@@ -1,6 +1,6 @@
 // A disc across its normal, or a ring: its plane, bounded by the distance from its axis.
 //
-// Guarantee: what is lit lies within h of the plane, or half a voxel (COVER: half a voxel's
+// Guarantee: lit voxels lie within h of the plane, or half a voxel (COVER: half a voxel's
 // diagonal) where that is more, and within the rim; all that lies within h and the rim is lit, but
 // for 0.02 voxel at the rim; within the rim no step gets through. The rim is cut along the normal.
 #pragma once

@@ -1,7 +1,7 @@
 // A plane polygon of closed curves, holes included, by the even-odd rule: its plane, bounded by the
 // curves projected along the axis nearest to its normal.
 //
-// Guarantee: what is lit lies within h of the plane, or half a voxel (COVER: half a voxel's
+// Guarantee: lit voxels lie within h of the plane, or half a voxel (COVER: half a voxel's
 // diagonal) where that is more, and within the rim; all that lies within h and the rim is lit, but
 // for 0.02 voxel at the rim; within the rim no step gets through. Rims are cut along the axis
 // nearest to the normal, so a shell's edge leans, by h·√2 at most.

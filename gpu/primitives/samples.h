@@ -8,7 +8,7 @@
 // outside of the grid has nothing.
 //
 //   volume   a value v is the entry ⌊(v − low)·scale⌋ of the table, 0 to 255; entries without the
-//            bit kDrawn cover nothing, nor do values that are no numbers. Colours are their own:
+//            bit kDrawn cover nothing, nor do values that are not numbers. Colours are their own:
 //            c·a/255, nothing where a is 0.
 //   level    inside is where v ≥ level. SOLID covers what is inside; SURFACE by
 //            |level − v| ≤ h·|∇v|, and the neighbours on either side, as gpu/implicit/field.h has

@@ -1,9 +1,9 @@
 // Smooth curves along points, as cubic Béziers: through them all (Catmull–Rom, whose tangents are
 // half of the way between neighbours), or near them (uniform cubic B-splines), and Béziers as they
-// are. An open one goes on past its ends in a straight line, so it begins and ends in its end
+// are. An open one continues in a straight line, so it begins and ends in the outermost
 // points.
 //
-// Guarantee: a curve begins and ends in its end points; Catmull–Rom goes through all its points;
+// Guarantee: a curve begins and ends in its outermost points; Catmull–Rom goes through all its points;
 // it and B-splines are smooth.
 #pragma once
 
