@@ -16,6 +16,7 @@ import pathlib
 import re
 import subprocess
 import sys
+import textwrap
 import tomllib
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -87,15 +88,21 @@ def faults(source):
     return wrong
 
 
+def wrapped(line):
+    """The line in parts of at most 140 characters."""
+    return [line] if len(line) <= 140 else textwrap.wrap(line, 140, break_long_words=False, break_on_hyphens=False)
+
+
 def page(source):
     out = ["# Known advisories", "",
-           "What is known of the libraries that voxeld is made of, and what it means for voxeld: written by `tools/advisories.py` from "
-           "[advisories.toml](advisories.toml), which also makes [voxeld.openvex.json](voxeld.openvex.json) for scanners. Gone through last on "
-           f"{source['timestamp']:%Y-%m-%d}. What a build is made of stands in its `voxeld.spdx.json`.", "",
+           "Known advisories of the libraries that voxeld uses, and their effect on voxeld.",
+           "Written by `tools/advisories.py` from [advisories.toml](advisories.toml), like [voxeld.openvex.json](voxeld.openvex.json) for scanners.",
+           f"Last reviewed on {source['timestamp']:%Y-%m-%d}. Each build lists its components in `voxeld.spdx.json`.", "",
            "*Exploitable*: in voxeld, as it is packaged for Debian 12 with all its updates.", ""]
     for library in source["library"]:
         packages = ", ".join(f"`{name}`" for name in library["packages"])
-        out += [f"## {library['name']}", "", f"{packages + ' ' if packages else ''}{library['version']}. {library.get('text', '')}".strip(), ""]
+        said = f"{packages + ' ' if packages else ''}{library['version']}. {library.get('text', '')}".strip()
+        out += [f"## {library['name']}", "", *(part for line in said.split("\n") for part in wrapped(line)), ""]
         those = [one for one in source["advisory"] if one["library"] == library["name"]]
         if not those:
             continue
