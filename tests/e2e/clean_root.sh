@@ -45,11 +45,11 @@ in_root dpkg -s voxeld | grep -E '^(Package|Status|Version|Depends)'
 } >"$root/tmp/install.sh"
 in_root bash -euxc '. /tmp/install.sh' 2>&1 | sed 's/^/   /'
 
-step "who may do what, other machines"
+step "access control, other machines"
 mkdir "$root/root/work"
 {
   echo 'sudo() { "$@"; }'
-  block "Who may do what" 1
+  block "Access control" 1
   block "Other machines" 1
 } >"$root/tmp/access.sh"
 in_root bash -euc 'cd /root/work; . /tmp/access.sh' >>"$root.log" 2>&1 || fail "access: $(tail -5 "$root.log")"
