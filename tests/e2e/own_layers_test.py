@@ -91,7 +91,7 @@ class Layers(unittest.TestCase):
         self.assertRegex(said, r'nothing of "draw 2" can be seen on display sim: .*outside')
         self.assertRegex(said, r'nothing of "draw 3" can be seen on display sim: .*black')
         # All of them are asked about, however many.
-        many = ["point 0,0,0"] * 20 + ["sphere radius=0.1 at=9,9,9"]
+        many = ["sphere radius=0.1"] * 20 + ["sphere radius=0.1 at=9,9,9"]
         told = json.loads(self.run_as("painter", "--json", "draw", *many).stdout)
         self.assertEqual(len(told["unseen"]), 1)
 
