@@ -24,6 +24,7 @@ constexpr int kMostSequences = 32;
 constexpr uint32_t kUndefined = UINT32_MAX;
 constexpr uint32_t kItem = 0xFFFEE000, kItemEnd = 0xFFFEE00D, kSequenceEnd = 0xFFFEE0DD;
 constexpr uint32_t kPixels = 0x7FE00010;
+constexpr uint32_t kModalityTables = 0x00283000, kDisplayTables = 0x00283010;  // sequences
 constexpr absl::string_view kDeflated = "1.2.840.10008.1.2.1.99",
                             kBigEndian = "1.2.840.10008.1.2.2", kRunLengths = "1.2.840.10008.1.2.5";
 // Two letters whose elements have lengths of 32 bits.
@@ -114,15 +115,14 @@ class Walker {
       const bool was = explicit_;
       if (implicit) explicit_ = false;
       if (top && tag == kPixels) facts_.compressed = true;
-      absl::Status status = Items(at, end, tag, tag == kPixels, depth + 1);
+      absl::Status status = Within(tag, at, end, tag == kPixels, depth);
       explicit_ = was;
       return status;
     }
     if (length > end - *at) return CutOff(tag, length, end - *at);
     const size_t after = *at + length;
     if (kind == "SQ" || (kind.empty() && tag != kPixels && BeginsWithItem(*at, length))) {
-      if (absl::Status status = Items(at, after, tag, false, depth + 1); !status.ok())
-        return status;
+      if (absl::Status status = Within(tag, at, after, false, depth); !status.ok()) return status;
     } else {
       Take(tag, bytes_.substr(*at, length), top);
     }
@@ -135,6 +135,14 @@ class Walker {
     if (length < 8 || (uint32_t{U16(at)} << 16 | U16(at + 2)) != kItem) return false;
     const uint32_t item = U32(at + 4);
     return item == kUndefined || item <= length - 8;
+  }
+
+  // The items of the element `tag`.
+  absl::Status Within(uint32_t tag, size_t* at, size_t end, bool fragments, int depth) {
+    const uint32_t outer = std::exchange(sequence_, tag);
+    absl::Status status = Items(at, end, tag, fragments, depth + 1);
+    sequence_ = outer;
+    return status;
   }
 
   // Items up to a delimiter or `end`; `fragments`: their contents are no elements.
@@ -172,6 +180,14 @@ class Walker {
     return absl::OkStatus();
   }
 
+  // Of 16 bits each.
+  std::vector<uint32_t> Numbers(absl::string_view value) const {
+    std::vector<uint32_t> numbers;
+    for (size_t i = 0; i + 2 <= value.size(); i += 2)
+      numbers.push_back(U16(static_cast<size_t>(value.data() - bytes_.data()) + i));
+    return numbers;
+  }
+
   static std::string Text(absl::string_view value) {
     return std::string(absl::StripAsciiWhitespace(value.substr(0, value.find('\0'))));
   }
@@ -187,6 +203,11 @@ class Walker {
                                   : tag == 0x00281050 ? &facts_.window_center
                                   : tag == 0x00281051 ? &facts_.window_width
                                                       : nullptr;
+    if (sequence_ == kModalityTables && tag == 0x00283002)
+      facts_.modality.descriptor = Numbers(value);
+    if (sequence_ == kModalityTables && tag == 0x00283006)
+      facts_.modality.entries = {static_cast<size_t>(value.data() - bytes_.data()), value.size()};
+    facts_.display_tables += sequence_ == kDisplayTables && tag == 0x00283006 ? 1 : 0;
     if (!top && tag == 0x00281052) facts_.intercepts.push_back(Text(value));
     if (!top && tag == 0x00281053) facts_.slopes.push_back(Text(value));
     if (anywhere != nullptr) {
@@ -206,10 +227,7 @@ class Walker {
       return;
     }
     if (tag >= 0x00281101 && tag <= 0x00281103) {
-      DicomFacts::Palette& palette = facts_.palette[tag - 0x00281101];
-      palette.descriptor.clear();
-      for (size_t i = 0; i + 2 <= value.size(); i += 2)
-        palette.descriptor.push_back(U16(static_cast<size_t>(value.data() - bytes_.data()) + i));
+      facts_.palette[tag - 0x00281101].descriptor = Numbers(value);
       return;
     }
     if (tag >= 0x00281201 && tag <= 0x00281203) {
@@ -217,6 +235,8 @@ class Walker {
                                                   value.size()};
       return;
     }
+    // Groups 6000 to 601e: the rows of an overlay.
+    if ((tag & 0xFFE1FFFF) == 0x60000010) ++facts_.overlays;
     const uint16_t number =
         value.size() >= 2 ? U16(static_cast<size_t>(value.data() - bytes_.data())) : uint16_t{0};
     switch (tag) {
@@ -238,6 +258,26 @@ class Walker {
       case 0x3004000C:
         facts_.frame_offsets = Text(value);
         break;
+      case 0x00181164:
+        facts_.detector_spacing = Text(value);
+        break;
+      case 0x00182010:
+        facts_.film_spacing = Text(value);
+        break;
+      case 0x00280034:
+        facts_.aspect = Text(value);
+        break;
+      case 0x00280009: {
+        const std::vector<uint32_t> halves = Numbers(value);
+        for (size_t i = 0; i + 1 < halves.size(); i += 2)
+          facts_.frame_axes.push_back(halves[i] << 16 | halves[i + 1]);
+        break;
+      }
+      case 0x00540080: {
+        const std::vector<uint32_t> slices = Numbers(value);
+        facts_.slice_order.assign(slices.begin(), slices.end());
+        break;
+      }
       case 0x00280008:
         if (!absl::SimpleAtoi(Text(value), &facts_.frames)) facts_.frames = 0;
         break;
@@ -306,6 +346,10 @@ class Walker {
     }
     if (absl::Status status = palette ? CheckPalette() : absl::OkStatus(); !status.ok())
       return status;
+    if (!facts_.modality.descriptor.empty()) {
+      const absl::Status status = CheckTable(facts_.modality, "table of what its numbers mean");
+      if (!status.ok()) return status;
+    }
     // At most 2³² of the first two, so that the product cannot wrap.
     const uint64_t pixels = facts_.rows * facts_.columns;
     if (facts_.frames > kMaxModelSamples / pixels) {
@@ -384,23 +428,35 @@ class Walker {
   }
 
   absl::Status CheckPalette() const {
-    static constexpr const char* kNames[] = {"red", "green", "blue"};
+    static constexpr const char* kNames[] = {"palette of red", "palette of green",
+                                             "palette of blue"};
     for (size_t i = 0; i < 3; ++i) {
-      const auto& [descriptor, entries] = facts_.palette[i];
-      const auto& [at, length] = entries;
-      if (descriptor.size() != 3 || (descriptor[2] != 8 && descriptor[2] != 16)) {
-        return FileError(file_, absl::StrCat("has no palette of ", kNames[i], " that can be read"),
-                         "three numbers (entries, the first, 8 or 16 bits) are expected at "
-                         "(0028,1101) to (0028,1103)");
+      if (absl::Status status = CheckTable(facts_.palette[i], kNames[i]); !status.ok())
+        return status;
+      const uint32_t bits = facts_.palette[i].descriptor[2];
+      if (bits != 8 && bits != 16) {
+        return FileError(file_, absl::StrCat("has ", bits, " bits for entries of its ", kNames[i]),
+                         "8 or 16 are expected");
       }
-      const uint64_t count = descriptor[0] == 0 ? 65536 : descriptor[0];
-      // Entries of 8 bits may have 16 bits of room.
-      if (length < count || (descriptor[2] == 16 && length < count * 2)) {
-        return FileError(file_,
-                         absl::StrCat("has ", length, " bytes for ", count, " entries of ",
-                                      descriptor[2], " bits in its palette of ", kNames[i]),
-                         "all of them are expected");
-      }
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status CheckTable(const DicomFacts::Palette& table, absl::string_view name) const {
+    const auto& [descriptor, entries] = table;
+    const auto& [at, length] = entries;
+    if (descriptor.size() != 3 || descriptor[2] < 8 || descriptor[2] > 16) {
+      return FileError(file_, absl::StrCat("has no ", name, " that can be read"),
+                       "three numbers (entries, the first, 8 to 16 bits) are expected to describe "
+                       "it");
+    }
+    const uint64_t count = descriptor[0] == 0 ? 65536 : descriptor[0];
+    // Entries of 8 bits may have 16 bits of room.
+    if (length < count || (descriptor[2] > 8 && length < count * 2)) {
+      return FileError(file_,
+                       absl::StrCat("has ", length, " bytes for ", count, " entries of ",
+                                    descriptor[2], " bits in its ", name),
+                       "all of them are expected");
     }
     return absl::OkStatus();
   }
@@ -443,6 +499,7 @@ class Walker {
   const SourceFile& file_;
   const absl::string_view bytes_;
   bool explicit_ = true;
+  uint32_t sequence_ = 0;  // the element whose items are walked
   DicomFacts facts_;
 };
 

@@ -21,6 +21,10 @@ struct DicomFacts {
   std::string transfer_syntax, series, photometric;
   std::string orientation, spacing, slice_thickness, slices_apart, slope, intercept, window_center,
       window_width;
+  // How far apart pixels were on the detector or the scanned film, and how high one is for how wide: used where `spacing` is missing.
+  std::string detector_spacing, film_spacing, aspect;
+  std::vector<uint32_t> frame_axes;    // elements whose value differs from frame to frame
+  std::vector<uint16_t> slice_order;   // the slice of each frame, from 1 on
   std::string frame_offsets;           // of the frames of a dose, along the normal
   std::vector<std::string> positions;  // of the image, or of its frames in their order
   std::vector<std::string> slopes,
@@ -34,12 +38,14 @@ struct DicomFacts {
   bool planar = false;      // of several numbers a pixel: all of the first, then all of the second
   bool big_endian = false;  // numbers, those of pixels and palettes too
   bool has_pixels = false;
-  // Of red, green and blue: how many entries, from which number on, of how many bits; and where they lie.
+  // A table: how many entries, from which number on, of how many bits; and where they lie. `palette`: of red, green and blue.
   struct Palette {
     std::vector<uint32_t> descriptor;
     std::pair<size_t, size_t> entries = {0, 0};
   };
   std::array<Palette, 3> palette;
+  Palette modality;  // what a stored number means, in place of a slope; no entries: there is none
+  uint64_t overlays = 0, display_tables = 0;  // which are not shown
   // Where the pixels lie in the file: as they are, all frames, or compressed, in fragments, of which the first is a table.
   bool compressed = false;
   std::vector<std::pair<size_t, size_t>> pixels;  // from which byte on, how many

@@ -166,6 +166,27 @@ absl::StatusOr<std::string> Decompress(const SourceFile& file, const DicomFacts&
        .big_endian = false});
 }
 
+// The number to which a table's first entry belongs, which is signed where the pixels are.
+int32_t FirstOf(const DicomFacts& facts, const DicomFacts::Palette& table) {
+  const auto bits = static_cast<uint16_t>(table.descriptor[1]);
+  return facts.is_signed ? static_cast<int16_t>(bits) : bits;
+}
+
+// Puts entries of a table in place of the numbers that name them.
+void LookUp(const SourceFile& file, const DicomFacts& facts, const DicomFacts::Palette& table,
+            float* begin, float* end) {
+  const auto& [descriptor, entries] = table;
+  const uint32_t count = descriptor[0] == 0 ? 65536 : descriptor[0];
+  const bool wide = entries.second >= uint64_t{count} * 2;
+  std::vector<float> values;
+  DecodeSamples(absl::string_view(file.bytes).substr(entries.first, count * (wide ? 2 : 1)),
+                {.type = wide ? SampleType::kU16 : SampleType::kU8, .big_endian = facts.big_endian},
+                &values);
+  const double first = FirstOf(facts, table), last = static_cast<double>(values.size() - 1);
+  for (float* at = begin; at != end; ++at)
+    *at = values[static_cast<size_t>(std::clamp(double{*at} - first, 0.0, last))];
+}
+
 // Three bytes a pixel of places in a palette.
 std::string FromPalette(const SourceFile& file, const DicomFacts& facts,
                         const std::vector<float>& places) {
@@ -185,7 +206,7 @@ std::string FromPalette(const SourceFile& file, const DicomFacts& facts,
   out.reserve(places.size() * 3);
   for (const float place : places) {
     for (size_t k = 0; k < 3; ++k) {
-      const uint32_t first = facts.palette[k].descriptor[1];
+      const int32_t first = FirstOf(facts, facts.palette[k]);
       const double at =
           std::clamp(double{place} - first, 0.0, static_cast<double>(tables[k].size() - 1));
       out += static_cast<char>(tables[k][static_cast<size_t>(at)]);
@@ -252,7 +273,12 @@ absl::Status Decode(const SourceFile& file, const DicomFacts& facts, SampledVolu
                                   OfFrame(facts, i, facts.intercepts, facts.intercept));
     code.slope = !slope.empty() && slope[0] != 0 ? slope[0] : 1;
     code.intercept = !intercept.empty() ? intercept[0] : 0;
+    if (!facts.modality.descriptor.empty()) code.slope = 1, code.intercept = 0;
     DecodeSamples(bytes.substr(i * frame, frame), code, &volume->samples);
+  }
+  if (!facts.modality.descriptor.empty()) {
+    float* const end = volume->samples.data() + volume->samples.size();
+    LookUp(file, facts, facts.modality, end - pixels, end);
   }
   return absl::OkStatus();
 }

@@ -27,7 +27,7 @@ constexpr double kSameDirection = 0.999;  // the least cosine between them
 Point3 Cross(const Point3& a, const Point3& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-double Dot(const Point3& a, const Point3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+double Inner(const Point3& a, const Point3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 Point3 Times(const Point3& p, double by) { return {p.x * by, p.y * by, p.z * by}; }
 Point3 Less(const Point3& a, const Point3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 
@@ -53,8 +53,12 @@ Slice Locate(const DicomFacts& facts) {
   Slice slice;
   slice.size = {facts.columns, facts.rows, facts.frames};
   slice.channels = facts.samples_per_pixel;
-  const std::vector<double> spacing = DicomNumbers(facts.spacing),
-                            o = DicomNumbers(facts.orientation),
+  std::vector<double> spacing;
+  for (const std::string* text :
+       {&facts.spacing, &facts.detector_spacing, &facts.film_spacing, &facts.aspect}) {
+    if (spacing.size() != 2) spacing = DicomNumbers(*text);
+  }
+  const std::vector<double> o = DicomNumbers(facts.orientation),
                             thickness = DicomNumbers(facts.slice_thickness),
                             apart = DicomNumbers(facts.slices_apart),
                             offsets = DicomNumbers(facts.frame_offsets);
@@ -81,7 +85,7 @@ Slice Locate(const DicomFacts& facts) {
 
 // A place along the normal; 0 if it is too far away for a number.
 double Along(const Slice& slice, const Point3& place) {
-  const double along = Dot(slice.Normal(), place);
+  const double along = Inner(slice.Normal(), place);
   return std::isfinite(along) ? along : 0;
 }
 
@@ -92,6 +96,15 @@ struct Layer {
   double along = 0;  // its place along the normal
   std::vector<double> time;
 };
+
+// Whether frames without places of their own follow each other in time, or differ in something else that is no place.
+bool AreAlternatives(const DicomFacts& facts) {
+  constexpr uint32_t kSliceOrder = 0x00540080, kDoseOffsets = 0x3004000C;
+  return !facts.frame_axes.empty() &&
+         std::none_of(facts.frame_axes.begin(), facts.frame_axes.end(), [](uint32_t element) {
+           return element == kSliceOrder || element == kDoseOffsets;
+         });
+}
 
 // Puts layers into the order in which they lie. Of those at one place the first in time stays.
 // Returns: how many times there are, less one.
@@ -132,7 +145,7 @@ Point3 StepOf(const std::vector<Layer>& layers, const Slice& first, std::string*
       *note = absl::StrCat("its slices are unevenly apart (", nearest, " to ", farthest,
                            "); shown as if they were even");
     const Point3 step = Times(Less(layers.back().place, layers.front().place), 1 / count);
-    if (std::abs(Dot(step, first.Normal())) > 1e-6 * std::sqrt(Dot(step, step))) return step;
+    if (std::abs(Inner(step, first.Normal())) > 1e-6 * std::sqrt(Inner(step, step))) return step;
   }
   const double between = first.between != 0 && std::isfinite(first.between) ? first.between : 1;
   return Times(first.Normal(), between);
@@ -169,6 +182,7 @@ absl::StatusOr<Model> Finish(const SourceFile& file, const DicomFacts& facts, co
   }
   if (facts.photometric == "MONOCHROME1") TurnRound(&volume);
   Model model;
+  AddLeftOut("tables for displays", volume.window ? 0 : facts.display_tables, &model);
   model.path = file.path;
   model.format = "DICOM";
   model.up = Up::kZ;
@@ -212,8 +226,8 @@ struct Stack {
   bool Takes(const std::string& other_series, const Slice& other) const {
     return series == other_series && first.size[2] == 1 && first.size == other.size &&
            first.channels == other.channels && first.places.empty() == other.places.empty() &&
-           Dot(first.right, other.right) > kSameDirection &&
-           Dot(first.down, other.down) > kSameDirection;
+           Inner(first.right, other.right) > kSameDirection &&
+           Inner(first.down, other.down) > kSameDirection;
   }
 };
 
@@ -269,6 +283,7 @@ absl::StatusOr<Model> ReadStack(const SourceFile& folder, Stack* stack) {
   SampledVolume volume;
   volume.samples.reserve(first.size[0] * first.size[1] * layers.size());
   DicomFacts first_facts;
+  uint64_t overlays = 0;
   for (const Layer& layer : layers) {
     const absl::StatusOr<SourceFile> file = ReadPlain(stack->paths[layer.number]);
     if (!file.ok()) return file.status();
@@ -278,6 +293,7 @@ absl::StatusOr<Model> ReadStack(const SourceFile& folder, Stack* stack) {
     if (!stack->Takes(facts->series, Locate(*facts)))
       return FileError(*file, "has changed since it was read first", "read it again");
     if (&layer == &layers[0]) first_facts = *facts;
+    overlays += facts->overlays;
     if (absl::Status decoded = DecodeDicomPixels(*file, *facts, &volume); !decoded.ok())
       return decoded;
   }
@@ -287,6 +303,7 @@ absl::StatusOr<Model> ReadStack(const SourceFile& folder, Stack* stack) {
       Finish(folder, first_facts, first, layers[0].place, layers.size(), step, std::move(volume));
   if (!model.ok()) return model;
   AddLeftOut("further times", further_times, &*model);
+  AddLeftOut("overlays", overlays, &*model);
   if (!note.empty()) model->note = absl::StrCat(folder.path, ": ", note);
   return model;
 }
@@ -307,13 +324,22 @@ absl::StatusOr<Model> ReadDicomVolume(const SourceFile& file) {
   Point3 step = StepOf({}, slice, nullptr);
   size_t further_times = 0;
   std::string note;
-  if (depth > 1 && slice.places.size() >= depth) {
+  const bool has_places = slice.places.size() >= depth,
+             has_order = !has_places && facts->slice_order.size() == depth;
+  if (depth > 1 && !has_places && AreAlternatives(*facts)) {
+    further_times = depth - 1;
+    depth = 1;
+    PickFrames({Layer{}}, slice.size[0] * slice.size[1], &volume);
+  } else if (depth > 1 && (has_places || has_order)) {
     std::vector<Layer> layers;
-    for (size_t i = 0; i < depth; ++i)
-      layers.push_back({.number = i,
-                        .place = slice.places[i],
-                        .along = Along(slice, slice.places[i]),
-                        .time = {}});
+    for (size_t i = 0; i < depth; ++i) {
+      const double along = has_order ? facts->slice_order[i] * std::abs(slice.between) : 0;
+      const Point3 place = has_places ? slice.places[i]
+                                      : Point3{origin.x + slice.Normal().x * along,
+                                               origin.y + slice.Normal().y * along,
+                                               origin.z + slice.Normal().z * along};
+      layers.push_back({.number = i, .place = place, .along = Along(slice, place), .time = {}});
+    }
     further_times = SortLayers(&layers);
     step = StepOf(layers, slice, &note);
     origin = layers[0].place;
@@ -324,6 +350,7 @@ absl::StatusOr<Model> ReadDicomVolume(const SourceFile& file) {
       Finish(plain, *facts, slice, origin, depth, step, std::move(volume));
   if (!model.ok()) return model;
   AddLeftOut("further times", further_times, &*model);
+  AddLeftOut("overlays", facts->overlays, &*model);
   if (!note.empty()) model->note = absl::StrCat(file.path, ": ", note);
   return model;
 }

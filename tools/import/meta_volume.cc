@@ -295,8 +295,8 @@ class MetaReader {
     const absl::StatusOr<absl::string_view> bytes =
         TakeSamples(file, data, 0, samples_, channels_ * SampleBytes(code_.type));
     if (!bytes.ok()) return bytes.status();
-    if (code_.type == SampleType::kU8 && (channels_ == 3 || channels_ == 4)) {
-      DecodeColors(*bytes, channels_, volume);
+    if (AreColors()) {
+      DecodeColors(*bytes, code_, channels_, volume);
       return absl::OkStatus();
     }
     DecodeSamples(*bytes, code_, &volume->samples);
@@ -304,28 +304,22 @@ class MetaReader {
     return absl::OkStatus();
   }
 
+  // Three or four unsigned numbers of 8 or 16 bits are how programs write colours; others are vectors.
+  bool AreColors() const {
+    return (code_.type == SampleType::kU8 || code_.type == SampleType::kU16) &&
+           (channels_ == 3 || channels_ == 4);
+  }
+
   absl::Status ReadText(absl::string_view data, SampledVolume* volume) const {
-    std::vector<float>& out = volume->samples;
-    while (out.size() < samples_ * channels_) {
-      data.remove_prefix(std::min(data.find_first_not_of(" \t\r\n,"), data.size()));
-      if (data.empty()) {
-        return FileError(file_,
-                         absl::StrCat("has ", out.size(), " samples of ", samples_ * channels_),
-                         "the file is truncated");
-      }
-      const absl::string_view word = data.substr(0, data.find_first_of(" \t\r\n,"));
-      double value = 0;
-      if (!absl::SimpleAtod(word, &value)) {
-        return FileError(file_,
-                         absl::StrCat("sample ", out.size(), " is \"",
-                                      EscapeForTerminal(word.substr(0, 40)), "\""),
-                         "a number is expected");
-      }
-      const auto number = static_cast<float>(value * code_.slope + code_.intercept);
-      out.push_back(std::isfinite(number) ? number : std::numeric_limits<float>::quiet_NaN());
-      data.remove_prefix(word.size());
+    std::vector<float> numbers;
+    const absl::Status status = ReadTextSamples(file_, data, samples_ * channels_, code_, &numbers);
+    if (!status.ok()) return status;
+    if (AreColors()) {
+      ColorsOf(numbers, code_.type, channels_, volume);
+      return absl::OkStatus();
     }
-    KeepFirstOfEach(channels_, &out);
+    volume->samples = std::move(numbers);
+    KeepFirstOfEach(channels_, &volume->samples);
     return absl::OkStatus();
   }
 

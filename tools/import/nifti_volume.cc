@@ -61,7 +61,7 @@ struct FreeImage {
 // What both headers say, in one form.
 struct Head {
   std::array<int64_t, 8> dim = {};
-  int datatype = 0;
+  int datatype = 0, intent = 0;
   double vox_offset = 0, slope = 0, intercept = 0, cal_min = 0, cal_max = 0;
   bool apart = false;  // the samples are in a file beside it
 };
@@ -71,6 +71,7 @@ Head HeadOf(const Header& header, bool apart) {
   Head head;
   for (size_t i = 0; i < head.dim.size(); ++i) head.dim[i] = header.dim[i];
   head.datatype = header.datatype;
+  head.intent = header.intent_code;
   head.vox_offset = static_cast<double>(header.vox_offset);
   head.slope = header.scl_slope;
   head.intercept = header.scl_inter;
@@ -144,6 +145,7 @@ class NiftiReader {
       samples *= size_[axis];
     }
     const uint64_t bytes = samples * BytesEach();
+    if (planes_ > 0) return ReadPlanes(file, bytes * planes_, std::move(volume));
     if (IsPacked(file)) {
       if (absl::Status status = ReadPacked(file, bytes, &volume); !status.ok()) return status;
       return Finish(IsPacked(file), std::move(volume));
@@ -151,6 +153,23 @@ class NiftiReader {
     const absl::string_view all = file.bytes;
     if (all.size() < from_ + bytes) return CutOff(file, all.size(), bytes);
     Decode(all.substr(from_, bytes), &volume);
+    return Finish(IsPacked(file), std::move(volume));
+  }
+
+  // Colours whose red of all places stands before the green (NIFTI_INTENT_RGB_VECTOR).
+  absl::StatusOr<Model> ReadPlanes(const SourceFile& file, uint64_t bytes,
+                                   SampledVolume volume) const {
+    std::string inflated;
+    absl::string_view all = file.bytes;
+    if (IsPacked(file)) {
+      absl::StatusOr<std::string> unpacked = Inflate(file, file.bytes, from_ + bytes);
+      if (!unpacked.ok()) return unpacked.status();
+      inflated = *std::move(unpacked);
+      all = inflated;
+    }
+    if (all.size() < from_ + bytes) return CutOff(file, all.size(), bytes);
+    DecodeColors(Interleaved(all.substr(from_, bytes), planes_, SampleBytes(code_.type)), code_,
+                 planes_, &volume);
     return Finish(IsPacked(file), std::move(volume));
   }
 
@@ -213,7 +232,7 @@ class NiftiReader {
     model.up = Up::kZ;
     const uint64_t times = head_.dim[0] >= 4 ? static_cast<uint64_t>(head_.dim[4]) : 1;
     AddLeftOut("further times", times - 1, &model);
-    AddLeftOut("further components", volumes_ / times - 1, &model);
+    AddLeftOut("further components", planes_ > 0 ? 0 : volumes_ / times - 1, &model);
     model.volumes.push_back(std::move(volume));
     return model;
   }
@@ -265,6 +284,10 @@ class NiftiReader {
       return false;
     }
     code_.big_endian = big_endian;
+    // Where NIfTI has qform_code.
+    constexpr size_t kOrient = 252;
+    const auto orient = reinterpret_cast<const uint8_t*>(&first_)[kOrient];
+    orientation_ = orient <= 5 ? orient : 0;
     first_ = header;
     head_ = HeadOf(first_, true);
     is_analyze_ = true;
@@ -313,6 +336,12 @@ class NiftiReader {
           "whole numbers of 8 to 64 bits, floats of 32 or 64, and colours (128, 2304) are read");
     }
     if (type) code_.type = *type;
+    const bool is_color = (head_.intent == NIFTI_INTENT_RGB_VECTOR && head_.dim[5] == 3) ||
+                          (head_.intent == NIFTI_INTENT_RGBA_VECTOR && head_.dim[5] == 4);
+    // Behind one time alone the planes follow each other.
+    if (type && is_color && dimensions >= 5 && head_.dim[4] == 1 &&
+        volumes_ == static_cast<uint64_t>(head_.dim[5]))
+      planes_ = volumes_;
     if (std::isfinite(head_.slope) && head_.slope != 0 && std::isfinite(head_.intercept)) {
       code_.slope = head_.slope;
       code_.intercept = head_.intercept;
@@ -350,7 +379,26 @@ class NiftiReader {
     const nifti_dmat44& m = image->sform_code > 0 ? image->sto_xyz : image->qto_xyz;
     // The file's x goes to the right and y to the front of the head; the viewer stands before it, on the side of -y.
     const auto column = [&m](int c) { return Point3{-m.m[0][c], -m.m[1][c], m.m[2][c]}; };
-    return PlaceVolume(file_, column(3), {column(0), column(1), column(2)}, volume);
+    std::array<Point3, 3> steps = {column(0), column(1), column(2)};
+    Point3 origin = column(3);
+    if (orientation_ != 0) {
+      // Which of left, front and up the file's axes go to.
+      static constexpr size_t kAxes[3][3] = {{0, 1, 2}, {0, 2, 1}, {1, 2, 0}};
+      const std::array<Point3, 3> old = steps;
+      const auto length = [](const Point3& p) { return std::hypot(p.x, p.y, p.z); };
+      for (size_t i = 0; i < 3; ++i) {
+        const Point3& along = old[kAxes[orientation_ % 3][i]];
+        const double by = length(old[i]) / length(along);
+        steps[i] = {along.x * by, along.y * by, along.z * by};
+      }
+      if (orientation_ >= 3) {
+        const auto rows = static_cast<double>(size_[1] - 1);
+        origin = {origin.x + steps[1].x * rows, origin.y + steps[1].y * rows,
+                  origin.z + steps[1].z * rows};
+        steps[1] = {-steps[1].x, -steps[1].y, -steps[1].z};
+      }
+    }
+    return PlaceVolume(file_, origin, steps, volume);
   }
 
   const SourceFile& file_;
@@ -362,6 +410,9 @@ class NiftiReader {
   bool is_analyze_ = false;
   SampleCode code_;
   size_t channels_ = 0;  // of colours; 0: numbers
+  size_t planes_ = 0;    // of colours, each in a volume of its own
+  int orientation_ =
+      0;  // of ANALYZE 7.5: 0 to 2 transverse, coronal and sagittal; 3 to 5 with rows from the other side
   std::array<uint64_t, 3> size_ = {1, 1, 1};
   uint64_t volumes_ = 1, from_ = 0;
 };

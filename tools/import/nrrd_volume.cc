@@ -307,26 +307,14 @@ class NrrdReader {
   bool AreColors() const {
     const std::vector<absl::string_view> kinds = Words("kinds");
     const std::string kind = kinds.empty() ? "" : absl::AsciiStrToLower(kinds[0]);
-    return encoding_ != "ascii" && IsRgb(kind) && (each_ == 3 || each_ == 4);
+    return IsRgb(kind) && (each_ == 3 || each_ == 4);
   }
 
   // The same, with all of red before green.
   bool AreColorPlanes() const {
     const std::vector<absl::string_view> kinds = Words("kinds");
-    return encoding_ != "ascii" && each_ == 1 && (volumes_ == 3 || volumes_ == 4) &&
-           kinds.size() == axes_.size() + 1 && IsRgb(absl::AsciiStrToLower(kinds.back()));
-  }
-
-  // Numbers of three or four planes, side by side.
-  std::string Interleaved(absl::string_view planes) const {
-    const size_t bytes = SampleBytes(code_.type), plane = planes.size() / volumes_;
-    std::string out;
-    out.reserve(planes.size());
-    for (size_t at = 0; at < plane; at += bytes) {
-      for (size_t k = 0; k < volumes_; ++k)
-        absl::StrAppend(&out, planes.substr(k * plane + at, bytes));
-    }
-    return out;
+    return each_ == 1 && (volumes_ == 3 || volumes_ == 4) && kinds.size() == axes_.size() + 1 &&
+           IsRgb(absl::AsciiStrToLower(kinds.back()));
   }
 
   // Two digits a byte.
@@ -356,7 +344,7 @@ class NrrdReader {
   }
 
   absl::Status ReadSamples(absl::string_view data, SampledVolume* volume) const {
-    std::vector<float>* const out = &volume->samples;
+    std::vector<float> numbers;
     // Of the first volume.
     const uint64_t samples = size_[0] * size_[1] * size_[2] * (AreColorPlanes() ? volumes_ : each_);
     const uint64_t wanted = samples * SampleBytes(code_.type);
@@ -365,27 +353,24 @@ class NrrdReader {
     if (absl::Status status = Skip(&data, all); !status.ok()) return status;
     if (encoding_ == "raw") return Take(data, wanted, volume);
     if (encoding_ == "hex") return ReadHex(data, wanted, volume);
-    while (out->size() < samples) {
-      const size_t from = std::min(data.find_first_not_of(" \t\r\n,"), data.size());
-      data.remove_prefix(from);
-      if (data.empty()) break;
-      const absl::string_view word = data.substr(0, data.find_first_of(" \t\r\n,"));
-      double value = 0;
-      if (!absl::SimpleAtod(word, &value)) {
-        return FileError(file_,
-                         absl::StrCat("sample ", out->size(), " is \"",
-                                      EscapeForTerminal(word.substr(0, 40)), "\""),
-                         "a number is expected");
+    if (absl::Status status = ReadTextSamples(file_, data, samples, {}, &numbers); !status.ok())
+      return status;
+    if (AreColors()) {
+      ColorsOf(numbers, code_.type, each_, volume);
+      return absl::OkStatus();
+    }
+    if (AreColorPlanes()) {
+      std::vector<float> mixed;
+      mixed.reserve(numbers.size());
+      const size_t plane = numbers.size() / volumes_;
+      for (size_t at = 0; at < plane; ++at) {
+        for (size_t k = 0; k < volumes_; ++k) mixed.push_back(numbers[k * plane + at]);
       }
-      const auto number = static_cast<float>(value);
-      out->push_back(std::isfinite(number) ? number : std::numeric_limits<float>::quiet_NaN());
-      data.remove_prefix(word.size());
+      ColorsOf(mixed, code_.type, volumes_, volume);
+      return absl::OkStatus();
     }
-    if (out->size() != samples) {
-      return FileError(file_, absl::StrCat("has ", out->size(), " samples of ", samples),
-                       "the file is truncated");
-    }
-    KeepFirstOfEach(each_, out);
+    volume->samples = std::move(numbers);
+    KeepFirstOfEach(each_, &volume->samples);
     return absl::OkStatus();
   }
 
@@ -401,7 +386,8 @@ class NrrdReader {
       return absl::OkStatus();
     }
     if (AreColorPlanes()) {
-      DecodeColors(Interleaved(data.substr(0, wanted)), code_, volumes_, volume);
+      DecodeColors(Interleaved(data.substr(0, wanted), volumes_, SampleBytes(code_.type)), code_,
+                   volumes_, volume);
       return absl::OkStatus();
     }
     DecodeSamples(data.substr(0, wanted), code_, &volume->samples);

@@ -183,8 +183,13 @@ absl::StatusOr<Model> ReadAny(const SourceFile& file, const ImportOptions& optio
 
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenAnimationHere(SourceFile file, size_t number,
                                                                double fps) {
-  if (file.extension == "obj")
-    return FileError(file, absl::StrCat("has no animation ", number), "it has none at all");
+  const bool is_still = std::any_of(Readers().begin(), Readers().end(), [&](const Reader& reader) {
+    return HasExtension(reader.format, file.extension) && reader.format.what != "meshes";
+  });
+  if (is_still || file.extension == "obj") {
+    return FileError(file, absl::StrCat("is .", file.extension, ", which has no animations"),
+                     "a .glb, .gltf, .fbx, .dae or .bvh is expected");
+  }
   const bool is_gltf = file.extension == "gltf" || file.extension == "glb";
   return is_gltf ? OpenGltfAnimation(std::move(file), number, fps)
                  : OpenAssimpAnimation(std::move(file), number, fps);

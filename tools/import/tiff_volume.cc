@@ -97,6 +97,9 @@ struct Description {
   std::string order = "CZT";                     // the first changes from page to page
   std::optional<std::array<double, 3>> spacing;
   std::optional<double> depth;  // in the unit of the resolution
+  uint64_t images = 0;          // pages that the description counts; 0: it does not
+  // Where pages lie by OME's elements TiffData: the slice, channel and time of each page that they name.
+  std::map<uint64_t, std::array<uint64_t, 3>> places;
 };
 
 template <typename T>
@@ -119,6 +122,7 @@ Description FromImageJ(absl::string_view text) {
     uint64_t* const number = field.first == "slices"     ? &found.slices
                              : field.first == "channels" ? &found.channels
                              : field.first == "frames"   ? &found.times
+                             : field.first == "images"   ? &found.images
                                                          : nullptr;
     if (number != nullptr && (!absl::SimpleAtoi(field.second, number) || *number == 0)) *number = 1;
     // Some stacks have negative ones.
@@ -135,6 +139,38 @@ absl::string_view OmeAttribute(absl::string_view pixels, absl::string_view name)
   if (at == absl::string_view::npos) return {};
   const absl::string_view value = pixels.substr(at + before.size());
   return value.substr(0, value.find('"'));
+}
+
+// Takes the elements TiffData of the first Pixels: from page IFD on, PlaneCount pages follow each other in the order of the dimensions.
+void TakeTiffData(absl::string_view text, Description* found) {
+  constexpr uint64_t kMostPlaces = 65536;
+  const std::array<uint64_t, 3> sizes = {found->slices, found->channels, found->times};
+  text = text.substr(0, text.find("</Pixels>"));
+  constexpr absl::string_view kElement = "<TiffData";
+  uint64_t next = 0;
+  for (size_t at = text.find(kElement); at != absl::string_view::npos;
+       at = text.find(kElement, at + 1)) {
+    const absl::string_view element = text.substr(at, text.find('>', at) - at);
+    const auto number = [element](absl::string_view name, uint64_t otherwise) {
+      uint64_t value = 0;
+      return absl::SimpleAtoi(OmeAttribute(element, name), &value) ? value : otherwise;
+    };
+    std::array<uint64_t, 3> place = {number("FirstZ", 0), number("FirstC", 0), number("FirstT", 0)};
+    const bool has_page = !OmeAttribute(element, "IFD").empty();
+    const uint64_t page = number("IFD", next);
+    // Without a page or a count it is about all pages.
+    uint64_t count = number("PlaneCount", has_page ? 1 : kMostPlaces);
+    for (; count > 0 && found->places.size() < kMostPlaces; --count, ++next) {
+      if (place[0] >= sizes[0] || place[1] >= sizes[1] || place[2] >= sizes[2]) break;
+      if (next < page) next = page;
+      found->places[next] = place;
+      for (const char axis : found->order) {
+        const size_t i = axis == 'Z' ? 0 : axis == 'C' ? 1 : 2;
+        if (++place[i] < sizes[i]) break;
+        place[i] = axis == found->order.back() ? sizes[i] : 0;
+      }
+    }
+  }
 }
 
 // OME's XML (https://docs.openmicroscopy.org/ome-model).
@@ -168,6 +204,7 @@ std::optional<Description> FromOme(absl::string_view text) {
     if (spacing[2] == 0) spacing[2] = spacing[0];
     found.spacing = spacing;
   }
+  TakeTiffData(text.substr(from), &found);
   return found;
 }
 
@@ -286,15 +323,38 @@ class TiffReader {
     return FromOme(description).value_or(Description());
   }
 
+  // The pages of the first channel at the first time, by slices, where the description names the place of each; else none.
+  static std::vector<size_t> PlacedPages(const Description& description, size_t pages) {
+    if (description.places.size() != pages) return {};
+    std::map<uint64_t, size_t> by_slice;
+    for (const auto& [page, place] : description.places) {
+      if (page < pages && place[1] == 0 && place[2] == 0) by_slice.emplace(place[0], page);
+    }
+    std::vector<size_t> placed;
+    if (by_slice.size() != description.slices) return placed;
+    for (const auto& [slice, page] : by_slice) placed.push_back(page);
+    return placed;
+  }
+
   // Which of the pages are the slices of the first channel at the first time. All of them if the numbers do not fit.
   static std::vector<size_t> ChoosePages(const Description& description, size_t pages,
                                          Model* model) {
-    const auto& [slices, channels, times, order, spacing, depth] = description;
-    const auto fits = [pages, slices = slices](uint64_t each, uint64_t others) {
+    const uint64_t slices = description.slices, channels = description.channels,
+                   times = description.times;
+    if (description.images > pages) {
+      model->note = absl::StrCat(model->path, ": its description counts ", description.images,
+                                 " images, and it has ", pages, " pages, which are shown");
+    }
+    const auto fits = [pages, slices](uint64_t each, uint64_t others) {
       return slices > 0 && slices <= pages && each <= pages / slices &&
              others <= pages / slices / each && slices * each * others == pages;
     };
     std::vector<size_t> shown;
+    if (const std::vector<size_t> placed = PlacedPages(description, pages); !placed.empty()) {
+      AddLeftOut("further channels", channels - 1, model);
+      AddLeftOut("further times", times - 1, model);
+      return placed;
+    }
     // A page of colours holds several channels.
     const uint64_t paged = fits(channels, times) ? channels : 1;
     if (!fits(paged, times)) {
@@ -307,7 +367,7 @@ class TiffReader {
       return shown;
     }
     uint64_t step = 1;
-    for (const char axis : order) {
+    for (const char axis : description.order) {
       if (axis == 'Z') break;
       step *= axis == 'C' ? paged : axis == 'T' ? times : 1;
     }

@@ -8,7 +8,9 @@
 #include <string>
 #include <type_traits>
 
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "common/text/printable.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -191,20 +193,61 @@ void DecodeColors(absl::string_view bytes, const SampleCode& code, size_t channe
                   SampledVolume* volume) {
   if (code.type == SampleType::kU8 && code.slope == 1 && code.intercept == 0)
     return DecodeColors(bytes, channels, volume);
-  const double most = GreatestOf(code.type);
   const size_t step = channels * SampleBytes(code.type) * kColorsAtOnce;
   std::vector<float> numbers;
-  std::string colors;
   for (size_t at = 0; at < bytes.size(); at += step) {
     numbers.clear();
-    colors.clear();
     DecodeSamples(bytes.substr(at, step), code, &numbers);
-    for (const float number : numbers) {
+    ColorsOf(numbers, code.type, channels, volume);
+  }
+}
+
+void ColorsOf(std::span<const float> numbers, SampleType type, size_t channels,
+              SampledVolume* volume) {
+  const double most = GreatestOf(type);
+  std::string colors;
+  for (size_t at = 0; at < numbers.size(); at += channels * kColorsAtOnce) {
+    colors.clear();
+    for (const float number :
+         numbers.subspan(at, std::min(channels * kColorsAtOnce, numbers.size() - at))) {
       const double part = std::isfinite(number) ? std::clamp(number / most, 0.0, 1.0) : 0;
       colors += static_cast<char>(std::lround(part * 255));
     }
     DecodeColors(colors, channels, volume);
   }
+}
+
+std::string Interleaved(absl::string_view bytes, size_t planes, size_t bytes_each) {
+  const size_t plane = bytes.size() / planes;
+  std::string out;
+  out.reserve(bytes.size());
+  for (size_t at = 0; at < plane; at += bytes_each) {
+    for (size_t k = 0; k < planes; ++k)
+      absl::StrAppend(&out, bytes.substr(k * plane + at, bytes_each));
+  }
+  return out;
+}
+
+absl::Status ReadTextSamples(const SourceFile& file, absl::string_view text, uint64_t count,
+                             const SampleCode& code, std::vector<float>* out) {
+  for (uint64_t i = 0; i < count; ++i) {
+    text.remove_prefix(std::min(text.find_first_not_of(" \t\r\n,"), text.size()));
+    if (text.empty()) {
+      return FileError(file, absl::StrCat("has ", i, " samples of ", count),
+                       "the file is truncated");
+    }
+    const absl::string_view word = text.substr(0, text.find_first_of(" \t\r\n,"));
+    double value = 0;
+    if (!absl::SimpleAtod(word, &value)) {
+      return FileError(
+          file, absl::StrCat("sample ", i, " is \"", EscapeForTerminal(word.substr(0, 40)), "\""),
+          "a number is expected");
+    }
+    const auto number = static_cast<float>(value * code.slope + code.intercept);
+    out->push_back(std::isfinite(number) ? number : std::numeric_limits<float>::quiet_NaN());
+    text.remove_prefix(word.size());
+  }
+  return absl::OkStatus();
 }
 
 absl::StatusOr<absl::string_view> TakeSamples(const SourceFile& file, absl::string_view all,

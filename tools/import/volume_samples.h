@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -40,6 +42,18 @@ void DecodeColors(absl::string_view bytes, size_t bytes_each, SampledVolume* vol
 // The same for channels of any type, `channels` (3 or 4) for each colour. Integers reach to the greatest of their type, floats to 1.
 void DecodeColors(absl::string_view bytes, const SampleCode& code, size_t channels,
                   SampledVolume* volume);
+
+// The same for numbers that were read as samples of `type`.
+void ColorsOf(std::span<const float> numbers, SampleType type, size_t channels,
+              SampledVolume* volume);
+
+// Numbers of `planes` planes of the same size, side by side for each place. Each has `bytes_each` bytes.
+std::string Interleaved(absl::string_view bytes, size_t planes, size_t bytes_each);
+
+// Appends `count` numbers that are written as text, with blanks or commas between them, after the slope and intercept of `code`.
+// InvalidArgument if there are fewer, or a word is no number.
+absl::Status ReadTextSamples(const SourceFile& file, absl::string_view text, uint64_t count,
+                             const SampleCode& code, std::vector<float>* out);
 
 // Returns: the `count` times `bytes_each` bytes of samples in `all` from byte `from` on.
 // InvalidArgument if there are fewer. `count` is kMaxModelSamples at most.

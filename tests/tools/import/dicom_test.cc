@@ -128,9 +128,11 @@ TEST_F(Volumes, ARealSlice) {
   const auto model = ReadHere(kSlice, {});
   ASSERT_THAT(model, IsOk());
   EXPECT_EQ(model->format, "DICOM");
-  EXPECT_THAT(model->volumes.at(0).size, ElementsAre(512, 512, 4)) << "JPEG, lossless";
+  // An angiogram: its pointer says that the frames are times. JPEG, lossless.
+  EXPECT_THAT(model->volumes.at(0).size, ElementsAre(512, 512, 1));
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"further times", 3}}));
   const Point3 &from = model->volumes[0].corners[0], &to = model->volumes[0].corners[7];
-  EXPECT_NEAR((to.z - from.z) / (to.x - from.x), 0.05, 1e-9) << "four layers can be seen";
+  EXPECT_NEAR((to.z - from.z) / (to.x - from.x), 0.05, 1e-9) << "one layer can be seen";
   std::string bytes = ReadAll(kSlice);
   const size_t frame = bytes.find("\xff\xc3");
   ASSERT_NE(frame, std::string::npos);
@@ -296,11 +298,98 @@ TEST_F(Volumes, APalette) {
   const SampledVolume narrow = Read("a.dcm", picture(palette(8, "\x10\x20")));
   EXPECT_EQ(narrow.colors[0], (Rgb{16, 11, 0}));
   EXPECT_EQ(narrow.colors[5], (Rgb{32, 13, 0}));
+  // Signed pixels, from -1 on: the entries are for -2 and -1.
+  std::string signed_pixels = picture(palette(8, "\x10\x20"));
+  const std::string is_unsigned = Element(0x28, 0x103, "US", Short(0));
+  signed_pixels.replace(signed_pixels.find(is_unsigned), is_unsigned.size(),
+                        Element(0x28, 0x103, "US", Short(1)));
+  for (size_t at = 0;
+       (at = signed_pixels.find(Short(2) + Short(1) + Short(8), at)) != std::string::npos; ++at)
+    Put(&signed_pixels, at + 2, static_cast<uint16_t>(-2));
+  Put(&signed_pixels, signed_pixels.size() - 12, static_cast<uint16_t>(-2));
+  const SampledVolume negative = Read("a.dcm", signed_pixels);
+  EXPECT_EQ(negative.colors[0], (Rgb{16, 11, 0}));
+  EXPECT_EQ(negative.colors[1], (Rgb{32, 13, 0}));
   EXPECT_THAT(Error("a.dcm", picture("")), HasSubstr("has no palette of red"));
   EXPECT_THAT(Error("a.dcm", picture(palette(16, "\x10\x20"))),
               HasSubstr("has 2 bytes for 2 entries of 16 bits"));
   EXPECT_THAT(Error("a.dcm", picture(palette(8, "\x10\x20", 0))),
               HasSubstr("has 2 bytes for 65536 entries"));
+}
+
+// DICOM PS3.3, C.7.6.6: the pointer names the element that differs from frame to frame.
+std::string Frames(const std::string& axis, uint16_t group, uint16_t element) {
+  return Element(0x28, 8, "IS", "3") + Element(0x28, 9, "AT", Short(group) + Short(element)) + axis;
+}
+
+TEST_F(Volumes, FramesOverTimeAreNotDepth) {
+  const auto without_place = [](std::string bytes) {
+    bytes.replace(bytes.find("1\\2\\0"), 5, "     ");
+    return bytes;
+  };
+  for (const auto& [group, element] :
+       {std::pair<uint16_t, uint16_t>{0x18, 0x1063}, {0x18, 0x1065}, {0x54, 0x10}, {0x54, 0x70}}) {
+    const auto model =
+        Import("a.dcm", without_place(Dicom("7", 0, 1, Frames("", group, element), 18)));
+    ASSERT_THAT(model, IsOk());
+    EXPECT_THAT(model->volumes.at(0).size, ElementsAre(3, 2, 1));
+    EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"further times", 2}}));
+  }
+  // Offsets of a dose and slices of a tomogram are places.
+  const auto dose = Import("a.dcm", without_place(Dicom("7", 0, 1, Frames("", 0x3004, 0xC), 18)));
+  ASSERT_THAT(dose, IsOk());
+  EXPECT_THAT(dose->volumes.at(0).size, ElementsAre(3, 2, 3));
+  const auto slices = Import(
+      "a.dcm",
+      without_place(Dicom(
+          "7", 0, 1, Frames(Element(0x54, 0x80, "US", Short(2) + Short(1) + Short(2)), 0x54, 0x80),
+          18)));
+  ASSERT_THAT(slices, IsOk());
+  EXPECT_THAT(slices->volumes.at(0).size, ElementsAre(3, 2, 2));
+  EXPECT_EQ(slices->volumes[0].samples[0], -1000 + 2 * 7) << "the second frame is the first slice";
+  EXPECT_EQ(slices->left_out, (std::vector<LeftOut>{{"further times", 1}}));
+}
+
+// Of rows first. A distance on the detector or film, or a ratio, stands for that in the patient.
+TEST_F(Volumes, PixelsAreAsHighAsAnyElementSays) {
+  for (const auto& [group, element, kind] :
+       {std::tuple<uint16_t, uint16_t, const char*>{0x18, 0x1164, "DS"},
+        {0x18, 0x2010, "DS"},
+        {0x28, 0x34, "IS"}}) {
+    std::string bytes = Dicom("7", 0, 1, Element(group, element, kind, "4\\1"));
+    bytes.replace(bytes.find("0.5\\0.25"), 8, "        ");
+    const SampledVolume volume = Read("a.dcm", bytes);
+    const double wide = volume.corners[1].x - volume.corners[0].x,
+                 high = volume.corners[2].y - volume.corners[0].y;
+    EXPECT_NEAR(wide / 3, 1, 1e-9) << element;
+    EXPECT_NEAR(high / 2, 4, 1e-9) << element;
+  }
+}
+
+TEST_F(Volumes, TablesSayWhatNumbersMean) {
+  const auto table = [](const std::string& descriptor, const std::string& data) {
+    const std::string content =
+        Element(0x28, 0x3002, "US", descriptor) + Element(0x28, 0x3006, "OW", data);
+    std::string item("\xfe\xff\x00\xe0", 4);
+    Put(&item, 4, static_cast<uint32_t>(content.size()));
+    return Element(0x28, 0x3000, "SQ", item + content);
+  };
+  // Pixels are 1 to 6, the table begins at 2.
+  const SampledVolume volume = Read(
+      "a.dcm",
+      Dicom("7", 0, 1, table(Short(3) + Short(2) + Short(16), Short(700) + Short(50) + Short(9))));
+  EXPECT_THAT(volume.samples, ElementsAre(700, 700, 50, 9, 9, 9));
+  EXPECT_THAT(Error("a.dcm", Dicom("7", 0, 1, table(Short(9) + Short(0) + Short(16), Short(1)))),
+              HasSubstr("has 2 bytes for 9 entries of 16 bits"));
+}
+
+TEST_F(Volumes, OverlaysAreCounted) {
+  const std::string overlays = Element(0x6000, 0x10, "US", Short(2)) +
+                               Element(0x6002, 0x10, "US", Short(2)) +
+                               Element(0x6000, 0x3000, "OW", Short(0));
+  const auto model = Import("a.dcm", Dicom("7", 0, 1, overlays));
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"overlays", 2}}));
 }
 
 TEST_F(Volumes, AFolderOfOneFileIsThatFile) {
@@ -309,7 +398,7 @@ TEST_F(Volumes, AFolderOfOneFileIsThatFile) {
   folder_.Write("a", ReadAll(kSlice));
   const auto model = ReadHere(folder_.Path(""), {});
   ASSERT_THAT(model, IsOk());
-  EXPECT_THAT(model->volumes.at(0).size, ElementsAre(512, 512, 4));
+  EXPECT_THAT(model->volumes.at(0).size, ElementsAre(512, 512, 1));
 }
 
 TEST_F(Volumes, AFolderOfSlicesInTheirOrder) {

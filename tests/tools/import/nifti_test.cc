@@ -161,6 +161,7 @@ TEST_F(Volumes, Analyze) {
   Put<float>(&header, 116, 9);
   header.replace(252, 96, std::string(96, '\x01'));
   header.replace(344, 4, std::string(4, '\0'));
+  header[252] = '\0';  // transverse
   std::string samples;
   for (int16_t i = 0; i < 8; ++i)
     Put<int16_t>(&samples, samples.size(), static_cast<int16_t>(i - 4));
@@ -189,6 +190,19 @@ TEST_F(Volumes, Analyze) {
     EXPECT_EQ(volume.corners[7], (Point3{1.5, -3, 4.5}));
   }
   EXPECT_THAT(Read("a.img", samples).samples, ElementsAre(-4, -3, -2, -1, 0, 1, 2, 3));
+  // Coronal, sagittal, and transverse with rows from the back. Cells are 1, 2 and 3 long.
+  const std::tuple<char, Point3, Point3> orientations[] = {
+      {'\1', {-0.5, 1.5, -1}, {1.5, -4.5, 3}},
+      {'\2', {-1.5, 0.5, -1}, {4.5, -1.5, 3}},
+      {'\3', {-0.5, -3, -1.5}, {1.5, 1, 4.5}},
+      {'\4', {-0.5, 1.5, 3}, {1.5, -4.5, -1}},
+      {'\x20', {-0.5, 1, -1.5}, {1.5, -3, 4.5}}};  // none that there is: transverse
+  for (const auto& [orient, first, last] : orientations) {
+    header[252] = orient;
+    const SampledVolume volume = Read("a.hdr", header);
+    EXPECT_EQ(volume.corners[0], first) << int{orient};
+    EXPECT_EQ(volume.corners[7], last) << int{orient};
+  }
   EXPECT_THAT(Error("a.nii", header), HasSubstr("a header of NIfTI is expected"));
   Put<int16_t>(&header, 40, 9);
   EXPECT_THAT(Error("a.hdr", header), HasSubstr("has 9 dimensions"));
@@ -202,6 +216,30 @@ TEST_F(Volumes, NiftiOfColours) {
   const SampledVolume four =
       Read("a.nii", Nifti({3, 2, 1, 1}, 2304, "\x64\xc8\xff\xff\x64\xc8\xff\x80"));
   EXPECT_THAT(four.colors, ElementsAre(Rgb{100, 200, 255}, Rgb{50, 100, 128}));
+}
+
+// Colours as vectors (intents 2003 and 2004): all of red stands before all of green.
+TEST_F(Volumes, NiftiOfColourVectors) {
+  std::string three = Nifti({5, 2, 1, 1, 1, 3}, 2, "\xff\x0a\x01\x14\x02\x1e");
+  Put<int16_t>(&three, 68, 2003);
+  for (const std::string& bytes : {three, Gzip(three)}) {
+    const auto model = Import("a.nii.gz", bytes);
+    ASSERT_THAT(model, IsOk());
+    EXPECT_THAT(model->volumes[0].colors, ElementsAre(Rgb{255, 1, 2}, Rgb{10, 20, 30}));
+    EXPECT_TRUE(model->left_out.empty());
+  }
+  EXPECT_THAT(Error("a.nii", three.substr(0, three.size() - 1)), HasSubstr("bytes of samples"));
+  // 16 bits: the greatest of the type is brightest.
+  std::string wide =
+      Nifti({5, 1, 1, 1, 1, 4}, 512, std::string("\xff\xff\x00\x80\x00\x00\xff\xff", 8));
+  Put<int16_t>(&wide, 68, 2004);
+  EXPECT_THAT(Read("a.nii", wide).colors, ElementsAre(Rgb{255, 128, 0}));
+  // Vectors of another intent are not colours.
+  Put<int16_t>(&three, 68, 1007);
+  const auto vector = Import("a.nii", three);
+  ASSERT_THAT(vector, IsOk());
+  EXPECT_TRUE(vector->volumes[0].colors.empty());
+  EXPECT_EQ(vector->left_out, (std::vector<LeftOut>{{"further components", 2}}));
 }
 
 TEST_F(Volumes, NiftiLiesWhereItsMatrixSays) {

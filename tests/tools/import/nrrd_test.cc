@@ -107,6 +107,17 @@ TEST_F(Volumes, NrrdOfMoreThanOneNumber) {
                          std::string("\xff\xff\x80\x80\0\0", 6))
           .colors,
       ElementsAre(Rgb{255, 128, 0}));
+  // As text, in both orders.
+  EXPECT_THAT(Read("t.nrrd",
+                   "NRRD0004\ntype: ushort\nencoding: ascii\ndimension: 3\nsizes: 3 2 1\n"
+                   "kinds: RGB-color domain domain\n\n65535 0 0 0 32896 65535")
+                  .colors,
+              ElementsAre(Rgb{255, 0, 0}, Rgb{0, 128, 255}));
+  EXPECT_THAT(Read("t.nrrd",
+                   "NRRD0004\ntype: uchar\nencoding: text\ndimension: 3\nsizes: 2 1 3\n"
+                   "kinds: domain domain RGB-color\n\n255 0 1 2 3 4")
+                  .colors,
+              ElementsAre(Rgb{255, 1, 3}, Rgb{0, 2, 4}));
   const auto hsv =
       Import("h.nrrd", head + "dimension: 3\nsizes: 3 1 1\nkinds: HSV-color domain domain\n\n123");
   ASSERT_THAT(hsv, IsOk());

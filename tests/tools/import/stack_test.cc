@@ -136,6 +136,19 @@ TEST_F(Volumes, MetaImageOfMoreThanOneNumber) {
                                                   std::string("\xff\0\0abcdefghi", 12)));
   EXPECT_THAT(colors.colors, ElementsAre(Rgb{255, 0, 0}, Rgb{'a', 'b', 'c'}, Rgb{'d', 'e', 'f'},
                                          Rgb{'g', 'h', 'i'}));
+  EXPECT_THAT(
+      Read("w.mha", Meta("MET_USHORT", "ElementNumberOfChannels = 3\n",
+                         Numbers<uint16_t>({65535, 0, 32896, 0, 65535, 0, 1, 2, 3, 0, 0, 0})))
+          .colors,
+      ElementsAre(Rgb{255, 0, 128}, Rgb{0, 255, 0}, Rgb{0, 0, 0}, Rgb{0, 0, 0}));
+  EXPECT_THAT(Read("t.mha", Meta("MET_UCHAR", "ElementNumberOfChannels = 3\nBinaryData = False\n",
+                                 "255 0 1 2 3 4 5 6 7 8 9 10"))
+                  .colors,
+              ElementsAre(Rgb{255, 0, 1}, Rgb{2, 3, 4}, Rgb{5, 6, 7}, Rgb{8, 9, 10}));
+  // Signed numbers and floats are vectors.
+  EXPECT_TRUE(Read("v.mha", Meta("MET_SHORT", "ElementNumberOfChannels = 3\n",
+                                 Numbers<int16_t>({1, 2, 3, 4, 5, 6, 7, 8, 9, 1, 2, 3})))
+                  .colors.empty());
   const auto two = Import("b.mha", Meta("MET_UCHAR", "ElementNumberOfChannels = 2\n", "1a2b3c4d"));
   ASSERT_THAT(two, IsOk());
   EXPECT_THAT(two->volumes[0].samples, ElementsAre('1', '2', '3', '4'));
@@ -527,6 +540,42 @@ TEST_F(Volumes, TiffStacksOfChannelsAndTimes) {
   EXPECT_THAT(wrong->volumes[0].size, ElementsAre(1, 1, 8));
   EXPECT_THAT(wrong->note,
               HasSubstr("counts 2 slices, 3 channels and 1 times, and it has 8 pages"));
+}
+
+// OME's elements say where each page lies; the order of the pages does not.
+TEST_F(Volumes, TiffPagesWhereOmePutsThem) {
+  const auto stack = [this](const std::string& elements, const std::string& sizes) {
+    std::vector<Page> pages;
+    for (char c = 'a'; c < 'e'; ++c) pages.push_back({.width = 1, .samples = std::string(1, c)});
+    pages[0].description =
+        absl::StrCat("<?xml version=\"1.0\"?><OME><Image><Pixels DimensionOrder=\"XYZCT\" ", sizes,
+                     ">", elements, "</Pixels></Image></OME>");
+    const auto model = Import("a.tif", Tiff(pages));
+    EXPECT_TRUE(model.ok()) << model.status();
+    return model.ok() ? model->volumes[0].samples : std::vector<float>();
+  };
+  const std::string deep = "SizeZ=\"4\" SizeC=\"1\" SizeT=\"1\"",
+                    times = "SizeZ=\"2\" SizeC=\"1\" SizeT=\"2\"";
+  EXPECT_THAT(stack("<TiffData IFD=\"0\" FirstZ=\"2\" PlaneCount=\"2\"/>"
+                    "<TiffData IFD=\"2\" FirstZ=\"0\" PlaneCount=\"2\"></TiffData>",
+                    deep),
+              ElementsAre('c', 'd', 'a', 'b'));
+  EXPECT_THAT(stack("<TiffData FirstT=\"1\" IFD=\"0\"/><TiffData IFD=\"1\" FirstZ=\"1\"/>"
+                    "<TiffData IFD=\"2\" FirstZ=\"1\" FirstT=\"1\"/><TiffData IFD=\"3\"/>",
+                    times),
+              ElementsAre('d', 'b'));
+  EXPECT_THAT(stack("<TiffData/>", times), ElementsAre('a', 'b'));
+  // What does not name all pages, or names a slice that there is not, says nothing.
+  EXPECT_THAT(stack("<TiffData IFD=\"0\" FirstZ=\"3\"/>", deep), ElementsAre('a', 'b', 'c', 'd'));
+  EXPECT_THAT(stack("<TiffData IFD=\"0\" FirstZ=\"9\"/>", deep), ElementsAre('a', 'b', 'c', 'd'));
+}
+
+TEST_F(Volumes, TiffWithFewerPagesThanItsDescriptionCounts) {
+  const auto model = Import(
+      "a.tif",
+      Tiff({{.width = 1, .samples = "a", .description = "ImageJ=1.53\nimages=4\nslices=4\n"}}));
+  ASSERT_THAT(model, IsOk());
+  EXPECT_THAT(model->note, HasSubstr("counts 4"));
 }
 
 TEST_F(Volumes, TiffTurnedByItsOrientation) {

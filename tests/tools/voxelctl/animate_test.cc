@@ -1,7 +1,10 @@
 // Moving pictures, read back by the libraries and programs that everyone reads them with.
+#include <fcntl.h>
 #include <gif_lib.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -70,6 +73,28 @@ TEST(WholeFile, IsThereWholeOrNotAtAll) {
   EXPECT_EQ(FilesIn(folder), 1u);
   EXPECT_THAT(WriteWholeFile(folder.Path("none\x1b/a"), ""),
               Fails(Words{"none\\u{1b}/a", "cannot be written", "No such file"}));
+}
+
+TEST(WholeFile, ReplacesRegularFilesAlone) {
+  TempFolder folder;
+  const std::string fifo = folder.Path("fifo"), link = folder.Path("link"),
+                    file = folder.Write("file", "old");
+  ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
+  const int reader = ::open(fifo.c_str(), O_RDONLY | O_NONBLOCK);
+  ASSERT_THAT(WriteWholeFile(fifo, "new"), IsOk());
+  char bytes[4] = {};
+  EXPECT_EQ(::read(reader, bytes, sizeof(bytes)), 3);
+  ::close(reader);
+  EXPECT_TRUE(std::filesystem::is_fifo(fifo));
+  ASSERT_EQ(::symlink("/dev/full", link.c_str()), 0);
+  EXPECT_THAT(std::string(WriteWholeFile(link, "new").message()), HasSubstr("could not be written"));
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
+  ASSERT_EQ(::unlink(link.c_str()), 0);
+  ASSERT_EQ(::symlink("file", link.c_str()), 0);
+  ASSERT_THAT(WriteWholeFile(link, "new"), IsOk());
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  EXPECT_EQ(ReadAll(file), "new");
 }
 
 TEST(OrderedDither, KeepsThePalettesColoursAndTheMeanOfOthers) {

@@ -6,6 +6,8 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -22,7 +24,16 @@ absl::Status ErrorOf(const std::string& path, const char* what) {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<WholeFile>> WholeFile::Create(const std::string& path) {
+absl::StatusOr<std::unique_ptr<WholeFile>> WholeFile::Create(const std::string& name) {
+  std::error_code ignored;
+  // A link stays a link: the file that it leads to is replaced.
+  const std::filesystem::path target = std::filesystem::canonical(name, ignored);
+  const std::string path = target.empty() ? name : target.string();
+  if (std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored)) {
+    const int file = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
+    if (file < 0) return ErrorOf(name, "cannot be written");
+    return std::unique_ptr<WholeFile>(new WholeFile(name, name, file));
+  }
   for (int attempt = 0; attempt < 100; ++attempt) {
     std::string temporary = absl::StrCat(path, ".", ::getpid(), ".", attempt, ".tmp");
     const int file = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
@@ -36,7 +47,7 @@ absl::StatusOr<std::unique_ptr<WholeFile>> WholeFile::Create(const std::string& 
 
 WholeFile::~WholeFile() {
   ::close(file_);
-  if (!in_place_) ::unlink(temporary_.c_str());
+  if (!in_place_ && temporary_ != path_) ::unlink(temporary_.c_str());
 }
 
 absl::Status WholeFile::SystemError(const char* what) const { return ErrorOf(path_, what); }
@@ -52,8 +63,9 @@ absl::Status WholeFile::Write(absl::string_view bytes) {
 }
 
 absl::Status WholeFile::Commit() {
-  if (::fsync(file_) != 0) return SystemError("could not be written");
-  if (::rename(temporary_.c_str(), path_.c_str()) != 0)
+  // A pipe or a terminal has nothing to put on a disk.
+  if (::fsync(file_) != 0 && errno != EINVAL) return SystemError("could not be written");
+  if (temporary_ != path_ && ::rename(temporary_.c_str(), path_.c_str()) != 0)
     return SystemError("could not be put in place");
   in_place_ = true;
   return absl::OkStatus();

@@ -10,12 +10,13 @@
 
 namespace voxeld::voxelctl {
 
-// A new file beside `path` that Commit() renames there: a reader sees the old file or the new one. Without Commit()
-// nothing of it stays. Its permissions are those that any new file of the user's has. Messages of errors begin with
-// the path, made fit for a terminal. Not thread-safe.
+// A new file beside `path` that Commit() renames there: a reader sees the old file or the new one. Without Commit() nothing of it stays.
+// Its permissions are those of any new file of the user. If `path` is a link, the file that it leads to is replaced. A pipe, device or
+// other file that is not a regular one is written as it is. Messages of errors begin with the path, escaped for a terminal. Not
+// thread-safe.
 class WholeFile {
  public:
-  // PermissionDenied if there can be none.
+  // PermissionDenied if it cannot be created or opened.
   static absl::StatusOr<std::unique_ptr<WholeFile>> Create(const std::string& path);
   ~WholeFile();
   WholeFile(const WholeFile&) = delete;
