@@ -67,7 +67,8 @@ absl::Status Access::Look(bool again) {
     }
     bool changed = read;
     for (const auto& [hash, grant] : grants_.tokens) {
-      // A clock that was set back makes some valid again, and nobody has to go for that.
+      // When the clock is set back, expired tokens become valid again. This takes nothing from
+      // anybody, so it is not a change.
       changed = changed || (grant.expires_s.has_value() && *grant.expires_s > looked_s_ &&
                             *grant.expires_s <= now);
     }

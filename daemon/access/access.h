@@ -1,15 +1,18 @@
-// Who a caller is and what they may do: by a bearer token, by a client certificate, by the kernel's
-// word on a unix socket; by the grants file (grants.h), which is read again when it changes.
+// Identifies callers and determines their scopes, by a bearer token, by a client certificate, or by
+// the user that the kernel reports for a unix socket. The grants file (grants.h) is reloaded when
+// it changes.
 //
-//   token given           it must be in the file and not expired; nothing else counts then
-//   certificate           in the file by its common name; else certificate_scopes
-//   unix socket           root and the daemon's own user may do everything; a user in the file what
-//                         is said there; any other (whom the socket's mode lets in) unix_scopes
+//   token given           The token must be in the file and not expired. No other credential counts
+//                         then.
+//   certificate           The grant with its common name applies, or else certificate_scopes.
+//   unix socket           Root and the daemon's own user have all scopes. A user in the file has
+//                         the scopes listed there, any other user that the socket's mode admits
+//                         unix_scopes.
 //   none of these         anonymous_scopes
 //
-// A file that cannot be read, or is wrong, fails closed: until it is right again whoever needs it is
-// turned away (UNAVAILABLE), and so is a user of a unix socket that is not root's or the daemon's.
-// Calls under way go on, until a file that is right says otherwise.
+// An unreadable or invalid file fails closed: until it is fixed, callers that need it are rejected
+// (UNAVAILABLE). They include users of unix sockets other than root and the daemon's user. Running
+// calls continue until a valid file revokes their scopes.
 #pragma once
 
 #include <cstdint>
@@ -30,30 +33,31 @@
 namespace voxeld::daemon::access {
 
 struct AccessOptions {
-  std::string grants;  // the file; empty: there is none
+  std::string grants;  // path of the grants file; empty: no file
   Scopes anonymous = Scopes::All();
   Scopes certificate;
   Scopes unix_users = Scopes::All();
-  // Users of unix sockets who may do everything, whatever any file says: root and the daemon's own.
+  // Users of unix sockets that have all scopes regardless of the grants file: root and the daemon's
+  // own user.
   std::set<uint32_t> trusted = TrustedUsers();
 
   static std::set<uint32_t> TrustedUsers();
 };
 
-// What a connection and a call say of who is calling.
+// The credentials of a connection and a call.
 struct Credentials {
-  std::optional<std::string> token;        // of "authorization: Bearer …"
-  std::optional<std::string> certificate;  // the verified one's common name
-  std::optional<uint32_t> user;            // of a unix socket
+  std::optional<std::string> token;        // from "authorization: Bearer …"
+  std::optional<std::string> certificate;  // common name of the verified client certificate
+  std::optional<uint32_t> user;            // user id of the peer of a unix socket
 };
 
 struct Caller {
-  std::string
-      principal;    // a token's or a certificate's name: whose layers are whose. Empty: nobody's
-  std::string who;  // for logs: "token stage-left", "user 1000", "anonymous"
+  std::string principal;  // name of the token or certificate; owns the caller's layers. Empty: none
+  std::string who;        // for logs: "token stage-left", "user 1000", "anonymous"
   Scopes scopes;
 
-  // What it was known by; of a token the hash.
+  // How the caller was identified, and the key: a token's hash, a certificate's common name or a
+  // user id.
   enum class By : uint8_t { kAnonymous, kToken, kCertificate, kUser };
   By by = By::kAnonymous;
   std::string key;
@@ -66,26 +70,29 @@ class Access {
   using WallClock = std::function<int64_t()>;
   static WallClock SystemWallClock();
 
-  // `log` may be none, else it outlives this. Nothing is read until the first Look.
+  // `log` may be null; otherwise it must outlive this object. The file is first read by Look.
   Access(AccessOptions options, WallClock now, Logger* log);
   Access(const Access&) = delete;
   Access& operator=(const Access&) = delete;
 
-  // Reads the file if it is another than last time, or `again`. Answers what is wrong with it. Tells
-  // on_change if the file was read, or if a token has expired since the last look.
+  // Reads the file if it has changed since the last call, or if `again` is true. Calls on_change if
+  // the file was read, or if a token has expired since the last call. Errors: FailedPrecondition
+  // with the fault of the file.
   absl::Status Look(bool again = false);
-  // Other options, with their file as it is now: InvalidArgument or so if that is wrong, and those in force
-  // stay. Tells on_change.
+  // Replaces the options and reads their file. Calls on_change. Errors: the error of ReadGrants if
+  // the file is invalid; the previous options then stay in force.
   absl::Status Change(AccessOptions options);
-  // After a Look that may have taken something from somebody. Called by whoever calls Look.
+  // Sets the callback for changes that may have revoked scopes. The thread that calls Look or
+  // Change calls it.
   void SetOnChange(std::function<void()> on_change);
 
-  // Unauthenticated, PermissionDenied or Unavailable, with what would help.
+  // Errors: Unauthenticated or Unavailable, with the remedy.
   absl::StatusOr<Caller> Identify(const Credentials& credentials) const;
-  // OK if `caller` may still do all that it could when it was identified. Also while the file is wrong.
+  // Returns OK if `caller` still has every scope that it had when it was identified, or while the
+  // file is invalid.
   absl::Status Recheck(const Caller& caller) const;
 
-  // What is wrong with the file; empty: nothing.
+  // Returns: the fault of the file, or an empty string.
   std::string trouble() const;
 
  private:

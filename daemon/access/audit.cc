@@ -16,7 +16,7 @@
 namespace voxeld::daemon::access {
 namespace {
 
-// Whether it is a file that can be read, and its last line has no end.
+// Returns: whether the file is readable and its last line is incomplete.
 bool EndsWithinALine(int file) {
   const Descriptor reader(open(absl::StrCat("/proc/self/fd/", file).c_str(),
                                O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));

@@ -1,5 +1,6 @@
-// Who did what that others feel: control actions, and calls that were turned away. A JSON object a
-// line, appended to a file of its own, or lines of the daemon's log where there is none.
+// Records actions that affect other clients: control actions and rejected calls. Each entry is a
+// JSON object on its own line, appended to a separate file. Without a file, entries are lines of
+// the daemon's log.
 //
 //   {"time":"2026-01-31T12:00:00.000Z","who":"token stage-left","peer":"ipv4:192.0.2.1:4000",
 //    "method":"UpdateDisplay","what":"name=\"sim\" brightness=0.5","result":"OK"}
@@ -30,19 +31,21 @@ struct AuditOptions {
 struct AuditStats {
   uint64_t pending = 0;  // entries that are not written yet
   uint64_t lost = 0;     // entries that did not fit into the buffer
-  std::string error;     // of the last write; empty: it succeeded
+  std::string error;     // from the last write; empty: it succeeded
 };
 
-// Thread-safe. Arguments may hold any bytes: those that are not text are escaped.
+// Thread-safe. Arguments may contain any bytes; bytes that are not text are escaped.
 //
-// If the file cannot be written, entries are kept in a bounded buffer and written in order by a later Record, Retry or Reopen. Entries
-// that do not fit into the buffer are counted as lost.
+// If the file cannot be written, entries stay in a bounded buffer and are written in order by a
+// later Record, Retry or Reopen. Entries that do not fit into the buffer are counted as lost.
 class Audit {
  public:
-  // The file is created with mode 0640. `log` may be null, and outlives this.
+  // Creates the file with mode 0640 if needed. `log` may be null; otherwise it must outlive this
+  // object.
   static absl::StatusOr<std::unique_ptr<Audit>> Open(AuditOptions options, Logger* log);
 
-  // Call before each control action. Returns: Unavailable with the reason if entries are required and the file cannot be written.
+  // Call before each control action. Errors: Unavailable with the reason if entries are required
+  // and the file cannot be written.
   absl::Status MayAct();
 
   void Record(const std::string& who, const std::string& peer, const std::string& method,
@@ -51,7 +54,8 @@ class Audit {
   // Writes pending entries. Call periodically.
   void Retry();
 
-  // Opens the file again, after it was moved away (logrotate). If that fails, the log says so and the old file stays open.
+  // Opens the file again, after logrotate has moved it. If that fails, this is logged and the old
+  // file stays open.
   void Reopen();
 
   AuditStats stats() const;
@@ -69,9 +73,9 @@ class Audit {
   std::deque<std::string> pending_ VOXELD_GUARDED_BY(mutex_);
   size_t pending_bytes_ VOXELD_GUARDED_BY(mutex_) = 0;
   uint64_t lost_ VOXELD_GUARDED_BY(mutex_) = 0;
-  bool losing_ VOXELD_GUARDED_BY(mutex_) =
-      false;  // entries were lost since the file could last be written
-  std::string error_ VOXELD_GUARDED_BY(mutex_);  // of the last write; empty: it succeeded
+  // Entries were lost since the file could last be written.
+  bool losing_ VOXELD_GUARDED_BY(mutex_) = false;
+  std::string error_ VOXELD_GUARDED_BY(mutex_);  // from the last write; empty: it succeeded
   bool cut_ VOXELD_GUARDED_BY(mutex_) = false;   // the file ends in the middle of a line
 };
 

@@ -1,4 +1,4 @@
-// Whether a file is still the one that was read.
+// Detects whether a file has changed since it was read.
 #pragma once
 
 #include <sys/stat.h>
@@ -9,14 +9,14 @@
 
 namespace voxeld::daemon::access {
 
-// What changes when a file is written, or another is put in its place.
+// File attributes that change when the file is written or replaced.
 struct FileStamp {
   uint64_t device = 0, inode = 0;
   int64_t size = 0, modified_ns = 0, changed_ns = 0;
   bool operator==(const FileStamp&) const = default;
 };
 
-// Nothing if it is not there, or cannot be seen.
+// Returns: nothing if the file does not exist or is not accessible.
 inline std::optional<FileStamp> StampOf(const std::string& path) {
   struct stat found;
   if (stat(path.c_str(), &found) != 0) return {};

@@ -29,7 +29,7 @@ namespace {
 constexpr size_t kHashDigits = 64;
 constexpr size_t kMostFaults = 20;
 
-// `when` has an offset.
+// Requires: `when` has an offset.
 int64_t UnixSeconds(const toml::date_time& when) {
   using std::chrono::day;
   using std::chrono::month;
@@ -225,7 +225,7 @@ absl::StatusOr<Grants> ReadGrants(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::ostringstream text;
   file >> std::noskipws >> text.rdbuf();
-  if (!file.eof()) {  // could not be opened, or failed before its end
+  if (!file.eof()) {  // the file could not be opened, or reading failed
     return absl::UnavailableError(absl::StrCat("the grants file ", path, " cannot be read"));
   }
   return ParseGrants(text.str(), path);
@@ -234,7 +234,7 @@ absl::StatusOr<Grants> ReadGrants(const std::string& path) {
 std::string HashOf(std::string_view token) {
   std::array<unsigned char, EVP_MAX_MD_SIZE> digest;
   unsigned length = 0;
-  // It fails without memory alone.
+  // EVP_Digest fails only if memory runs out.
   if (EVP_Digest(token.data(), token.size(), digest.data(), &length, EVP_sha256(), nullptr) != 1) {
     throw std::bad_alloc();
   }

@@ -1,18 +1,18 @@
-// The file of who may what: TOML, made by hand and by `voxelctl token`.
+// The grants file lists who may do what. It is TOML, written by hand and by `voxelctl token`.
 //
-//   [[token]]                     # a bearer token, of which only the hash is kept
-//   name = "stage-left"           # the principal: what it draws belongs to this name
-//   sha256 = "9f86…"              # of the token's text, 64 digits
+//   [[token]]                     # a bearer token; only its hash is stored
+//   name = "stage-left"           # the principal, which owns everything that this token draws
+//   sha256 = "9f86…"              # hash of the token's text, 64 digits
 //   scopes = ["view", "draw"]
-//   expires = 2027-01-31T00:00:00Z    # or not at all
+//   expires = 2027-01-31T00:00:00Z    # optional
 //
-//   [[certificate]]               # a client certificate that tls_client_ca has signed
+//   [[certificate]]               # a client certificate signed by tls_client_ca
 //   name = "cube-room"
 //   subject = "cube-room.example" # its common name
 //   scopes = ["view"]
 //
-//   [[user]]                      # of this machine, over a unix socket, by the kernel's word
-//   name = "alice"                # as the system knows it, or a number
+//   [[user]]                      # a local user, as the kernel reports it for a unix socket
+//   name = "alice"                # a name that the system knows, or a number
 //   scopes = ["view", "draw"]
 #pragma once
 
@@ -34,22 +34,24 @@ struct Grant {
 };
 
 struct Grants {
-  std::map<std::string, Grant, std::less<>> tokens;        // by hash, lower case
+  std::map<std::string, Grant, std::less<>> tokens;        // by hash, in lower case
   std::map<std::string, Grant, std::less<>> certificates;  // by common name
-  std::map<uint32_t, Grant> users;                         // by number
+  std::map<uint32_t, Grant> users;                         // by user id
 };
 
-// Greatest file, and longest name.
+// Limits on the size of the file and the length of a name.
 inline constexpr uintmax_t kGreatestGrantsBytes = 4u << 20;
 inline constexpr size_t kLongestName = 128;
 
-// Every fault of the file is in the message, one a line, each with its line and what would be right.
+// Errors: a message that lists every fault of the file, one per line, each with its line number and
+// the remedy.
 absl::StatusOr<Grants> ParseGrants(std::string_view text, const std::string& name);
 
-// Reads the file. FailedPrecondition if others than its owner and root may write it.
+// Reads the file. Errors include FailedPrecondition if users other than its owner and root can
+// write it.
 absl::StatusOr<Grants> ReadGrants(const std::string& path);
 
-// SHA-256 in 64 digits.
+// Returns: the SHA-256 as 64 hexadecimal digits.
 std::string HashOf(std::string_view token);
 
 }  // namespace voxeld::daemon::access

@@ -1,4 +1,4 @@
-// What a caller may do.
+// Scopes: the permissions of a caller.
 #pragma once
 
 #include <cstdint>
@@ -10,9 +10,9 @@
 namespace voxeld::daemon::access {
 
 enum class Scope : uint8_t {
-  kView = 1,     // look: displays, statistics, what is in the scene, what is shown
-  kDraw = 2,     // put things into the scene, and take back one's own
-  kControl = 4,  // displays' settings, others' layers and quotas, layers that erase
+  kView = 1,     // read displays, statistics, the scene and what is shown
+  kDraw = 2,     // add to the scene, and remove what one has added
+  kControl = 4,  // change displays' settings, others' layers and quotas, and layers that erase
 };
 
 class Scopes {
@@ -25,13 +25,13 @@ class Scopes {
     return *this;
   }
   constexpr bool Has(Scope scope) const { return (bits_ & static_cast<uint8_t>(scope)) != 0; }
-  // Whether all of `other` are among them.
+  // Returns: whether this set contains all of `other`.
   constexpr bool Hold(Scopes other) const { return (bits_ & other.bits_) == other.bits_; }
   constexpr bool empty() const { return bits_ == 0; }
   constexpr bool operator==(const Scopes&) const = default;
 
-  std::string ToString() const;  // "view draw"; "none"
-  std::string Sentence() const;  // the same for people: "view, draw and control"
+  std::string ToString() const;  // "view draw" or "none"
+  std::string Sentence() const;  // the same in prose: "view, draw and control"
 
  private:
   explicit constexpr Scopes(uint8_t bits) : bits_(bits) {}
@@ -40,7 +40,8 @@ class Scopes {
 
 const char* ScopeName(Scope scope);
 
-// "view", "draw", "control", separated by spaces or commas; "none", "all". InvalidArgument lists them.
+// Parses "view", "draw" and "control", separated by spaces or commas, or "none" or "all". Errors:
+// InvalidArgument, which lists the valid words.
 absl::StatusOr<Scopes> ParseScopes(std::string_view text);
 
 }  // namespace voxeld::daemon::access

@@ -1,4 +1,4 @@
-// All that decides who may do what, opened together and looked at together.
+// Opens and checks everything that decides who may do what: grants, TLS files and the audit log.
 #pragma once
 
 #include <memory>
@@ -16,28 +16,29 @@ namespace voxeld::daemon::access {
 // Thread-safe.
 class Security {
  public:
-  // How often files should be looked at.
+  // Recommended interval between calls of Look.
   static constexpr sync::TimeNs kLookInterval = sync::kSecond;
 
-  // Fails if what is there now is not right: nothing is begun with less than was asked for. `tls` without
-  // any file: no address speaks it. `log` outlives this.
+  // Fails if any of the files is invalid now, so that the daemon never starts with less security
+  // than configured. If `tls` names no file, no address can use TLS. `log` must outlive this
+  // object.
   static absl::StatusOr<std::unique_ptr<Security>> Open(const AccessOptions& options,
                                                         const TlsFiles& tls, AuditOptions audit,
                                                         Logger& log);
 
-  // Reads what has changed. What is wrong is logged, and in trouble().
+  // Reads the files that have changed. Faults are logged and reported by trouble().
   void Look() { LookAt(false); }
-  // Reads all of it, and opens the audit log anew.
+  // Reads all files again and reopens the audit log.
   void Reload();
 
   Access& access() { return *access_; }
-  const TlsStore* tls() const { return tls_.get(); }  // may be none
+  const TlsStore* tls() const { return tls_.get(); }  // null without TLS
   TlsStore::Counts tls_counts() const {
     return tls_ == nullptr ? TlsStore::Counts() : tls_->counts();
   }
   Audit& audit() { return *audit_; }
 
-  // What is wrong with any of it, or will soon be; empty: nothing.
+  // Returns: current faults and upcoming ones (expiring certificates); empty if there are none.
   std::string trouble() const;
 
  private:

@@ -1,4 +1,4 @@
-// A thread that does something every so often, by an injected clock.
+// Runs a function at a fixed interval on its own thread, timed by an injected clock.
 #pragma once
 
 #include <functional>
@@ -13,7 +13,8 @@ namespace voxeld::daemon::access {
 // Thread-safe.
 class Ticker {
  public:
-  // `work` is called on the ticker's thread; the clock outlives it. The first time after an interval.
+  // Calls `work` on the ticker's thread, for the first time after one interval. `clock` must
+  // outlive this object.
   Ticker(sync::Clock& clock, sync::TimeNs interval, std::function<void()> work)
       : clock_(clock), interval_(interval), work_(std::move(work)), thread_([this] { Run(); }) {}
   ~Ticker() {

@@ -52,7 +52,7 @@ absl::StatusOr<std::string> ReadPem(const char* what, const std::string& path, b
   std::ifstream file(path, std::ios::binary);
   std::ostringstream text;
   file >> std::noskipws >> text.rdbuf();
-  if (!file.eof()) {  // could not be opened, or failed before its end
+  if (!file.eof()) {  // the file could not be opened, or reading failed
     return absl::UnavailableError(absl::StrCat(what, " ", path, " cannot be read"));
   }
   return text.str();
@@ -79,7 +79,7 @@ int64_t UnixSeconds(const ASN1_TIME* time) {
   return ASN1_TIME_to_tm(time, &parts) == 1 ? static_cast<int64_t>(timegm(&parts)) : 0;
 }
 
-// Never asked for at a terminal.
+// Keeps OpenSSL from asking for a password at the terminal.
 int NoPassword(char*, int, int, void*) { return 0; }
 
 }  // namespace

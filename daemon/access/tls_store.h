@@ -1,6 +1,6 @@
-// The daemon's certificate and key, and whose clients' certificates it takes: PEM files, read again
-// when they change. What is not right is refused whole, and the last that was right stays in force: new
-// connections never have less than it asks of them.
+// Holds the daemon's certificate and key, and the authorities for client certificates. The PEM
+// files are reloaded when they change. An invalid set is rejected as a whole and the last valid one
+// stays in force, so new connections are never checked less strictly.
 #pragma once
 
 #include <array>
@@ -19,47 +19,50 @@
 namespace voxeld::daemon::access {
 
 struct TlsFiles {
-  std::string certificate;  // the daemon's, then those between it and its authority's
-  std::string key;          // not readable by all
-  std::string client_ca;    // authorities whose clients are let in
+  std::string certificate;  // the daemon's certificate, then its intermediates
+  std::string key;          // must not be readable by everybody
+  std::string client_ca;    // authorities whose client certificates are accepted
   bool any() const { return !certificate.empty() || !key.empty() || !client_ca.empty(); }
 };
 
 struct TlsMaterial {
   std::string certificate, key, client_ca;  // PEM
-  int64_t expires_s = 0;                    // the daemon's certificate, Unix time
+  int64_t expires_s = 0;                    // expiry of the daemon's certificate, Unix time
 };
 
-// InvalidArgument or FailedPrecondition says which file, what is wrong, and what would be right: no
-// certificate in it, a key of another, one that is not valid at `now_s`, one that all may read.
+// Errors: InvalidArgument or FailedPrecondition, which names the file, the fault and the remedy: no
+// certificate, a key that does not match, a certificate that is not valid at `now_s`, or a key that
+// everybody can read.
 absl::StatusOr<TlsMaterial> ReadTls(const TlsFiles& files, int64_t now_s);
 
 // Thread-safe.
 class TlsStore {
  public:
-  // So long before the certificate expires trouble() says so.
+  // trouble() reports an expiring certificate this long in advance.
   static constexpr int64_t kWarnSeconds = 14 * 24 * 3600;
 
-  // Fails if what is there now is not right. `log` may be none, else it outlives this.
+  // Fails if the files are invalid now. `log` may be null; otherwise it must outlive this object.
   static absl::StatusOr<std::unique_ptr<TlsStore>> Open(TlsFiles files, Access::WallClock now,
                                                         Logger* log);
 
-  // Reads the files if one is another than last time, or `again`. Answers what is wrong with them.
+  // Reads the files if one has changed, or if `again` is true. Errors: FailedPrecondition with the
+  // fault of the files.
   absl::Status Look(bool again = false);
 
   struct Current {
     std::shared_ptr<const TlsMaterial> material;
-    uint64_t generation = 0;  // greater by one with each that was taken
+    uint64_t generation = 0;  // increases by one with each accepted set
   };
   Current current() const;
 
-  // Times that the files were read and taken, the first included, and that they were wrong.
+  // How often the files were read and accepted (including the first time), and how often they were
+  // rejected.
   struct Counts {
     uint64_t taken = 0, refused = 0;
   };
   Counts counts() const;
 
-  // What is wrong, or will soon be; empty: nothing.
+  // Returns: the current or upcoming fault, or an empty string.
   std::string trouble() const;
 
  private:

@@ -40,7 +40,7 @@ absl::StatusOr<Address> ParseUnix(std::string_view text) {
   std::string_view path = text.substr(kUnixPrefix.size());
   if (path.starts_with("//")) path.remove_prefix(2);  // unix:///path
   if (path.empty() || path.front() != '/') return Wrong(text, "has no absolute path");
-  while (path.starts_with("//")) path.remove_prefix(1);  // so that what is printed reads back
+  while (path.starts_with("//")) path.remove_prefix(1);  // so that ToString can be parsed back
   if (path.size() > kPathBytes) {
     return Wrong(text, absl::StrCat("has a path of ", path.size(), " bytes, and ", kPathBytes,
                                     " is the most that a unix socket can have"));
@@ -64,7 +64,7 @@ absl::Status PrepareUnix(const Address& address) {
                                       " cannot be made"));
     }
   }
-  // A folder that somebody else made, in /tmp say, is theirs to change under us.
+  // Another user who owns the folder (in /tmp, for example) could replace its contents at any time.
   struct stat owner;
   if (stat(folder.c_str(), &owner) == 0 && owner.st_uid != geteuid() && owner.st_uid != 0) {
     return absl::PermissionDeniedError(absl::StrCat("the folder ", folder.string(), " of ",
@@ -81,7 +81,7 @@ absl::Status PrepareUnix(const Address& address) {
   sockaddr_un name = {};
   name.sun_family = AF_UNIX;
   std::memcpy(name.sun_path, address.path.data(), address.path.size());
-  // EPROTOTYPE: not in streams, but somebody does.
+  // EPROTOTYPE means that a server listens, but not on a stream socket.
   if (connect(probe.get(), reinterpret_cast<const sockaddr*>(&name), sizeof(name)) == 0 ||
       errno == EAGAIN || errno == EINPROGRESS || errno == EPROTOTYPE) {
     return absl::AlreadyExistsError(
