@@ -27,7 +27,8 @@ absl::Status Failed(const char* what) {
   return no_room ? absl::ResourceExhaustedError(message) : absl::UnavailableError(message);
 }
 
-// Throws std::bad_alloc: a hash that lacks something would call content damaged that is not.
+// Throws std::bad_alloc on failure, because an incomplete hash would report intact content as
+// damaged.
 class Hash {
  public:
   Hash() : context_(EVP_MD_CTX_new(), EVP_MD_CTX_free) {
@@ -45,7 +46,7 @@ class Hash {
   }
 
  private:
-  // Nothing else can be wrong with it.
+  // OpenSSL's digest functions fail only if memory runs out.
   static void Check(int done) {
     if (done != 1) throw std::bad_alloc();
   }

@@ -1,4 +1,4 @@
-// One asset's bytes on the disk.
+// Reads and writes the file of one asset.
 #pragma once
 
 #include <cstdint>
@@ -13,15 +13,15 @@
 
 namespace voxeld::daemon::assets {
 
-// One that is being written. Statuses: ResourceExhausted (the disk is full, descriptors are out), else
-// Unavailable.
+// An asset file that is being written. Errors: ResourceExhausted if the disk is full or no
+// descriptors are left, else Unavailable.
 class AssetFile {
  public:
-  // Mode 0600. `empty`: what is there goes; else it stays.
+  // Opens the file with mode 0600. `empty`: truncates it; otherwise existing content stays.
   static absl::StatusOr<AssetFile> Open(const std::string& path, bool empty);
 
   absl::Status Write(uint64_t offset, std::string_view bytes);
-  // On the disk, under another path, when it returns. An error: it has the path that it had.
+  // Flushes the file to the disk and renames it to `path`. On an error it keeps its previous path.
   absl::Status Keep(const std::string& path);
 
  private:
@@ -31,15 +31,16 @@ class AssetFile {
   Descriptor file_;
 };
 
-// Exactly that range. OutOfRange: the file is shorter, or not there. Unavailable: it cannot be read.
+// Reads exactly this range. Errors: OutOfRange if the file is shorter or missing, Unavailable if it
+// cannot be read.
 absl::StatusOr<wire::MappedRange> ReadAssetFile(const std::string& path, uint64_t offset,
                                                 uint64_t size);
 
-// The SHA-256 of the first `size` bytes; statuses as above.
+// Returns: the SHA-256 of the first `size` bytes. Errors: as for ReadAssetFile.
 absl::StatusOr<std::string> HashAssetFile(const std::string& path, uint64_t size);
 std::string HashBytes(std::string_view bytes);
 
-// That it is in use, for whoever reads the folder later.
+// Updates the file's time, which tells a later ReadFolder that the asset was in use.
 void TouchAssetFile(const std::string& path);
 
 }  // namespace voxeld::daemon::assets

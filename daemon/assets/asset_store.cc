@@ -29,7 +29,7 @@ std::string Hex(std::string_view digest) {
 
 uint64_t CostOf(uint64_t size) { return std::max(size, AssetStore::kLeastCost); }
 
-// A file's name as the store gives it; nothing: it is none of ours.
+// Parses a file name that the store has assigned. Returns: nothing for any other name.
 struct Name {
   std::string digest;
   bool complete = false;
@@ -120,7 +120,7 @@ absl::Status AssetStore::ReadFolder(const std::string& folder) {
       asset.used = ++uses_;
     }
     std::erase_if(assets_, [](const auto& entry) { return entry.second.stored == 0; });
-    (void)MakeRoom("", 0, 0, &gone);  // where there was more room once
+    (void)MakeRoom("", 0, 0, &gone);  // if the limits are lower than before
   }
   RemoveFiles(gone);
   return absl::OkStatus();
@@ -211,7 +211,7 @@ absl::StatusOr<AssetStore::UploadId> AssetStore::Admit(std::string_view digest, 
       !status.ok()) {
     return status;
   }
-  // One that had to go for its room has been dropped already.
+  // If MakeRoom has dropped the displaced upload, the count is already below the limit.
   if (uploads_.size() >= limits_.max_uploads) EndUpload(*displaced, gone);
   at = assets_.try_emplace(std::string(digest)).first;
   Asset& asset = at->second;
@@ -308,7 +308,8 @@ absl::Status AssetStore::Append(UploadId upload, uint64_t offset, std::string_vi
     return Because(written, digest);
   }
   sync::MutexLock lock(mutex_);
-  Asset& asset = assets_.find(digest)->second;  // an upload under way, and this is who ends those
+  // The asset still exists: only this thread ends running uploads.
+  Asset& asset = assets_.find(digest)->second;
   asset.stored += bytes.size();
   asset.heard = clock_.Now();
   figures_.bytes_in += bytes.size();
@@ -391,7 +392,7 @@ void AssetStore::DropDamaged(std::string_view digest, UploadId brought) {
     ++figures_.damaged;
     Paths gone;
     Drop(at, &gone);
-    RemoveFiles(gone);  // before anybody can bring it anew
+    RemoveFiles(gone);  // before a new upload can create them again
   }
   if (log_ != nullptr) {
     log_->Error("an asset was damaged, and is gone", {{"sha256", Hex(digest)}});
@@ -452,7 +453,7 @@ absl::StatusOr<wire::MappedRange> AssetStore::FindAsset(std::string_view digest,
   absl::StatusOr<wire::MappedRange> bytes = absl::OutOfRangeError("");
   if (*right) bytes = ReadAssetFile(path, offset, size);
   if (absl::IsOutOfRange(
-          bytes.status())) {  // cut while the daemon runs, or gone for another's room
+          bytes.status())) {  // truncated while the daemon was running, or removed to make room
     DropDamaged(digest, asset.brought);
     return missing("damaged on the disk, or gone meanwhile; bring it anew by UploadAsset");
   }

@@ -1,13 +1,15 @@
-// Content by its hash (voxeld.v1.SceneService.UploadAsset): brought once, piece by piece, and named by
-// any number of requests.
+// Stores content by its hash (voxeld.v1.SceneService.UploadAsset). Content is uploaded once, in
+// pieces, and any number of requests can refer to it.
 //
-//   uploads   may break off, and go on behind the last piece that came: parts are kept like what is whole
-//   whole     only what has its hash: compared when the last byte is here, and again when it is first
-//             used after a start
-//   budget    for what is whole, for parts, and for what uploads under way said they would bring: what
-//             was used least recently goes, uploads under way stay
-//   a folder  keeps it over the daemon's end, on the disk before Finish answers: <sha256>, and
-//             <sha256>.part for parts. Files of other names are left alone. Without one it is in memory
+//   uploads   can be interrupted and resumed after the last piece that arrived: incomplete assets
+//             are stored like complete ones
+//   complete  only if the hash matches: it is compared when the last byte arrives, and again when
+//             the asset is first used after a start
+//   budget    covers complete assets, incomplete ones, and the announced sizes of running uploads.
+//             The least recently used assets are dropped; running uploads are not
+//   a folder  preserves assets across restarts. They are on the disk before Finish returns:
+//             <sha256>, and <sha256>.part if incomplete. Other files are left alone. Without a
+//             folder assets are in memory
 #pragma once
 
 #include <cstdint>
@@ -30,61 +32,64 @@
 namespace voxeld::daemon::assets {
 
 struct AssetLimits {
-  uint64_t max_asset_bytes = 256u << 20;  // of one
-  uint64_t max_bytes = 512u << 20;        // of all
-  uint64_t max_assets = 4096;             // whole ones and parts
-  size_t max_uploads = 16;                // under way at once
-  // An upload that brought nothing for so long gives way to another of the same content, to one beyond
-  // max_uploads, and to whoever needs its room.
+  uint64_t max_asset_bytes = 256u << 20;  // of one asset
+  uint64_t max_bytes = 512u << 20;        // of all assets together
+  uint64_t max_assets = 4096;             // complete and incomplete
+  size_t max_uploads = 16;                // running at once
+  // An upload that has sent nothing for this long can be displaced: by another upload of the same
+  // content, by one beyond max_uploads, or when its space is needed.
   sync::TimeNs idle_limit_ns = 30 * sync::kSecond;
 };
 
 struct AssetState {
   std::string digest;
-  uint64_t stored = 0;  // bytes that are here
+  uint64_t stored = 0;  // bytes received so far
   bool complete = false;
 };
 
-// Thread-safe; Begin, Append, Finish and Abandon one at a time. What a function is given as a digest has
-// 32 bytes.
+// Thread-safe, except that Begin, Append, Finish and Abandon must not run concurrently. Digests
+// must have 32 bytes.
 class AssetStore final : public wire::AssetSource {
  public:
   using UploadId = uint64_t;
-  // Of the budget an asset has at least this: what knowing of it costs, and a disk's block.
+  // Minimum charge of an asset against the budget: its bookkeeping and one disk block.
   static constexpr uint64_t kLeastCost = 4096;
 
-  // Reads what the folder has, which is made (mode 0700) if it is not there; empty: none. One that cannot
-  // be used is logged, and told by figures(): assets are in memory then. Clock and log outlive the store;
-  // the log may be none.
+  // Reads the folder, and creates it (mode 0700) if it does not exist; an empty path means none. If
+  // the folder is unusable, this is logged and reported by figures(), and assets are kept in
+  // memory. The clock and the log must outlive the store; the log may be null.
   static std::unique_ptr<AssetStore> Open(const std::string& folder, const AssetLimits& limits,
                                           sync::Clock& clock, Logger* log);
 
-  // Content of `size` bytes is brought from `offset` on, which is 0 (anew) or where what is here ends.
-  // Makes room. AlreadyExists: it is here. InvalidArgument, OutOfRange: size or offset is wrong.
-  // Aborted: another upload of it is under way. ResourceExhausted: uploads under way leave no room, or
-  // are as many as there may be; or the disk is full. Unavailable: it fails. Where it fails nothing of
-  // others has gone.
+  // Starts an upload of `size` bytes at `offset`, which is 0 (from the start) or the number of
+  // bytes already stored. Makes room. Errors: AlreadyExists if the asset is complete;
+  // InvalidArgument or OutOfRange if the size or offset is wrong; Aborted if another upload of it
+  // is running; ResourceExhausted if running uploads leave no room, their number is at its limit,
+  // or the disk is full; Unavailable if reading or opening a file fails. A refused upload
+  // drops no other asset.
   absl::StatusOr<UploadId> Begin(std::string_view digest, uint64_t size, uint64_t offset);
 
-  // The next bytes, one at least. InvalidArgument: there are none. OutOfRange: `offset` is not where the
-  // last ones ended, or there are more than were said. Aborted: the upload brought nothing for long, and
-  // gave way. ResourceExhausted, Unavailable: they cannot be written; the upload is over.
+  // Appends the next bytes. Errors: InvalidArgument if `bytes` is empty; OutOfRange if `offset` is
+  // not where the last piece ended, or if the announced size would be exceeded; Aborted if the
+  // upload was idle and has been displaced; ResourceExhausted or Unavailable if the bytes cannot be
+  // written, which ends the upload.
   absl::Status Append(UploadId upload, uint64_t offset, std::string_view bytes);
 
-  // All has been brought. OutOfRange: it has not; what is here stays. DataLoss: it has another hash, and
-  // is gone. Answers the size.
+  // Completes the upload. Returns: the size. Errors: OutOfRange if bytes are missing, which keeps
+  // the stored ones; DataLoss if the hash differs, which drops the asset.
   absl::StatusOr<uint64_t> Finish(UploadId upload);
 
-  // Ends an upload; what it brought stays. One that has ended is none.
+  // Ends an upload and keeps its bytes. Does nothing if the upload has already ended.
   void Abandon(UploadId upload);
 
-  // Something has come for it, and waits to be appended. Any thread.
+  // Reports that a piece has arrived and waits to be appended. May be called on any thread.
   void Heard(UploadId upload);
 
   absl::StatusOr<wire::MappedRange> FindAsset(std::string_view digest, uint64_t offset,
                                               uint64_t size) override;
 
-  // Those, or all that are here, what was used most recently first.
+  // Returns: the states of these assets, in this order. ListAll returns all stored ones, most
+  // recently used first.
   std::vector<AssetState> List(std::span<const std::string> digests) const;
   std::vector<AssetState> ListAll() const;
 
@@ -92,15 +97,15 @@ class AssetStore final : public wire::AssetSource {
 
  private:
   struct Asset {
-    uint64_t size = 0;  // as it was said; when no upload is under way what is here
+    uint64_t size = 0;  // announced size; without a running upload the stored size
     uint64_t stored = 0;
     bool complete = false;
     bool checked = false;            // since the start
-    uint64_t used = 0;               // a number that grows with each use
-    UploadId brought = 0;            // by whom it is whole; 0: it was at the start
-    UploadId upload = 0;             // under way; 0: none
-    sync::TimeNs heard = 0;          // of it
-    std::shared_ptr<char[]> memory;  // without a folder, of `size` bytes
+    uint64_t used = 0;               // increases with each use
+    UploadId brought = 0;            // the upload that completed it; 0: it existed at the start
+    UploadId upload = 0;             // the running upload; 0: none
+    sync::TimeNs heard = 0;          // when the upload last sent something
+    std::shared_ptr<char[]> memory;  // without a folder: `size` bytes
   };
   using Assets = std::map<std::string, Asset, std::less<>>;
   using Paths = std::vector<std::string>;
@@ -110,7 +115,8 @@ class AssetStore final : public wire::AssetSource {
   absl::Status ReadFolder(const std::string& folder);
   std::string PathOf(std::string_view digest, bool complete) const;
 
-  // Those that make or take away Assets add the files that are to be removed without the lock.
+  // Functions that add or drop Assets collect the files to remove in `gone`. Remove these without
+  // the lock.
   bool IsIdle(const Asset& asset) const VOXELD_REQUIRES(mutex_);
   absl::Status MakeRoom(std::string_view digest, uint64_t cost, uint64_t more, Paths* gone)
       VOXELD_REQUIRES(mutex_);
@@ -123,22 +129,23 @@ class AssetStore final : public wire::AssetSource {
   absl::StatusOr<UploadId> Admit(std::string_view digest, uint64_t size, uint64_t offset,
                                  Paths* gone) VOXELD_EXCLUDES(mutex_);
 
-  // Of a whole one in the folder: hashes it, unless that has been done. False: it was damaged, or is gone.
+  // Hashes a complete asset in the folder, unless that has been done since the start. Returns:
+  // false if it is damaged or missing.
   absl::StatusOr<bool> Check(std::string_view digest) VOXELD_EXCLUDES(mutex_, check_mutex_);
-  // Unless another has brought it anew meanwhile.
+  // Drops the asset unless a newer upload has replaced it.
   void DropDamaged(std::string_view digest, UploadId brought) VOXELD_EXCLUDES(mutex_);
 
-  std::string folder_;  // constant once it is open
+  std::string folder_;  // constant after Open
   const AssetLimits limits_;
   sync::Clock& clock_;
   Logger* const log_;
 
-  std::map<UploadId, AssetFile> files_;  // of uploads, with a folder; theirs who bring them
+  std::map<UploadId, AssetFile> files_;  // of uploads, with a folder; only their thread uses it
 
-  sync::Mutex check_mutex_;  // one is hashed at a time; before mutex_
+  sync::Mutex check_mutex_;  // one asset is hashed at a time; lock before mutex_
   mutable sync::Mutex mutex_;
   Assets assets_ VOXELD_GUARDED_BY(mutex_);
-  std::map<UploadId, std::string> uploads_ VOXELD_GUARDED_BY(mutex_);  // their digests
+  std::map<UploadId, std::string> uploads_ VOXELD_GUARDED_BY(mutex_);  // digests
   uint64_t reserved_ VOXELD_GUARDED_BY(mutex_) = 0;                    // sum of the costs
   uint64_t uses_ VOXELD_GUARDED_BY(mutex_) = 0;
   UploadId last_upload_ VOXELD_GUARDED_BY(mutex_) = 0;

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <charconv>
 
-#include "colormaps_text.h"  // kColormapsText, made of the file
+#include "colormaps_text.h"  // kColormapsText, generated from the file
 #include "common/text/suggest.h"
 
 namespace voxeld {
 namespace {
 
-// Up to `separator`, which goes too.
+// Returns the text up to `separator`, and removes both from `text`.
 std::string_view Take(std::string_view& text, char separator) {
   const size_t end = std::min(text.find(separator), text.size());
   const std::string_view taken = text.substr(0, end);
@@ -17,7 +17,7 @@ std::string_view Take(std::string_view& text, char separator) {
   return taken;
 }
 
-// f(name, colours) for each map until it is true.
+// Calls f(name, colours) for each map until it returns true.
 template <typename F>
 void ForEachMap(F&& f) {
   std::string_view text = kColormapsText;
@@ -29,7 +29,7 @@ void ForEachMap(F&& f) {
   }
 }
 
-// "viridis_r" is viridis from its end.
+// "viridis_r" is viridis reversed.
 constexpr std::string_view kReversed = "_r";
 
 std::string_view WithoutReversed(std::string_view name) {
@@ -57,7 +57,7 @@ std::optional<ColorTable> FindColormap(std::string_view name) {
     return true;
   });
   if (stops.empty()) return std::nullopt;
-  // In whole numbers: 255·(stops − 1) parts.
+  // Interpolate in integers: a segment has 255 parts.
   ColorTable table;
   const uint32_t last = static_cast<uint32_t>(stops.size() - 1);
   for (uint32_t i = 0; i < table.size(); ++i) {

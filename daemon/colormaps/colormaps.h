@@ -1,4 +1,4 @@
-// Colour maps by name (proto/voxeld/v1/colormaps.txt).
+// Finds colour maps by name (proto/voxeld/v1/colormaps.txt).
 #pragma once
 
 #include <array>
@@ -10,13 +10,13 @@
 
 namespace voxeld {
 
-using ColorTable = std::array<uint32_t, 256>;  // 0x00RRGGBB, of 0 to 1
+using ColorTable = std::array<uint32_t, 256>;  // 0x00RRGGBB for values from 0 to 1
 
-// None if there is no such map. With "_r" behind its name each is turned round.
+// Returns: nothing if the map does not exist. The suffix "_r" reverses a map.
 std::optional<ColorTable> FindColormap(std::string_view name);
-// As they stand in the file, without those turned round.
+// Returns: the names in the order of the file, without reversed maps.
 std::vector<std::string> ColormapNames();
-// What to say of a name that is none: the one that may be meant, or which there are.
+// Returns: advice for an unknown name: a similar name, or the list of all names.
 std::string ColormapAdvice(std::string_view wrong);
 
 }  // namespace voxeld
