@@ -13,7 +13,7 @@
 namespace voxeld::daemon {
 namespace {
 
-// What kept voxeld from being understood.
+// Converts the parser's error to a Status.
 absl::Status Explain(const CLI::App& app, const CLI::ParseError& error) {
   const std::string wrong = app.remaining().empty() ? "" : app.remaining().front();
   if (!wrong.empty() && wrong.front() != '-') {

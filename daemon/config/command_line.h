@@ -1,4 +1,4 @@
-// voxeld's command line, as it was given. What it means is for ResolveConfig.
+// Parses voxeld's command line. LoadConfig and ApplyCommandLine interpret the values.
 #pragma once
 
 #include <optional>
@@ -19,11 +19,11 @@ struct CommandLine {
   std::optional<std::string> log_format;
   std::optional<std::string> state_dir;  // --state-dir DIR
   bool check_config = false;
-  std::string print_and_exit;  // not empty: the answer to --help or --version
+  std::string print_and_exit;  // if not empty, the text to print for --help or --version
 };
 
-// InvalidArgument for a usage error, with what would be right. --help-man, which is for the build, is answered by the manual's
-// page.
+// Errors: InvalidArgument for a usage error, with the remedy. --help-man, which the build uses,
+// returns the manual page.
 absl::StatusOr<CommandLine> ParseCommandLine(int argc, const char* const* argv,
                                              const std::string& version);
 

@@ -93,9 +93,9 @@ absl::Status ApplyDisplays(const CommandLine& command_line, Config* config) {
   return absl::OkStatus();
 }
 
-// A value of the command line for one of the fields with a few possible values.
+// Sets a field that has a few possible values to a value of the command line.
 struct ChoiceSetter {
-  const char* key;  // the section's and the field's, as in "log.level"
+  const char* key;  // section and field, as in "log.level"
   const std::optional<std::string>& value;
   const char* option;
   std::string section;
@@ -143,7 +143,7 @@ absl::StatusOr<gpu::EngineKind> ParseEngineKind(std::string_view text) {
     known.push_back(EngineKindText(kind));
     if (known.back() == text) return kind;
   }
-  // By the letters alone gpu would be near cpu.
+  // By letter distance alone, "gpu" would be similar to "cpu".
   const std::string suggestion = absl::EqualsIgnoreCase({text.data(), text.size()}, "gpu")
                                      ? "; did you mean cuda?"
                                      : Suggestion(text, known);
@@ -196,7 +196,8 @@ absl::StatusOr<std::optional<Address>> LocalSocketAddress(const ServerConfig& co
   }
   for (const Address& listen : config.listen) {
     if (!listen.unix_socket) continue;
-    // A path too long for its suffix: none, as nobody asked for it by name.
+    // If the path plus suffix is too long there is no local socket, because nobody requested one
+    // explicitly.
     absl::StatusOr<Address> address = ParseAddress(absl::StrCat(listen.ToString(), kLocalSuffix));
     if (address.ok()) return std::optional<Address>(*std::move(address));
   }
@@ -292,7 +293,7 @@ absl::Status ReadConfigFile(const std::string& path, Config* config) {
   if (error) {
     return absl::ErrnoToStatus(error.value(), absl::StrCat("the configuration file ", path));
   }
-  // As a stream: what a shell's <(…) names has no size.
+  // Read the file as a stream, because the file behind a shell's <(…) has no size.
   std::ifstream file(path, std::ios::binary);
   std::string text;
   std::array<char, 1 << 16> piece;

@@ -25,96 +25,100 @@ namespace voxeld::daemon {
 
 struct ServerConfig {
   std::vector<Address> listen;
-  // Nothing: no http port. `http_asked`: it was asked for, so that a busy one is an error.
+  // Nothing: no HTTP port. `http_asked`: it was requested explicitly, so that a busy port is an
+  // error.
   std::optional<Address> http;
   bool http_asked = false;
-  // Where producers on this machine hand over memory: "auto" (beside the first unix socket of
-  // `listen`, with ".local" after its name), a path, or empty for nowhere.
+  // Path of the local socket, at which producers on this machine hand over memory: "auto" (the
+  // first unix socket of `listen` with ".local" appended), a path, or empty for none.
   std::string local_socket = "auto";
-  uint32_t max_local_memories = 256;  // of one session, held at once
-  // That a client of Stream has not read. A commit's issues come at once: well above
-  // max_issues_per_commit, or clients that do read may be ended.
+  uint32_t max_local_memories = 256;  // of one session, held at the same time
+  // Limit on answers that a client of Stream has not read yet. A commit's issues arrive all at
+  // once, so keep this well above max_issues_per_commit. Otherwise streams of clients that do read
+  // may be ended.
   uint32_t max_queued_answers = 16384;
   uint64_t max_queued_bytes = 16u << 20;  // the same in bytes
   listen::ConnectionLimits connections;
-  uint32_t max_calls_per_connection = 100;  // at once; further ones wait in the client
+  uint32_t max_calls_per_connection = 100;  // at the same time; the client queues further ones
   uint32_t max_metadata_bytes = 8u << 10;   // of one call
-  // From when a call has begun until gRPC has HTTP/2's settings.
+  // From the beginning of a call until gRPC has the HTTP/2 settings.
   int64_t handshake_limit_ns = 2 * sync::kSecond;
-  // A client that pings more often without data, so many times, is sent away.
+  // A client that pings more often than this without data, max_ping_strikes times, is disconnected.
   int64_t ping_interval_min_ns = 5 * sync::kSecond;
   uint32_t max_ping_strikes = 2;
-  // A connection without calls is closed after it; one that is so old is asked to go, and closed
-  // after the grace, with what is left on it. 0: never.
+  // A connection without calls is closed after the idle limit. A connection that reaches the age
+  // limit is asked to close, and closed after the grace period together with its remaining calls.
+  // 0: never.
   int64_t connection_idle_limit_ns = 0;
   int64_t connection_age_limit_ns = 0;
   int64_t connection_age_grace_ns = 60 * sync::kSecond;
-  uint32_t max_scene_watches = 64;   // WatchScene calls at once, of all connections
+  uint32_t max_scene_watches = 64;   // concurrent WatchScene calls of all connections
   uint32_t max_stats_watches = 64;   // WatchStats calls
   uint32_t max_volume_watches = 16;  // WatchVolume calls
   int64_t watch_write_limit_ns = 30 * sync::kSecond;
   int64_t upload_silence_limit_ns = 30 * sync::kSecond;
   uint64_t max_arriving_bytes = uint64_t{1} << 30;
   int64_t open_limit_ns = 5 * sync::kSecond;  // how long a new stream waits for its Open
-  // How long a stream that its client has half-closed waits for outcomes, and an ending one for its
-  // client to read what is queued.
+  // How long a half-closed stream waits for outcomes, and how long an ending stream waits for its
+  // client to read the queued messages.
   int64_t drain_limit_ns = 5 * sync::kSecond;
-  // An idle connection is probed this often, and closed when no answer comes.
+  // How often an idle connection is probed. It is closed if no answer arrives.
   int64_t keepalive_interval_ns = 20 * sync::kSecond;
   int64_t keepalive_timeout_ns = 10 * sync::kSecond;
   uint32_t max_http_connections = 64;
   int64_t http_idle_limit_ns = 10 * sync::kSecond;
-  std::string http_hosts;    // names, between commas, that browsers may know this machine by
-  bool http_control = true;  // a browser may be given control, by an address that serves once
-  bool http_play = true;     // with control it may send files to be played
-  uint64_t http_max_upload_bytes = 256u << 20;  // of one of them
+  std::string http_hosts;    // comma-separated names by which browsers may address this machine
+  bool http_control = true;  // allow a browser control through a one-time address
+  bool http_play = true;     // allow a browser with control to upload files to play
+  uint64_t http_max_upload_bytes = 256u << 20;  // of one uploaded file
 };
 
 struct EngineConfig {
   gpu::EngineKind kind = gpu::EngineKind::kAuto;
-  uint32_t threads = 0;  // 0: one a core
+  uint32_t threads = 0;  // 0: one per core
   uint64_t staging_limit_bytes = uint64_t{4} << 30;
-  uint32_t device = 0;  // which GPU
-  // gpu::EngineOptions::index_bytes, of each display.
+  uint32_t device = 0;  // index of the GPU
+  // gpu::EngineOptions::index_bytes of each display.
   uint64_t index_bytes = 0;
-  // A CUDA engine always has a process of its own; the CPU's may have one too.
+  // A CUDA engine always runs in a separate process; a CPU engine may.
   bool in_worker = false;
-  std::string worker;  // the program of that process; empty: voxeld-engine
-  // NCCL's library, for displays with several GPUs: a path; empty: $VOXELD_NCCL, then where the loader
-  // looks; "off": none.
+  std::string worker;  // program of that process; empty: voxeld-engine
+  // Path of the NCCL library, for displays with several GPUs. Empty: $VOXELD_NCCL, then the
+  // loader's search path. "off": none.
   std::string nccl;
-  // After which a process that does not answer is ended, and the CPU takes over.
+  // A process that does not respond within this time is terminated, and the CPU takes over.
   int64_t worker_deadline_ns = 2 * sync::kSecond;
 };
 
 struct LogConfig {
   std::string level = "info";           // trace, debug, info, warn, error, off
   std::string format = "text";          // text, json
-  std::string audit;                    // a file for who did what; empty: the log
-  bool audit_required = false;          // refuse control actions while `audit` cannot be written
-  uint32_t max_lines_per_second = 100;  // of one event; 0: any number
+  std::string audit;                    // path of the audit log; empty: the log
+  bool audit_required = false;          // reject control actions while `audit` cannot be written
+  uint32_t max_lines_per_second = 100;  // of one event; 0: unlimited
 };
 
 struct StateConfig {
-  std::string dir;  // where what outlives the daemon is kept; empty: nothing does
-  int64_t interval_ns =
-      100 * sync::kMillisecond;  // how long what nobody waits for may be unwritten
+  std::string dir;  // folder for persistent state; empty: nothing is persistent
+  // Longest delay before changes that no client waits for are written.
+  int64_t interval_ns = 100 * sync::kMillisecond;
 };
 
 struct SecurityConfig {
-  std::string grants;  // the file of tokens, certificates and users (access/grants.h); empty: none
-  // PEM, for addresses that speak TLS: all three or none.
+  // Path of the file of tokens, certificates and users (access/grants.h). Empty: none.
+  std::string grants;
+  // PEM files for addresses that use TLS. Set all three or none.
   access::TlsFiles tls;
-  // What callers have that no grant names, as ParseScopes takes it. "auto": all, and none once there is
-  // a grants file.
+  // Scopes of callers that no grant names, in the syntax of ParseScopes. "auto": all, or none if
+  // there is a grants file.
   std::string anonymous_scopes = "auto";
   std::string certificate_scopes = "none", unix_scopes = "all";
-  // Addresses beyond this machine may be without TLS.
+  // Allow addresses that other machines can reach without TLS.
   bool allow_plain_beyond_loopback = false;
 };
 
 struct Config {
-  std::string file;  // that was read; empty: none
+  std::string file;  // path of the file that was read; empty: none
   ServerConfig server;
   EngineConfig engine;
   LogConfig log;
@@ -124,49 +128,49 @@ struct Config {
   std::vector<DisplayConfig> displays;
 };
 
-// What the environment says: a variable's value, or nothing.
+// Returns: the value of an environment variable, or nothing.
 using Environment = std::function<std::optional<std::string>(const char* name)>;
 Environment ProcessEnvironment();
 
 // Returns: the addresses at which gRPC is served by default. voxelctl and the clients also try these by default.
 std::vector<std::string> DefaultAddresses(const Environment& environment);
 
-// Reads `path` over `config`. Every fault of the file is in the message, one a line, each as
-// "path:line:column: key what was wrong, the value, what would be right". InvalidArgument, or
-// NotFound if there is no such file.
+// Reads `path` and overrides `config`. The error message lists every fault of the file, one per
+// line, each as "path:line:column: key", what is wrong, the value and the remedy. Errors:
+// InvalidArgument, or NotFound if the file does not exist.
 absl::Status ReadConfigFile(const std::string& path, Config* config);
 
-// The same for text; `name` stands for the path in messages.
+// Does the same for text. `name` replaces the path in messages.
 absl::Status ReadConfigText(std::string_view text, const std::string& name, Config* config);
 
-// Which file is read when none is named: $XDG_CONFIG_HOME/voxeld/voxeld.toml (~/.config without
-// it), else /etc/voxeld/voxeld.toml, else none. `exists` says whether a file is there.
+// Returns: the file to read if none is named: $XDG_CONFIG_HOME/voxeld/voxeld.toml (~/.config if it
+// is unset), else /etc/voxeld/voxeld.toml, else nothing. `exists` reports whether a file exists.
 std::string FindConfigFile(const Environment& environment,
                            const std::function<bool(const std::string&)>& exists);
 
-// Defaults, then the file: `file` if one is named, else the one that is found.
-// Errors as of ReadConfigFile.
+// Returns: the defaults overridden by `file`, or by the file that FindConfigFile returns. Errors:
+// as for ReadConfigFile.
 absl::StatusOr<Config> LoadConfig(const std::optional<std::string>& file,
                                   const Environment& environment);
 
-// What the command line says goes over it. InvalidArgument is a usage error.
+// Overrides the configuration with the command line. Errors: InvalidArgument for a usage error.
 absl::Status ApplyCommandLine(const CommandLine& command_line, Config* config);
 
-// Where the local socket is, by what is in force; nothing: there is none. InvalidArgument for what
-// CheckLocalSocket refuses, and for an address of `listen`.
+// Returns: the address of the local socket, or nothing if it is off. Errors: InvalidArgument
+// for a value that CheckLocalSocket rejects, and for an address that `listen` contains.
 absl::StatusOr<std::optional<Address>> LocalSocketAddress(const ServerConfig& config);
 
-// What is in force for callers. InvalidArgument for scopes that there are not.
+// Returns: the access options in force. Errors: InvalidArgument for unknown scopes.
 absl::StatusOr<access::AccessOptions> AccessOf(const SecurityConfig& config);
 
-// InvalidArgument if an address is not to be had as it is: beyond this machine without TLS, or TLS
-// without its files.
+// Errors: InvalidArgument if other machines can reach an address without TLS, or if an address uses
+// TLS without its files.
 absl::Status CheckSecurity(const Config& config);
 
-// The same for one address, wherever it is from.
+// Checks one address from any source in the same way.
 absl::Status CheckReach(const Address& address, const SecurityConfig& security);
 
-// As a file that would read back the same.
+// Returns: TOML text that parses back to the same configuration.
 std::string ToToml(const Config& config);
 
 }  // namespace voxeld::daemon

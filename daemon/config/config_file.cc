@@ -1,4 +1,4 @@
-// The TOML file: read with line and column, printed back.
+// Reads the TOML file with line and column numbers, and prints it.
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
@@ -19,7 +19,7 @@
 namespace voxeld::daemon {
 namespace {
 
-// A value as it stands in the file, for messages.
+// Returns: a value as it appears in the file, for messages.
 std::string Show(const toml::node& node) {
   if (node.is_table()) return "a table";
   if (node.is_array()) return "an array";
@@ -278,7 +278,7 @@ class FileReader {
     return absl::StrCat(name_, ":", source.begin.line, ":", source.begin.column);
   }
 
-  // A line of printable text, whatever keys and values are.
+  // Adds a fault as one line of printable text, whatever keys and values contain.
   void Error(const toml::source_region& source, const std::string& text) {
     errors_.push_back(absl::StrCat(Where(source), ": ", EscapeControls(text)));
   }
@@ -291,7 +291,7 @@ class FileReader {
   const toml::table& root_;
   const std::string& name_;
   std::string section_;
-  const toml::table* table_ = nullptr;  // of the section; null if it is not there
+  const toml::table* table_ = nullptr;  // of the section; null if it does not exist
   std::vector<std::string> known_sections_, known_keys_;
   std::vector<std::string> errors_;
 };

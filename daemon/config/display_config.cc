@@ -15,7 +15,7 @@ constexpr size_t kNameBytes = 64;
 
 absl::string_view View(std::string_view text) { return {text.data(), text.size()}; }
 
-// For messages, which are one line of printable text.
+// Escapes `text` for messages, which are one line of printable text.
 std::string Shown(absl::string_view text) { return EscapeQuoted(text); }
 
 absl::Status Wrong(std::string_view text, const std::string& why) {

@@ -90,7 +90,7 @@ absl::StatusOr<DisplayOptions> SplitDisplayOptions(const DisplayConfig& display)
           absl::StrCat("driver is ", display.driver, ", but the profile ", named.mapped(),
                        " is for ", profile->driver, "; give that one, or another profile"));
     }
-    // What is given with the display comes before what the profile says.
+    // Options of the display take precedence over those of the profile.
     split.driver.insert(profile->options.begin(), profile->options.end());
   }
   if (const auto view = split.driver.extract("view")) {

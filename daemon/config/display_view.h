@@ -1,5 +1,5 @@
-// A display's options that are the daemon's own, not its driver's: how the scene is laid into it, which GPUs draw it, with
-// which others it goes in step, and how much power it may draw.
+// Parses the options of a display that belong to the daemon rather than to the driver: how the
+// scene is mapped to the display, which GPUs draw it, its genlock group, and its power limit.
 #pragma once
 
 #include <cstdint>
@@ -17,19 +17,19 @@ namespace voxeld::daemon {
 
 struct DisplayOptions {
   DisplaySetup setup;
-  std::vector<int> gpus;                      // empty: as the engine's configuration says
-  std::map<std::string, std::string> driver;  // what is left
+  std::vector<int> gpus;                      // empty: as in the engine's configuration
+  std::map<std::string, std::string> driver;  // the remaining options
 };
 
-// `profile` is the name or path of a profile (display/profiles/profile.h), whose options are added to those that are given. `view` is
-// fit, millimetres or voxels; with fit, `view_box` may be x0;y0;z0;x1;y1;z1 in scene
-// units. `gpus` is numbers of GPUs, apart by semicolons. `genlock` is the name of a group; `power_limit` and `power_full` are
-// watts. InvalidArgument with the value and what would
-// be right.
+// `profile` is the name or path of a profile (display/profiles/profile.h), which supplies defaults
+// for options that are not given. `view` is fit, millimetres or voxels. With fit, `view_box` may be
+// x0;y0;z0;x1;y1;z1 in scene units. `gpus` is a list of GPU indices separated by semicolons.
+// `genlock` is the name of a group. `power_limit` and `power_full` are in watts. Errors:
+// InvalidArgument with the value and the remedy.
 absl::StatusOr<DisplayOptions> SplitDisplayOptions(const DisplayConfig& display);
 
-// Whether such an engine can draw a display of so many slices on those GPUs, as far as can be said
-// without looking for them. InvalidArgument says why not.
+// Checks, without looking for the GPUs, whether such an engine can draw a display with this number
+// of slices on them. Errors: InvalidArgument with the reason.
 absl::Status CheckGpus(const std::vector<int>& gpus, gpu::EngineKind kind, int32_t slices);
 
 }  // namespace voxeld::daemon

@@ -1,5 +1,5 @@
-// Every field of the configuration, once: its section, its key, its range.
-// Reading and printing walk this list.
+// Lists every field of the configuration once, with its section, key and range. Reading and
+// printing visit this list.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 namespace voxeld::daemon {
 
 // `visitor` has
-//   Section(name)                         what follows belongs to it
+//   Section(name)                         the following fields belong to it
 //   Listen(key, addresses&)
 //   Http(key, optional<Address>&, asked&)
 //   LocalSocket(key, string&)
@@ -19,9 +19,9 @@ namespace voxeld::daemon {
 //   Integer(key, integer&, least, greatest)
 //   Real(key, double&, least, greatest)
 //   Flag(key, bool&)
-//   Text(key, string&)                    any
+//   Text(key, string&)                    any text
 //   Program(key, string&)                 a file, or unix: and an absolute path
-//   Scopes(key, string&, auto_too)        what access::ParseScopes takes, or "auto"
+//   Scopes(key, string&, auto_too)        as access::ParseScopes accepts it, or "auto"
 template <typename Visitor, typename ConfigType>
 void VisitFields(ConfigType& config, Visitor& visitor) {
   constexpr int64_t kMost = std::numeric_limits<int64_t>::max();
@@ -151,17 +151,17 @@ void VisitFields(ConfigType& config, Visitor& visitor) {
   visitor.Integer("max_assets", limits.max_assets, 1, 1 << 20);
 }
 
-// "auto", "cpu", "cuda".
+// Parses "auto", "cpu" or "cuda".
 absl::StatusOr<gpu::EngineKind> ParseEngineKind(std::string_view text);
 std::string EngineKindText(gpu::EngineKind kind);
 
-// An address, or "off".
+// Parses an address or "off".
 absl::StatusOr<std::optional<Address>> ParseHttp(std::string_view text);
 
-// "auto" if that is possible, or what access::ParseScopes takes.
+// Accepts what access::ParseScopes accepts, and "auto" if `auto_too` is set.
 absl::Status CheckScopes(std::string_view text, bool auto_too);
 
-// "auto", nothing, an absolute path, or that as unix:PATH.
+// Accepts "auto", an empty text, or an absolute path with or without "unix:".
 absl::Status CheckLocalSocket(std::string_view text);
 
 }  // namespace voxeld::daemon
