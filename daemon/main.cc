@@ -1,4 +1,4 @@
-// voxeld: wiring only.
+// Connects the parts of voxeld; has no logic of its own.
 #include <pthread.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -57,9 +57,10 @@ namespace voxeld::daemon {
 namespace {
 
 constexpr int kUsageError = 2;
-// With half a second for what plays a file together below the 5 s that we promise.
+// Together with half a second for the player this stays below the promised 5 s.
 constexpr sync::TimeNs kServerLimit = 2 * sync::kSecond;
-constexpr sync::TimeNs kStopLimit = 4500 * sync::kMillisecond;  // for the server and the core
+// For the server and the core together.
+constexpr sync::TimeNs kStopLimit = 4500 * sync::kMillisecond;
 constexpr sync::TimeNs kEndLimit = 5 * sync::kSecond;
 
 int Fail(int code, const absl::Status& status) {
@@ -107,13 +108,13 @@ absl::StatusOr<Displays> MakeDisplays(const Config& config, const display::Drive
   return displays;
 }
 
-// A display's own: one that names its GPUs asks for them.
+// Returns: the engine options of a display. A display that names its GPUs uses them.
 gpu::EngineOptions EngineOf(gpu::EngineOptions engine, const std::vector<int>& gpus) {
   if (gpus.empty()) return engine;
   engine.kind = gpu::EngineKind::kCuda;
   engine.device = gpus.front();
   engine.devices = gpus;
-  // Ranks end together, so they share their processes with nobody.
+  // Ranks terminate together, so they share their processes with no other display.
   if (gpus.size() > 1) engine.workers = nullptr;
   return engine;
 }
@@ -152,9 +153,10 @@ void LogDisplays(Core& core, Logger& log) {
   }
 }
 
-// The address that gives control is for people at a terminal alone: what is kept of the output must not give it.
+// Prints the address that grants control only to a terminal, so that saved output never contains
+// it.
 bool TellsControl(const Config& config) {
-  return config.log.format == "text" && isatty(STDOUT_FILENO) != 0;  // JSON is for programs
+  return config.log.format == "text" && isatty(STDOUT_FILENO) != 0;  // programs read JSON
 }
 
 // Returns: "--server ADDR " with the first address that is served, or nothing if voxelctl tries one of them by default.
@@ -199,7 +201,8 @@ void Welcome(Core& core, const http::Server* http, const viewer::Viewer& viewer,
   std::fflush(stdout);
 }
 
-// Sockets that whoever started the daemon has opened; those with the name "tls" speak it.
+// Adopts sockets that the process that started the daemon has opened. Those named "tls" are served
+// over TLS.
 absl::StatusOr<std::vector<listen::ListeningSocket>> AdoptSockets(const Config& config,
                                                                   Supervisor& supervisor) {
   std::vector<listen::ListeningSocket> sockets;
@@ -221,15 +224,16 @@ absl::StatusOr<std::vector<listen::ListeningSocket>> AdoptSockets(const Config& 
   return sockets;
 }
 
-// Tells the supervisor that the daemon lives: that its core answers, and that it can be reached.
+// Notifies the supervisor's watchdog if the core responds and the daemon is reachable.
 void FeedWatchdog(Core& core, const Supervisor& supervisor) {
   core.GetStats([&supervisor](const absl::StatusOr<Stats>& stats) {
     if (stats.ok() && stats->connections.unreachable.empty()) supervisor.Alive();
   });
 }
 
-// Returns: EngineOptions::cpu_index_bytes. Items and lists of tiles are counted only after they have been drawn, so the CPU engines of
-// all displays together get at most half of max_memory_bytes for both.
+// Returns: EngineOptions::cpu_index_bytes. Items and lists of tiles are counted only after they
+// have been drawn, so the CPU engines of all displays together get at most half of max_memory_bytes
+// for both.
 uint64_t CpuIndexBytes(uint64_t max_memory_bytes, size_t displays) {
   const uint64_t share = max_memory_bytes / 2 / std::max<size_t>(1, displays);
   return std::clamp(share / 5 * 4, uint64_t{1}, uint64_t{4} << 30);
@@ -237,7 +241,7 @@ uint64_t CpuIndexBytes(uint64_t max_memory_bytes, size_t displays) {
 
 int Serve(const Config& config, const CommandLine& command_line, Displays displays,
           const sigset_t& signals, sync::Clock& clock, Supervisor& supervisor, Logger& log) {
-  std::optional<EndLimit> end_limit;  // of all that is below, to its last destructor
+  std::optional<EndLimit> end_limit;  // covers everything below, up to the last destructor
   ProcessWatch process(clock, log);
   access::Ticker turns(clock, TimeWatch::kTurn, [&process] { process.LookAtTime(); });
   const absl::StatusOr<access::AccessOptions> access_options = AccessOf(config.security);
@@ -247,14 +251,14 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
       {.path = config.log.audit, .required = config.log.audit_required}, log);
   if (!opened.ok()) return Fail(1, opened.status());
   const std::unique_ptr<access::Security> security = *std::move(opened);
-  std::unique_ptr<state::KeptState> kept;  // none: nothing outlives the daemon
+  std::unique_ptr<state::KeptState> kept;  // null: no persistent state
   if (!config.state.dir.empty()) {
     absl::StatusOr<std::unique_ptr<state::KeptState>> state =
         state::KeptState::Open(config.state.dir, config.state.interval_ns, clock, log);
     if (!state.ok()) return Fail(1, state.status());
     kept = *std::move(state);
   }
-  std::unique_ptr<assets::AssetStore> assets;  // none: none are taken
+  std::unique_ptr<assets::AssetStore> assets;  // null: uploads are rejected
   if (config.limits.max_assets_bytes > 0) {
     assets = assets::AssetStore::Open(
         config.state.dir.empty() ? "" : absl::StrCat(config.state.dir, "/assets"),
@@ -264,7 +268,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
         clock, &log);
   }
   services::HealthWatch watch(log);
-  std::atomic<reload::Reloader*> reloads = nullptr;  // there is one once the core is
+  std::atomic<reload::Reloader*> reloads = nullptr;  // set after the core exists
   const auto counters = std::make_shared<listen::Counters>();
   Core core({.limits = config.limits,
              .version = Version(),
@@ -411,7 +415,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
                      {"local", local.has_value() ? local->listen.ToString() : "off"},
                      {"http", *http == nullptr ? "off" : (*http)->address().ToString()}});
 
-  // JSON is for programs, which may read both outputs as one.
+  // Programs read JSON and may read both outputs as one.
   if (config.log.format == "text") {
     Welcome(core, http->get(), **viewer, TellsControl(config), OptionForClients(addresses));
   }
@@ -434,7 +438,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
     if (signal != SIGHUP) continue;
     log.Info("asked to read its files again");
     supervisor.Reloading();
-    (void)reloader.Reload();  // it says in the log what came of it
+    (void)reloader.Reload();  // logs the result
     security->Reload();
     supervisor.Ready(displays_text);
     signal = 0;
@@ -456,7 +460,7 @@ int Serve(const Config& config, const CommandLine& command_line, Displays displa
   http->reset();
   if (!stopped.ok()) {
     log.Error("not all ended", {{"why", std::string(stopped.message())}});
-    // A display's thread still uses what the destructors would take away.
+    // A display's thread still uses objects that the destructors would free.
     _exit(1);
   }
   log.Info("stopped");
@@ -480,21 +484,21 @@ int Main(int argc, char** argv) {
   const absl::StatusOr<Logger::Format> format = Logger::ParseFormat(config->log.format);
   if (!level.ok() || !format.ok()) return Fail(1, level.ok() ? format.status() : level.status());
 
-  Supervisor supervisor =
-      Supervisor::OfProcess();  // before there are other descriptors and threads
+  // Take the sockets before other descriptors and threads exist.
+  Supervisor supervisor = Supervisor::OfProcess();
   RaiseDescriptorLimit();
   TuneProcess();
-  umask(0007);  // sockets are for the user and the group from the moment that they exist
+  umask(0007);  // the user and the group can use new sockets from the moment they exist
   std::signal(SIGPIPE, SIG_IGN);
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
   sigaddset(&signals, SIGHUP);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // before displays make threads: main alone waits
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // before displays start threads: only main waits
 
   sync::SystemClock clock;
-  std::unique_ptr<display::LibusbBus> usb;  // made for the first display that asks for it
+  std::unique_ptr<display::LibusbBus> usb;  // created for the first display that needs it
   const auto shared_usb = [&]() -> absl::StatusOr<display::UsbBus*> {
     if (usb == nullptr) {
       absl::StatusOr<std::unique_ptr<display::LibusbBus>> made = display::LibusbBus::Make(clock);

@@ -9,7 +9,8 @@
 
 namespace voxeld::daemon {
 
-// What can be written is taken for PIPE_BUF bytes: a pipe has a page then, a socket more.
+// Assumes that a writable descriptor accepts PIPE_BUF bytes: a pipe then has room for a page, a
+// socket for more.
 bool DescriptorSink::Write(const spdlog::details::log_msg& message) {
   spdlog::memory_buf_t text;
   formatter_->format(message, text);

@@ -1,4 +1,4 @@
-// Where log lines go that must hold nobody up: to a descriptor, as far as that takes them at once.
+// A log sink that never blocks: it writes to a descriptor only as much as that accepts at once.
 #pragma once
 
 #include <spdlog/sinks/base_sink.h>
@@ -10,11 +10,11 @@
 
 namespace voxeld::daemon {
 
-// Lines that a full pipe, a stopped terminal or a slow journal does not take are left out, counted,
-// and told of in a line of their own before the next one that is taken.
+// Lines that a full pipe, a stopped terminal or a slow journal does not accept are dropped and
+// counted. A separate line reports them before the next line that is written.
 class DescriptorSink final : public spdlog::sinks::base_sink<std::mutex> {
  public:
-  // `told(n)`: the text of a line that says that n lines were left out. `descriptor` outlives this.
+  // `told(n)` returns the text that reports n dropped lines. `descriptor` must outlive this object.
   DescriptorSink(int descriptor, std::function<std::string(uint64_t)> told)
       : descriptor_(descriptor), told_(std::move(told)) {}
 

@@ -48,7 +48,7 @@ std::string JsonText(std::string_view text) {
   return EscapeJson(Json(std::string(text)).dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
-// Bare where no reader could be misled.
+// Returns: the text, quoted unless it is unambiguous without quotes.
 std::string TextValue(std::string_view text) {
   const bool bare = !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) {
     return c > ' ' && c < 0x7F && c != '"' && c != '=' && c != '\\';

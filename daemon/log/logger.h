@@ -1,7 +1,7 @@
-// Structured logs on stderr: an event and its fields, as text or as a JSON object, one a line.
-// Whatever comes from clients and devices is escaped, so that a line is always one line. A reader
-// that does not read holds nobody up: lines are left out then, and a later one says how many. So they are
-// where one event comes more often than a limit.
+// Writes structured logs to stderr: an event and its fields, as text or as a JSON object, one per
+// line. Text from clients and devices is escaped, so that an entry is always one line. A reader
+// that does not read never blocks the daemon: lines are dropped then, and a later line reports
+// their number. Lines are also dropped when one event is logged more often than a limit.
 //
 //   text  2026-01-31T12:00:00.000+0000 info session opened session=3 client="a \"b\""
 //   json  {"time":"…","level":"info","event":"session opened","session":"3","client":"a \"b\""}
@@ -30,8 +30,8 @@ class sink;
 namespace voxeld::daemon {
 
 struct LogField {
-  std::string_view key;  // a word
-  std::string value;     // anything; bytes that are not UTF-8 are replaced or escaped
+  std::string_view key;  // one word
+  std::string value;     // any text; bytes that are not UTF-8 are replaced or escaped
 };
 
 // Thread-safe.
@@ -40,22 +40,22 @@ class Logger {
   enum class Level : uint8_t { kTrace, kDebug, kInfo, kWarn, kError, kOff };
   enum class Format : uint8_t { kText, kJson };
 
-  // To stderr, or another descriptor, which outlives the logger.
+  // Logs to `descriptor`, which must outlive the logger.
   Logger(Level level, Format format, int descriptor = 2);
-  // To `sink`, whose pattern is set.
+  // Logs to `sink` and sets its pattern.
   Logger(Level level, Format format, std::shared_ptr<spdlog::sinks::sink> sink);
   ~Logger();
   Logger(const Logger&) = delete;
   Logger& operator=(const Logger&) = delete;
 
-  // From now on at most so many lines a second of one event; the next one of it that is written has `lines_left_out`.
-  // 0: any number. `clock` outlives the logger. To be called before others log.
+  // Limits each event to this many lines per second; 0 means no limit. The first line after dropped
+  // ones has `lines_left_out`. `clock` must outlive the logger. Call this before other threads log.
   void LimitEach(uint32_t lines_per_second, sync::Clock& clock);
-  // Another number, if LimitEach gave a clock; another level.
+  // Changes the limit (if LimitEach has set a clock) or the level.
   void SetLinesPerSecond(uint32_t lines_per_second);
   void SetLevel(Level level);
 
-  // "trace" … "off", "text", "json"; InvalidArgument lists them.
+  // Parses "trace" … "off", or "text" and "json". Errors: InvalidArgument, which lists them.
   static absl::StatusOr<Level> ParseLevel(std::string_view text);
   static absl::StatusOr<Format> ParseFormat(std::string_view text);
 
@@ -72,7 +72,7 @@ class Logger {
     uint32_t lines = 0;
     uint64_t left_out = 0;
   };
-  // Events are the program's own words, so there are not many.
+  // The map of events stays small, because event names are constants of the program.
   bool TakeShare(std::string_view event, uint64_t* left_out) VOXELD_EXCLUDES(mutex_);
 
   const Format format_;

@@ -17,7 +17,8 @@ namespace {
 constexpr std::string_view kFieldsAtOnce[] = {"log.level", "log.max_lines_per_second"};
 constexpr std::string_view kAccess[] = {"security.grants", "security.anonymous_scopes",
                                         "security.certificate_scopes", "security.unix_scopes"};
-// Who can come at all: what those who come may do is not changed before it.
+// These keys decide who can connect. Changes of permissions are not applied before changes of
+// these.
 constexpr std::string_view kReach[] = {"server.listen", "security.tls_certificate",
                                        "security.tls_key", "security.tls_client_ca",
                                        "security.allow_plain_beyond_loopback"};
@@ -28,7 +29,7 @@ bool IsIn(const std::string_view (&list)[n], std::string_view key) {
   return std::find(std::begin(list), std::end(list), key) != std::end(list);
 }
 
-// The visitor of VisitFields that writes each field's value down.
+// A visitor of VisitFields that records each field's value.
 class Values {
  public:
   explicit Values(const Config& config) { VisitFields(config, *this); }

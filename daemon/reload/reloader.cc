@@ -14,7 +14,7 @@
 namespace voxeld::daemon::reload {
 namespace {
 
-// What `ask` is answered, waited for.
+// Calls `ask` and waits for its answer.
 template <typename T, typename Ask>
 absl::StatusOr<T> Answer(const Ask& ask) {
   const auto promise = std::make_shared<std::promise<absl::StatusOr<T>>>();
@@ -34,7 +34,7 @@ bool SameView(const ViewOptions& one, const ViewOptions& other) {
   return one.mode == other.mode && one.box == other.box;
 }
 
-// What the file changes of a display; nothing: it changes nothing of it.
+// Returns: the changes that the file makes to a display, or nothing if it makes none.
 absl::StatusOr<std::optional<DisplayUpdate>> UpdateOf(const DisplayConfig& in_force,
                                                       const DisplayConfig& wanted) {
   const absl::StatusOr<DisplayOptions> before = SplitDisplayOptions(in_force);
@@ -111,7 +111,7 @@ absl::StatusOr<Changes> Reloader::Take(const Config& wanted) {
   Config taken = Taken(in_force_, wanted);
   std::vector<NamedUpdate> undo;
   absl::Status status = TakeDisplays(taken, &undo);
-  // A file of grants that alone is new is its own reader's.
+  // If only the content of the grants file has changed, Access reloads it without this call.
   if (status.ok() && changes.access) status = parts_.access.Change(*options);
   if (!status.ok()) {
     for (NamedUpdate& before : undo) (void)Update(parts_.core, std::move(before));

@@ -1,10 +1,11 @@
-// Reads the daemon's configuration again while it runs. What is wrong in it changes nothing at all: the one in
-// force stays, and trouble() says why. What only a restart changes is told, and left as it is: of it, what takes opening a
-// device or a port to find out is not found out. The file is the one that was read at the start; that it has gone is wrong too.
+// Reloads the daemon's configuration while it runs. An invalid configuration changes nothing: the
+// current one stays in force and trouble() reports the reason. Changes that need a restart are
+// reported and not applied; faults in them that only opening a device or port would reveal are not
+// detected. The file is the one that was read at the start; it is an error if it no longer exists.
 //
-// Taken while running: log.level, log.max_lines_per_second, security.grants and the scopes beside it, and of a
-// display view, view_box and power_limit. A display's setting that the file does not change stays as clients
-// have set it.
+// Applied while running: log.level, log.max_lines_per_second, security.grants and the scopes beside
+// it, and view, view_box and power_limit of a display. A display's setting that the file does not
+// change keeps the value that clients have set.
 #pragma once
 
 #include <string>
@@ -24,33 +25,36 @@
 namespace voxeld::daemon::reload {
 
 struct NamedUpdate {
-  std::string name;  // a display's
+  std::string name;  // name of the display
   DisplayUpdate update;
 };
 
 class Reloader {
  public:
-  // Who is told of what changes; all outlive this.
+  // The objects that are changed. All must outlive the Reloader.
   struct Parts {
     access::Access& access;
     Core& core;
     Logger& log;
   };
 
-  // `in_force` is what the file, the command line over it, and `environment` said at the start.
+  // `in_force` is the configuration at the start, made from the file, the command line and
+  // `environment`.
   Reloader(Config in_force, CommandLine command_line, Environment environment, const Parts& parts);
 
-  // Waits for the core. One thread at a time. Answers what changed, or why nothing did: the message has every
-  // fault of the file, one a line. Both are in the log.
+  // Blocks until the core has answered. Call from one thread at a time. Returns: the changes.
+  // Errors: a message that lists every fault of the file, one per line. Both are logged.
   absl::StatusOr<Changes> Reload();
 
-  // Thread-safe. Why the last Reload changed nothing, in one line; empty: it did, or there was none.
+  // Thread-safe. Returns: in one line, why the last Reload failed; empty if it succeeded or there
+  // was none.
   std::string trouble() const;
 
  private:
   absl::StatusOr<Config> Read() const;
   absl::StatusOr<Changes> Take(const Config& wanted);
-  // Gives each display of `wanted`, which are those in force, its settings. `undo`: what takes that back.
+  // Applies the settings of the displays in `wanted`, which must be the current displays. `undo`:
+  // receives the updates that restore the previous settings.
   absl::Status TakeDisplays(const Config& wanted, std::vector<NamedUpdate>* undo);
 
   Config in_force_;
