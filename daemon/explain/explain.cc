@@ -32,7 +32,7 @@ gpu::Affine Inverse(const gpu::Affine& map) {
   return inverse;
 }
 
-// A white box around all of the display's voxels.
+// Returns: a white box around all voxels of the display.
 EntityPtr Everything(const gpu::Target& target) {
   const display::VoxelGrid& grid = target.geometry.grid;
   const float cells[3] = {float(grid.nx), float(grid.ny), float(grid.nz)};
@@ -52,7 +52,7 @@ EntityPtr Everything(const gpu::Target& target) {
   return entity;
 }
 
-// In the order in which layers are laid over each other.
+// Returns: the layers in the order in which they are composited.
 std::vector<std::pair<OwnedName, LayerPtr>> FromTheBottom(const Snapshot& scene) {
   std::vector<std::pair<OwnedName, LayerPtr>> layers;
   scene.layers.ForEach(
@@ -141,7 +141,7 @@ class Inquiry {
     return false;
   }
 
-  // A scene with all that is defined, and no layer.
+  // Returns: the scene with all definitions and no layers.
   Snapshot Empty() const {
     Snapshot scene = *scene_;
     scene.layers = {};
@@ -149,7 +149,7 @@ class Inquiry {
     return scene;
   }
 
-  // The layer with this entity alone, in the way of nothing.
+  // Returns: the layer with this entity only, without anything that hides it.
   Layer Bare(Cut cut) const {
     Layer layer = layer_;
     layer.entities = {};
@@ -180,7 +180,7 @@ class Inquiry {
     return scene;
   }
 
-  // White wherever the entity is, whatever its colour.
+  // Returns: a scene that is white wherever the entity is, regardless of its colour.
   Snapshot Covering() const {
     Layer own = Bare(Cut::kNone);
     own.visible = false;
@@ -217,7 +217,7 @@ class Inquiry {
     return scene;
   }
 
-  // How many voxels the entity changes of a scene that has it.
+  // Returns: the number of voxels that change if the entity is removed from `with`.
   absl::StatusOr<uint64_t> DifferenceIn(const Snapshot& with) const {
     if (absl::Status status = Draw(voxels_, with); !status.ok()) return status;
     const std::vector<std::byte> there = voxels_.pictures();
@@ -230,7 +230,7 @@ class Inquiry {
     return different;
   }
 
-  // Whether the display's pictures are others by it.
+  // Returns: whether the entity changes the display's slice images.
   absl::StatusOr<bool> IsInPictures(const Snapshot& with) const {
     auto display = Stage::Make(target_, cancelled_);
     if (!display.ok()) return display.status();
@@ -244,8 +244,9 @@ class Inquiry {
     return stage.Draw(std::make_shared<Snapshot>(scene));
   }
 
-  // The least `n` of 1 to `most` for which the entity makes no difference in `scene(n)`, where it makes none in
-  // scene(most); as covers are laid over it one by one, once covered it mostly stays so.
+  // Returns: the least `n` from 1 to `most` for which the entity changes nothing in `scene(n)`.
+  // Requires: it changes nothing in scene(most). The binary search assumes that an entity that is
+  // covered stays covered as further covers are added, which is mostly true.
   template <typename Scene>
   absl::StatusOr<size_t> FirstThatCovers(size_t most, const Scene& scene) const {
     size_t low = 1;
@@ -262,13 +263,14 @@ class Inquiry {
     return low;
   }
 
-  // Which layer, and if it is its own which entity, does it.
+  // Finds the layer that covers the entity, and the entity if that is its own layer.
   absl::Status FindCover(const Snapshot& whole, Explanation* e) const {
     const auto layers = FromTheBottom(whole);
     const auto own =
         std::find_if(layers.begin(), layers.end(), [&](const auto& l) { return l.first == key_; });
     const auto below = static_cast<size_t>(own - layers.begin());
-    // Its own layer alone, then all below too, then those above, one by one. Masks stay, unseen.
+    // Tries its own layer alone, then with all layers below, then adds those above one by one.
+    // Masks stay in the scene but invisible.
     const auto first_layers = [&](size_t n) {
       Snapshot scene = whole;
       for (size_t i = 0; i < layers.size(); ++i) {
@@ -284,7 +286,7 @@ class Inquiry {
     e->by_layer = layers[below + *layer - 1].first;
     if (*layer > 1) return absl::OkStatus();
 
-    // Those that may cover it, the lowest first.
+    // Collects the entities that may cover it, lowest first.
     std::vector<std::pair<std::string, EntityPtr>> others;
     layer_.entities.ForEach([&](const std::string& id, const EntityPtr& entity) {
       if (id != id_ && entity->data.priority >= entity_->data.priority)

@@ -1,7 +1,7 @@
-// Why an entity is, or is not, to be seen on a display.
+// Explains why an entity is visible or invisible on a display.
 //
-// Nothing is worked out by rules that could differ from what is shown: the scene is drawn by the CPU's
-// engine, whole and in part, and the voxels and pictures are compared.
+// The explanation cannot differ from what is shown: the CPU engine draws the scene, whole and in
+// part, and the voxels and slice images are compared.
 #pragma once
 
 #include <cstdint>
@@ -15,46 +15,49 @@
 
 namespace voxeld::daemon {
 
-// The first of these that holds, in this order; kSeen if none does.
+// The first of these that applies, in this order; kSeen if none does.
 enum class Visibility : uint8_t {
   kSeen,
-  kOutside,  // all of it lies outside the display's volume
-  kNothing,  // it covers no voxel, though it lies there: too small, no inverse, nothing solid in it
-  kBlack,    // it covers voxels, and lights none
-  kClipped,  // the layer's clip or region leaves none of what it lights
-  kMasked,   // the layer's mask leaves none
-  kOwnerHidden,  // by an operator
-  kLayerHidden,  // the layer is not visible
-  kTransparent,  // the layer's opacity lets nothing through
-  kCovered,      // others cover it, or look alike where it is
-  kNoLight,  // the volume has it, no pixel of the display does: by the geometry, or by tone and dither
-  kErases,  // it takes light away, and that is seen
+  kOutside,  // lies entirely outside the display's volume
+  // Covers no voxel although it lies inside: it is too small, its transform has no inverse, or it
+  // contains nothing solid.
+  kNothing,
+  kBlack,        // covers voxels but lights none
+  kClipped,      // the layer's clip or region removes everything it lights
+  kMasked,       // the layer's mask removes everything it lights
+  kOwnerHidden,  // hidden by an operator
+  kLayerHidden,  // the layer is invisible
+  kTransparent,  // the layer's opacity is 0
+  kCovered,      // others cover it, or look the same in its place
+  // Changes voxels but no pixel of the display, because of the geometry, or of tone and dither.
+  kNoLight,
+  kErases,  // removes light, visibly
 };
 
 struct Explanation {
   Visibility visibility = Visibility::kSeen;
-  // Around it, in the display's voxels (voxel i is [i, i+1)); thickness left out.
+  // Bounds in the display's voxels (voxel i is [i, i+1)), without thickness.
   Bounds voxels;
-  // Of the display's voxels: those it covers by itself, those of them that are not black, those that clip,
-  // region and mask leave; those of the whole scene that differ by its being there.
+  // Numbers of voxels of the display: covered by the entity alone; of these, not black; left by
+  // clip, region and mask; and changed by the entity in the whole scene.
   uint64_t covered = 0, lit = 0, left = 0, seen = 0;
-  // kCovered: a layer above its own that does it, or its own; and of the latter an entity, if one alone can be
-  // named.
+  // For kCovered: the layer that covers the entity. If it is the entity's own layer, `by_entity`
+  // names the covering entity, if a single one covers it.
   OwnedName by_layer;
   std::string by_entity;
 };
 
-// `scene`, drawn for `target`, as far as `layer`'s entity `id` is concerned. NotFound if there is none;
-// Cancelled if `cancelled` (may be empty) says so, which is asked between drawings; else an engine's error.
-// Draws the scene a few times, in the caller's thread, and holds the display's volume and pictures twice:
-// ResourceExhausted above kMostExplainedVoxels.
+// Explains entity `id` of `layer` in `scene`, drawn for `target`. Draws the scene several times in
+// the caller's thread, and holds the display's volume and slice images twice. `cancelled` may be
+// empty; it is called between drawings. Errors: NotFound if the entity does not exist; Cancelled if
+// `cancelled` returns true; ResourceExhausted above kMostExplainedVoxels; else the engine's error.
 absl::StatusOr<Explanation> Explain(const SnapshotPtr& scene, const OwnedName& layer,
                                     const std::string& id, const gpu::Target& target,
                                     const std::function<bool()>& cancelled = nullptr);
 
 inline constexpr uint64_t kMostExplainedVoxels = uint64_t{1} << 28;
 
-// "it is black", for people; the layers' names are escaped.
+// Returns: a sentence for people, such as "it is black". Layer names are escaped.
 std::string Describe(const Explanation& explanation);
 
 }  // namespace voxeld::daemon

@@ -1,4 +1,4 @@
-// A thread for explanations, one after another: they take long, and may wait.
+// Runs explanations one after another on a separate thread, because they take long.
 #pragma once
 
 #include <atomic>
@@ -9,10 +9,10 @@
 
 namespace voxeld::daemon {
 
-// Thread-safe. Its destructor drops what has not begun, and waits for what has.
+// Thread-safe. The destructor drops queued work and waits for running work.
 class ExplainerThread {
  public:
-  // `stopping` says that it should end early.
+  // `stopping` becomes true when the work should stop early.
   using Work = std::function<void(const std::atomic<bool>& stopping)>;
 
   explicit ExplainerThread(size_t most_waiting) : most_waiting_(most_waiting) {}
@@ -20,14 +20,14 @@ class ExplainerThread {
   ExplainerThread(const ExplainerThread&) = delete;
   ExplainerThread& operator=(const ExplainerThread&) = delete;
 
-  // False if as many are waiting already.
+  // Returns: false if `most_waiting` explanations are already waiting.
   bool Post(Work work);
 
  private:
   const size_t most_waiting_;
   std::atomic<size_t> waiting_ = 0;
   std::atomic<bool> stopping_ = false;
-  gpu::CallQueue queue_{/*run_inline=*/false};  // the first to end
+  gpu::CallQueue queue_{/*run_inline=*/false};  // destroyed first
 };
 
 }  // namespace voxeld::daemon

@@ -5,7 +5,7 @@
 namespace voxeld::daemon {
 namespace {
 
-// Of a call that is carried out before it returns.
+// The result of a call that completes before it returns.
 class Answered {
  public:
   gpu::Engine::Done done() {

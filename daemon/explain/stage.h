@@ -1,4 +1,4 @@
-// Scenes that differ a little, drawn one after another for one display.
+// Draws scenes that differ a little, one after another, for one display.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,9 @@
 
 namespace voxeld::daemon {
 
-// Whose pictures are the voxels of `target`'s grid themselves, three bytes each (red, green, blue), x fastest, then y,
-// then z: also of those that none of its own pixels looks at.
+// Returns: a target whose slice images are the voxels of `target`'s grid, three bytes each (red,
+// green, blue), x fastest, then y, then z. They include voxels that none of the display's pixels
+// shows.
 gpu::Target VoxelsOf(const gpu::Target& target);
 
 // Single-threaded.
@@ -25,10 +26,10 @@ class Stage {
   static absl::StatusOr<std::unique_ptr<Stage>> Make(const gpu::Target& target,
                                                      std::function<bool()> cancelled);
 
-  // Draws `scene`, whose `uses` must be empty. Cancelled, or an engine's error.
+  // Draws `scene`. Requires: its `uses` is empty. Errors: Cancelled, or the engine's error.
   absl::Status Draw(SnapshotPtr scene);
 
-  // Of what was drawn last, as they go to the display.
+  // Returns: the slice images of the last drawing, as they are sent to the display.
   const std::vector<std::byte>& pictures() const { return pictures_; }
 
  private:

@@ -211,7 +211,7 @@ absl::StatusOr<display::Correction> CorrectionFromWire(const v1::Correction& in)
   return out;
 }
 
-// Looks at sizes before it takes memory: a short message may name many pixels without a light.
+// Checks sizes before it allocates memory, because a short message may announce many unlit pixels.
 absl::StatusOr<display::Lattice> ShapeFromWire(const v1::Lattice& in) {
   const int64_t pixels = int64_t{in.slices()} * in.width_px();
   if (in.width_px() < 1 || in.slices() < 1 || pixels > display::kMaxLatticePixels) {

@@ -1,5 +1,6 @@
-// A display's geometry as words of the wire, and back: alike at both ends. The way back looks at sizes before it takes memory;
-// whether the geometry can be is ValidateGeometry's.
+// Converts a display's geometry to the protocol and back, for both server and clients. FromWire
+// checks sizes before it allocates memory. ValidateGeometry checks whether the geometry is
+// possible.
 #pragma once
 
 #include "absl/status/statusor.h"
@@ -13,7 +14,7 @@ void ToWire(const display::Vec3& in, v1::Vec3* out);
 void ToWire(const display::Geometry& in, v1::Geometry* out);
 
 display::Vec3 FromWire(const v1::Vec3& in);
-// InvalidArgument names the field, its value and what would be right.
+// Errors: InvalidArgument with the field, its value and the remedy.
 absl::StatusOr<display::Geometry> FromWire(const v1::Geometry& in);
 
 }  // namespace voxeld::daemon::wire

@@ -48,7 +48,7 @@ absl::Status PictureFile::ReadPng(std::vector<uint8_t>& rgb) const {
     return Broken("PNG", image.message);
   }
   image.format = PNG_FORMAT_RGB;
-  image.flags |= PNG_IMAGE_FLAG_16BIT_sRGB;  // where the file does not say
+  image.flags |= PNG_IMAGE_FLAG_16BIT_sRGB;  // if the file does not specify it
   const png_color black = {0, 0, 0};
   if (png_image_finish_read(&image, &black, rgb.data(), 0, nullptr) == 0) {
     return Broken("PNG", image.message);
@@ -72,7 +72,8 @@ absl::StatusOr<PictureFile> PictureFile::OpenJpeg(absl::string_view bytes) {
 absl::Status PictureFile::ReadJpeg(std::vector<uint8_t>& rgb) const {
   const tjhandle reader = tjInitDecompress();
   const absl::Cleanup destroy = [&] { tjDestroy(reader); };
-  // One way to compute it, so that a file is the same picture on every processor; and no file of a thousand scans.
+  // Decode in a single way, so that a file gives the same picture on every processor, and reject
+  // files with too many scans.
   constexpr int kFlags = TJFLAG_ACCURATEDCT | TJFLAG_STOPONWARNING | TJFLAG_LIMITSCANS;
   if (tjDecompress2(reader, Bytes(bytes_), bytes_.size(), rgb.data(), static_cast<int>(size_.width),
                     0, static_cast<int>(size_.height), TJPF_RGB, kFlags) != 0) {

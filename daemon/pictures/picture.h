@@ -1,4 +1,4 @@
-// Pictures: PNG and JPEG files.
+// Reads PNG and JPEG files.
 #pragma once
 
 #include <cstdint>
@@ -14,18 +14,20 @@ struct Size {
   uint32_t width = 0, height = 0;  // at least 1
 };
 
-// A picture that has not been read yet.
+// A picture whose pixels have not been read yet.
 class PictureFile {
  public:
-  // Reads the head of a file; which of the two it is its first bytes tell. The bytes must live as long.
-  // InvalidArgument: it is neither, or its head is broken; the message begins with a verb.
+  // Reads the header of a file and detects its format from the first bytes. `bytes` must outlive
+  // this object. Errors: InvalidArgument if it is neither format or its header is broken; the
+  // message begins with a verb.
   static absl::StatusOr<PictureFile> Open(absl::string_view bytes);
 
   Size size() const { return size_; }
 
-  // Row by row from the upper left corner, 0x00RRGGBB, 8 bits a channel, as sRGB; grey as three alike.
-  // What is not opaque is laid over black. Takes 4 bytes a pixel, and while it reads as much again.
-  // InvalidArgument: the file is broken, or ends too soon; the message begins with a verb.
+  // Returns: the pixels row by row from the upper left corner, 0x00RRGGBB, 8 bits per channel,
+  // sRGB; grey as three equal channels. Transparent pixels are blended over black. Takes 4 bytes
+  // per pixel, and the same again while reading. Errors: InvalidArgument if the file is broken or
+  // truncated; the message begins with a verb.
   absl::StatusOr<std::vector<uint32_t>> Read() const;
 
  private:
