@@ -71,7 +71,8 @@ class TakenBody final : public BodySession, public std::enable_shared_from_this<
   }
 
  private:
-  // Something has to come, and on the whole enough.
+  // The next piece must arrive within the idle limit, and the whole body at the minimum average
+  // rate.
   steady_clock::time_point Deadline() const {
     const std::chrono::nanoseconds idle(options_.idle_limit_ns);
     const std::chrono::seconds whole(received_ / std::max<uint64_t>(1, options_.body_bytes_per_s));
@@ -128,13 +129,14 @@ class TakenBody final : public BodySession, public std::enable_shared_from_this<
     });
   }
 
-  // From now on the receiver is to say something, and nothing is read meanwhile. Its number.
+  // Starts waiting for the receiver's answer; reading is suspended meanwhile. Returns: the number
+  // of this wait.
   uint64_t Await() {
     stream_.expires_never();
     const uint64_t number = ++awaited_;
     timer_.expires_after(std::chrono::nanoseconds(options_.answer_limit_ns));
     timer_.async_wait([self = shared_from_this(), number](error_code error) {
-      // It may have been on its way when it was cancelled.
+      // The handler may already have been queued when the timer was cancelled.
       if (error || !self->Awaits(number)) return;
       self->Answer(PlainResponse(503, "the daemon did not answer in time"));
     });
@@ -149,7 +151,7 @@ class TakenBody final : public BodySession, public std::enable_shared_from_this<
         413, absl::StrCat("the body is too large: ", max_bytes_, " bytes are taken at the most")));
   }
 
-  // The first one counts.
+  // Sends the response. Only the first one counts.
   void Answer(Response answer) {
     if (!closed_ || response_.has_value()) return;
     timer_.cancel();
@@ -165,7 +167,8 @@ class TakenBody final : public BodySession, public std::enable_shared_from_this<
              });
   }
 
-  // Closing while something comes in would have the other end's system throw the answer away.
+  // Keeps reading after the response. If the connection were closed while data arrives, the
+  // client's system would discard the response.
   void Linger() {
     if (!closed_) return;
     stream_.async_read_some(asio::buffer(piece_),
@@ -181,11 +184,11 @@ class TakenBody final : public BodySession, public std::enable_shared_from_this<
   const ServerOptions& options_;
   beast::flat_buffer buffer_;
   const std::unique_ptr<BodyParser> parser_;
-  std::unique_ptr<BodyReceiver> receiver_;  // none once it is answered
+  std::unique_ptr<BodyReceiver> receiver_;  // null after the response
   const uint64_t max_bytes_;
   const steady_clock::time_point began_;
   uint64_t received_ = 0;
-  uint64_t awaited_ = 0;  // the number of what the receiver is to say next
+  uint64_t awaited_ = 0;  // number of the wait for the receiver
   std::array<char, kPieceBytes> piece_;
   std::optional<ResponseMessage> response_;
   std::function<void(BodySession*)> closed_;  // empty once closed

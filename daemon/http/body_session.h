@@ -1,5 +1,6 @@
-// A connection whose request brings a body that somebody takes, from behind the header on: one piece after another, each
-// when the last has been taken, so that no more than a piece is held; then the answer, and the end.
+// Handles a request with a body from the end of its header on. Each piece of the body is read when
+// the receiver has taken the previous one, so that only one piece is held in memory. Then the
+// response is sent and the connection closed.
 #pragma once
 
 #include <boost/beast/core/flat_buffer.hpp>
@@ -18,12 +19,13 @@ using BodyParser = boost::beast::http::request_parser<boost::beast::http::buffer
 class BodySession {
  public:
   virtual ~BodySession() = default;
-  virtual void Close() = 0;  // at once
+  virtual void Close() = 0;  // immediately
 };
 
-// On the server's thread. `parser` has read the header, and `buffer` what came with it. What of `reception` refuses is answered
-// before anything is read; whoever still sends then is listened to for a while, so that the answer is not lost. `closed`, once.
-// `options` outlive the session, which keeps itself alive while it is open.
+// Call on the server's thread. `parser` has read the header, and `buffer` holds data that arrived
+// with it. If `reception` has a refusal, that response is sent before anything is read; further
+// data is then read and discarded for a while, so that the response is not lost. `closed` is called
+// once. `options` must outlive the session, which keeps itself alive while it is open.
 std::shared_ptr<BodySession> StartBody(std::shared_ptr<boost::asio::io_context> io,
                                        ConnectionStream stream, boost::beast::flat_buffer buffer,
                                        std::unique_ptr<BodyParser> parser, Reception reception,

@@ -1,4 +1,4 @@
-// What a connection of the http port is made of, for the files that speak on it. TCP or a unix socket.
+// Types that the files of the HTTP port share for a connection over TCP or a unix socket.
 #pragma once
 
 #include <boost/asio/generic/stream_protocol.hpp>
@@ -16,8 +16,9 @@ using ConnectionStream =
     boost::beast::basic_stream<Protocol, boost::asio::io_context::executor_type>;
 using RequestMessage = boost::beast::http::request<boost::beast::http::string_body>;
 
-// Writes `head` and then `body`, and calls `done` with what came of it. Both must live until then. Every write of a connection goes
-// through here, since each completion handler that asio composes anew costs seconds of compiling.
+// Writes `head`, then `body`, and calls `done` with the result. Both must stay valid until then.
+// Every write of a connection uses this function, because each further combination of asio
+// completion handlers adds seconds of compile time.
 void WriteAll(ConnectionStream& stream, std::string_view head, std::string_view body,
               std::function<void(boost::system::error_code)> done);
 

@@ -46,7 +46,7 @@ using boost::system::error_code;
 
 constexpr auto kAcceptRetry = std::chrono::milliseconds(100);
 constexpr auto kAcceptSoon = std::chrono::milliseconds(20);
-constexpr uint64_t kGreatestBody = 4096;  // read and thrown away
+constexpr uint64_t kGreatestBody = 4096;  // read and discarded
 constexpr mode_t kSocketMode = 0660;
 
 Response Plain(unsigned status, std::string text) { return PlainResponse(status, std::move(text)); }
@@ -64,7 +64,7 @@ std::string AddressOf(const Stream::socket_type& socket) {
   return listen::PeerOf(address, static_cast<socklen_t>(endpoint.size())).address;
 }
 
-// Who answers, and who takes over what a connection here does not serve itself.
+// The handlers, and the owners of connections that Connection itself does not serve.
 class Connection;
 
 struct Served {
@@ -96,19 +96,19 @@ class Connection : public std::enable_shared_from_this<Connection> {
     since_ = std::chrono::steady_clock::now();
     parser_ = std::make_unique<Parser>();
     parser_->header_limit(options_.max_header_bytes);
-    parser_->body_limit(std::numeric_limits<uint64_t>::max());  // until it is known whose it is
+    parser_->body_limit(std::numeric_limits<uint64_t>::max());  // until the receiver is known
     stream_.expires_after(std::chrono::nanoseconds(options_.idle_limit_ns));
     wire::async_read_header(
         stream_, buffer_, *parser_,
         [self = shared_from_this()](error_code error, size_t) { self->OnHeader(error); });
   }
 
-  // Whether it waits for a request, and since when.
+  // Whether the connection waits for a request; since() is when it began to.
   bool waits() const { return waits_; }
   std::chrono::steady_clock::time_point since() const { return since_; }
   // The address of its client without the port (listen::Peer::address); empty for a unix socket.
   const std::string& address() const { return address_; }
-  // Whether it has a place.
+  // Whether the connection has a place.
   bool placed() const { return placed_; }
   void Place() { placed_ = true; }
 
@@ -121,7 +121,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
   }
 
  private:
-  // Takes a place for the request that has come. Returns: false if there was none, and the request has been answered with 503.
+  // Takes a place for the request that has arrived. Returns: false if there was none, and the
+  // request has been answered with 503.
   bool Admitted() {
     waits_ = false;
     std::optional<std::string> why = served_.refused(*this, Asked().path);
@@ -159,7 +160,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
       return;
     }
     waits_ = false;
-    // What is no HTTP gets an answer too; what is no request any more does not.
+    // Input that is not HTTP gets an error response; an incomplete request does not.
     if (error == wire::error::header_limit)
       return Write(Plain(431, "the header is too large"), true);
     if (error == wire::error::body_limit) return Write(Plain(413, "the body is too large"), true);
@@ -200,7 +201,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
       return Write(Plain(code, std::string(serve.status().message())), true);
     }
     const uint64_t number = ++number_;
-    // The answer may come when the connection, or the whole server, is gone.
+    // The answer may arrive after the connection or the server has been destroyed.
     const bool known =
         served_.handler(asked, [weak = weak_from_this(), number, close](Response answer) {
           const std::shared_ptr<Connection> open = weak.lock();
@@ -231,7 +232,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
     if (auto closed = std::exchange(closed_, nullptr)) closed(this);
   }
 
-  // The first answer to request `number` counts.
+  // Only the first answer to request `number` counts.
   void OnAnswer(uint64_t number, Response answer, bool close) {
     if (number != number_ || !closed_) return;
     ++number_;
@@ -281,7 +282,7 @@ absl::StatusOr<Protocol::endpoint> Endpoint(const Address& address, asio::io_con
 
 }  // namespace
 
-// Everything but Start and the destructor runs on the one thread.
+// Everything except Start and the destructor runs on the server's thread.
 class Server::Impl {
  public:
   Impl(ServerOptions options, Handler handler, Upgrade upgrade, Receive receive)
@@ -390,7 +391,7 @@ class Server::Impl {
                              [](const auto& connection) { return connection->placed(); }));
   }
 
-  // Returns: how many places the clients at `address` have that are not `asking`.
+  // Returns: the number of places that the clients at `address` have, without `asking`.
   size_t PlacedFor(const std::string& address, const Connection& asking) const {
     const auto is_there = [&](const auto& session) { return session.second == address; };
     return static_cast<size_t>(
@@ -402,10 +403,11 @@ class Server::Impl {
         }));
   }
 
-  // The most WebSockets. The other places are for those that come and go.
+  // Returns: the maximum number of WebSockets. The other places are left for short requests.
   size_t MostSockets() const { return (size_t{options_.max_connections} * 3 + 3) / 4; }
 
-  // The most places that the clients at one address may have: half of the places that WebSockets leave are for other addresses.
+  // Returns: the maximum number of places for the clients at one address. Half of the places that
+  // WebSockets leave are reserved for other addresses.
   size_t Share() const {
     return MostSockets() + (options_.max_connections - MostSockets() + 1) / 2;
   }
@@ -436,9 +438,10 @@ class Server::Impl {
     return std::nullopt;
   }
 
-  // Closes the connection that has waited for a request longest, of the address that has most that wait. `placed`: among those with a
-  // place, or else among those without one that have had kFirstRequest. `address`: among those of this address only; null: of any.
-  // Returns: whether there was one.
+  // Closes the connection that has waited longest for a request, at the address with most waiting
+  // connections. `placed`: considers connections with a place, else those without one after
+  // kFirstRequest. `address`: considers this address only; null: all. Returns: whether a connection
+  // was closed.
   bool CloseLongestIdle(bool placed, const std::string* address = nullptr) {
     const auto before =
         std::chrono::steady_clock::now() - std::chrono::nanoseconds(placed ? 0 : kFirstRequest);
@@ -471,7 +474,7 @@ class Server::Impl {
     };
   }
 
-  // Out of descriptors, say: what is open may close.
+  // Retries later, because closing connections may free what is missing (descriptors, for example).
   void AcceptLater(const error_code& why) {
     if (!std::exchange(accept_failed_, true) && options_.accept_failed) {
       options_.accept_failed(why.message());
@@ -524,7 +527,7 @@ class Server::Impl {
   Acceptor acceptor_;
   asio::steady_timer retry_;
   std::set<std::shared_ptr<Connection>> connections_;
-  // With the addresses of their clients.
+  // The sessions, with the addresses of their clients.
   std::map<std::shared_ptr<WebSocketSession>, std::string> sockets_;
   std::map<std::shared_ptr<BodySession>, std::string> bodies_;
   bool accepting_ = false, accept_failed_ = false, stopping_ = false;

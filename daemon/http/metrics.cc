@@ -26,7 +26,7 @@ struct Row {
   const char* help;
 };
 
-// Each figure is listed here, once.
+// Lists each metric once.
 constexpr Row<Stats> kDaemonRows[] = {
     {"voxeld_sessions", &Stats::sessions, MetricType::Gauge, "Open sessions"},
     {"voxeld_owners", &Stats::owners, MetricType::Gauge, "Owners of layers or sessions"},
@@ -285,7 +285,7 @@ class Families {
 };
 
 void AddLatency(MetricFamily* family, const Labels& labels, const LatencyStats& latency) {
-  // Gauges: of what was just now. A summary's numbers are of all since the start.
+  // Gauges for recent values. The numbers of a summary cover the time since the start.
   for (const auto& [stat, ns] :
        {std::pair("p50", latency.p50_ns), {"p99", latency.p99_ns}, {"max", latency.max_ns}}) {
     Labels all = labels;

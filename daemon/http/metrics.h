@@ -1,4 +1,4 @@
-// The figures as Prometheus text.
+// Formats the statistics as Prometheus text.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@ namespace voxeld::daemon::http {
 
 inline constexpr const char* kMetricsContentType = "text/plain; version=0.0.4; charset=utf-8";
 
-// Names begin with voxeld_; times are in seconds. Label values are escaped by the serializer.
+// Names begin with voxeld_ and times are in seconds. The serializer escapes label values.
 std::string MetricsText(const Stats& stats);
 
 }  // namespace voxeld::daemon::http

@@ -24,7 +24,7 @@ Response HealthResponse(const std::vector<DisplayDescription>& displays, const S
   bool held = false;
   if (phase == Phase::kStarting) reasons.push_back({{"what", "starting"}});
   if (phase == Phase::kEnding) {
-    // That displays stop then is no trouble of theirs.
+    // Displays stop during a shutdown, so they are not reported as faulty.
     return {503, "application/json",
             "{\"status\":\"failing\",\"reasons\":[{\"what\":\"shutting down\"}]}\n"};
   }
@@ -68,7 +68,7 @@ Response HealthResponse(const std::vector<DisplayDescription>& displays, const S
     reasons.push_back({{"what", "time"}, {"why", stats.process.time_trouble}});
   }
   for (const DisplayFigures& figures : stats.displays) {
-    const bool lost = figures.state == display::DisplayState::kLost;  // which is told above
+    const bool lost = figures.state == display::DisplayState::kLost;  // already reported above
     if (!figures.device_trouble.empty() && !lost) {
       reasons.push_back(
           {{"display", figures.name}, {"what", "device"}, {"why", figures.device_trouble}});

@@ -1,4 +1,4 @@
-// What the http port answers: /healthz and /metrics.
+// Serves /healthz and /metrics on the HTTP port.
 #pragma once
 
 #include <atomic>
@@ -11,18 +11,19 @@
 
 namespace voxeld::daemon::http {
 
-// Whether clients can connect: before, the http port is there already.
+// Whether clients can connect. The HTTP port opens earlier.
 enum class Phase : uint8_t { kStarting /* and so when it is made */, kServing, kEnding };
 
-// 200 while every display is there and is drawn for and the daemon serves, else 503:
-// {"status":"failing","reasons":[{"display":"sim","what":"lost","why":"…"}]}. A display that is
-// being looked for for the first time fails nothing. An engine that is not as was asked for, while
-// the CPU draws in its place, and what went wrong within the last minute, is 200 and "degraded"; 503 and "degraded" while it has not drawn yet
-// and the last volume is held.
+// Returns: 200 while the daemon serves and every display is connected and drawn, else 503 with
+// {"status":"failing","reasons":[{"display":"sim","what":"lost","why":"…"}]}. A display that
+// is being searched for the first time is not a failure. The response is 200 and "degraded" if the
+// CPU draws in place of the requested engine, or after an error within the last minute. It is 503
+// and "degraded" while the CPU has not drawn yet and the last volume is held.
 Response HealthResponse(const std::vector<DisplayDescription>& displays, const Stats& stats,
                         Phase phase);
 
-// The handler for Server. `core` outlives every call of it; `phase` is looked at with each.
+// Returns: the handler for Server. `core` must outlive every call of it; `phase` is read on each
+// call.
 Handler MonitorHandler(Core& core, std::shared_ptr<const std::atomic<Phase>> phase);
 
 }  // namespace voxeld::daemon::http

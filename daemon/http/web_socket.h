@@ -1,4 +1,4 @@
-// A WebSocket (RFC 6455) of the http port, from its upgrade on. Not compressed.
+// A WebSocket (RFC 6455) of the HTTP port after its upgrade, without compression.
 #pragma once
 
 #include <cstdint>
@@ -8,24 +8,29 @@
 
 namespace voxeld::daemon::http {
 
-// The server's end, for whoever serves it. Thread-safe; keeps nothing alive but itself.
+// The server's end of a WebSocket, used by the service. Thread-safe; keeps only itself alive.
 class WebSocketPeer {
  public:
   virtual ~WebSocketPeer() = default;
-  // In the order of the calls. Dropped once it is closed. While more than a megabyte waits nothing is read: serve by
-  // what the other end asks for, a bounded number of answers for each message.
+  // Sends messages in the order of the calls; drops them once the socket is closed. Reading is
+  // suspended while more than a megabyte is queued, so a service should send only in response to
+  // messages, and a bounded number for each.
   virtual void Send(std::string message, bool binary) = 0;
-  // Calls `what` on the server's thread, unless it is closed by then: for answers that come elsewhere.
+  // Calls `what` on the server's thread unless the socket is closed by then. Use it for results
+  // from other threads.
   virtual void Post(std::function<void()> what) = 0;
-  // After what was sent before; `why` is told to the other end, 123 bytes at most.
+  // Closes the socket after the messages sent so far. `why` is sent to the client, at most 123
+  // bytes.
   virtual void Close(std::string why) = 0;
 };
 
-// What serves it: on the server's thread, one call after another, until OnClosed or the server's end. Must not block.
+// Serves a WebSocket: called on the server's thread, one call after another, until OnClosed or the
+// end of the server. Must not block.
 class WebSocketService {
  public:
   virtual ~WebSocketService() = default;
-  // Whole messages of text, UTF-8 and at most kGreatestMessage bytes; others end the connection.
+  // Receives a complete text message: UTF-8, at most kGreatestMessage bytes. Other messages close
+  // the connection.
   virtual void OnText(std::string message) = 0;
 };
 

@@ -19,9 +19,10 @@ namespace websocket = boost::beast::websocket;
 using boost::system::error_code;
 
 constexpr auto kHandshakeLimit = std::chrono::seconds(10);
-constexpr auto kSilenceLimit = std::chrono::seconds(60);  // half of it: a ping
+constexpr auto kSilenceLimit = std::chrono::seconds(60);  // a ping is sent after half of it
 constexpr size_t kMostReason = 123;
-// Waiting to be sent; beyond, nothing more is read that could ask for more.
+// Limits on the send queue. Beyond them reading is suspended, because further messages could ask
+// for more.
 constexpr size_t kMostWaitingBytes = 1 << 20, kMostWaiting = 64;
 
 class Session final : public WebSocketSession, public std::enable_shared_from_this<Session> {
@@ -111,7 +112,7 @@ class Session final : public WebSocketSession, public std::enable_shared_from_th
     socket_.binary(next.binary);
     write_timer_.expires_after(message_limit_);
     write_timer_.async_wait([self = shared_from_this()](error_code error) {
-      if (!error) self->Close();  // who does not read
+      if (!error) self->Close();  // the client does not read
     });
     socket_.async_write(asio::buffer(next.bytes),
                         [self = shared_from_this()](error_code error, size_t) {
@@ -160,10 +161,10 @@ class Session final : public WebSocketSession, public std::enable_shared_from_th
   std::function<void(WebSocketSession*)> closed_;  // empty once closed
   std::unique_ptr<WebSocketService> service_;
   beast::flat_buffer buffer_;
-  std::deque<Outgoing> waiting_;  // the first is being written
+  std::deque<Outgoing> waiting_;  // the first one is being written
   size_t waiting_bytes_ = 0;
   bool accepted_ = false, writing_ = false;
-  bool held_ = false;  // too much waits: nothing is read
+  bool held_ = false;  // reading is suspended because the send queue is full
 };
 
 }  // namespace

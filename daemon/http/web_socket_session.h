@@ -1,4 +1,5 @@
-// A WebSocket's connection: reads whole messages, writes one after another, asks the other end for a sign of life.
+// A WebSocket's connection: reads whole messages, writes one message at a time, and pings the
+// client.
 #pragma once
 
 #include <chrono>
@@ -14,12 +15,12 @@ namespace voxeld::daemon::http {
 class WebSocketSession {
  public:
   virtual ~WebSocketSession() = default;
-  virtual void Close() = 0;  // at once
+  virtual void Close() = 0;  // immediately
 };
 
-// On the server's thread. Answers `request`, an upgrade, and serves until either end closes, or a message has not been read
-// within `message_limit`; then `closed`, once.
-// The session keeps itself alive while it is open.
+// Call on the server's thread. Answers `request`, an upgrade, and serves until either end closes or
+// the client has not read a message within `message_limit`; then calls `closed` once. The session
+// keeps itself alive while it is open.
 std::shared_ptr<WebSocketSession> StartWebSocket(
     std::shared_ptr<boost::asio::io_context> io, ConnectionStream stream,
     const RequestMessage& request, std::chrono::nanoseconds message_limit,
