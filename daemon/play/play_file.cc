@@ -26,8 +26,9 @@ Descriptor OpenFolder(int at, const char* path) {
   return Descriptor(openat(at, path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
 }
 
-// 0, or an error's number; ENOENT, EWOULDBLOCK: RemoveLeft of another daemon has taken it for one that was left. Where the file
-// system has no locks, that does nothing, and neither does this.
+// Locks the folder. Returns: 0 or an errno. ENOENT and EWOULDBLOCK mean that RemoveLeft of another
+// daemon is removing it as abandoned. On file systems without locks, RemoveLeft removes nothing and
+// this locks nothing.
 int Lock(const std::string& path, Descriptor& folder) {
   folder = OpenFolder(AT_FDCWD, path.c_str());
   if (!folder.ok()) return errno;
@@ -37,7 +38,8 @@ int Lock(const std::string& path, Descriptor& folder) {
   return open.st_dev == named.st_dev && open.st_ino == named.st_ino ? 0 : ENOENT;
 }
 
-// With what is in it, but for folders: then it stays.
+// Removes the folder and the files in it. A folder that contains folders stays. Returns: whether it
+// was removed.
 bool RemoveFolder(int at, const char* name, const Descriptor& folder) {
   const int listed = fcntl(folder.get(), F_DUPFD_CLOEXEC, 0);
   DIR* const entries = listed < 0 ? nullptr : fdopendir(listed);
@@ -120,7 +122,7 @@ std::string SafeName(std::string_view name) {
   name = name.substr(name.find_last_of("/\\") + 1);
   std::string safe;
   for (const char c : name) {
-    // '#' and '%' are places for numbers to voxelctl.
+    // voxelctl interprets '#' and '%' as placeholders for numbers.
     const bool odd = static_cast<unsigned char>(c) < 0x20 || c == 0x7f ||
                      std::string_view("#%*?\"'`<>|:;&$!").find(c) != std::string_view::npos;
     safe += odd ? '_' : c;
@@ -130,7 +132,7 @@ std::string SafeName(std::string_view name) {
     std::string extension = dot == std::string::npos ? "" : safe.substr(dot);
     if (extension.size() > kLongestName / 2) extension.clear();
     size_t end = kLongestName - extension.size();
-    while (end > 0 && (safe[end] & 0xc0) == 0x80) --end;  // no code point is cut
+    while (end > 0 && (safe[end] & 0xc0) == 0x80) --end;  // do not split a code point
     safe = safe.substr(0, end) + extension;
   }
   return safe.find_first_not_of('.') == std::string::npos ? "file" : safe;

@@ -1,4 +1,4 @@
-// A file that is to be played, in a folder of its own that nobody else may look into; both go with the object.
+// A file to play, in a private folder. Both are removed with the object.
 #pragma once
 
 #include <sys/types.h>
@@ -16,14 +16,16 @@
 
 namespace voxeld::daemon::play {
 
-// A folder of mode 0700 where the system has temporary files ($TMPDIR, else /tmp); removed with all that is in it. Locked by
-// flock(2) while the object is there, which the system ends with the process.
+// A folder of mode 0700 in the system's folder for temporary files ($TMPDIR, else /tmp). It is
+// removed with its contents when the object is destroyed. While the object exists, the folder is
+// locked by flock(2); the system releases the lock when the process ends.
 class PrivateFolder {
  public:
   static absl::StatusOr<PrivateFolder> Make();
-  // Removes those of this user that nobody has locked: whoever made them was killed. Of what has such a folder's name, only folders
-  // of mode 0700 that are this user's, by no link, and in them no further folders. Where the file system has no such locks none
-  // is. Returns how many went. Blocks as the disk does.
+  // Removes this user's unlocked folders, whose processes have been killed. Removes only folders
+  // with such a name that have mode 0700, belong to this user, are not links and contain no further
+  // folders. Removes nothing if the file system has no such locks. Returns: the number of removed
+  // folders. Blocks on the disk.
   static size_t RemoveLeft();
   PrivateFolder(PrivateFolder&& other) noexcept;
   PrivateFolder& operator=(PrivateFolder&& other) noexcept;
@@ -34,30 +36,31 @@ class PrivateFolder {
   PrivateFolder(std::string path, Descriptor lock)
       : path_(std::move(path)), lock_(std::move(lock)) {}
   void Remove();
-  std::string path_;  // empty: moved from
+  std::string path_;  // empty after a move
   Descriptor lock_;   // of the folder itself
 };
 
-// What a file that somebody calls `name` is called here: its last part, with no bytes that a terminal, a shell or
-// voxelctl would take for something else, at most kLongestName bytes, with its extension. Never empty.
+// The local name of a file that a client calls `name`: the last component, without bytes that are
+// special to a terminal, a shell or voxelctl, with its extension, and at most kLongestName bytes.
+// Never empty.
 inline constexpr size_t kLongestName = 120;
 std::string SafeName(std::string_view name);
 
-// For one thread at a time. Blocks as the disk does.
+// Not thread-safe. Blocks on the disk.
 class PlayFile {
  public:
-  // As write(2); tests have disks that are full.
+  // Has the signature of write(2). Tests replace it to simulate a full disk.
   using Write = std::function<ssize_t(int descriptor, const char* bytes, size_t size)>;
 
-  // A new one, empty, mode 0600. Errors: as the system has them.
+  // Creates an empty file with mode 0600. Errors: those of the system.
   static absl::StatusOr<PlayFile> Make(std::string_view name, Write write = nullptr);
 
-  // ResourceExhausted if there is no room.
+  // Errors: ResourceExhausted if the disk is full.
   absl::Status Append(std::string_view bytes);
   const std::string& name() const { return name_; }
   std::string path() const { return folder_.path() + "/" + name_; }
   uint64_t bytes() const { return bytes_; }
-  // What is in the path before the name, for whoever tells people of the file.
+  // Returns: the part of the path before the name, which messages for people should not show.
   std::string prefix() const { return folder_.path() + "/"; }
 
  private:

@@ -35,9 +35,11 @@ namespace {
 
 using std::chrono::steady_clock;
 
-// Ends a process with the thread that has started it, however that ends; a part of what every Linux has.
+// Terminates a process when the thread that started it ends for any reason. Part of every Linux
+// system.
 constexpr char kSetpriv[] = "/usr/bin/setpriv";
-// All that it is told: tokens and addresses of the daemon's own environment are not for it.
+// The only variables that the process gets. It must not see tokens and addresses in the daemon's
+// environment.
 constexpr const char* kEnvironment[] = {"PATH", "LANG", "LC_ALL", "LC_CTYPE", "TMPDIR", "TZ"};
 constexpr size_t kKeptErrors = 8192;
 constexpr int kFirstToGo = 500;  // of 1000
@@ -46,8 +48,8 @@ constexpr char kErrorLine[] = "voxelctl: ";
 struct Child {
   PlayFile file;
   pid_t pid = 0;
-  Descriptor ended, errors;  // readable once it has ended; what it says
-  std::string said;          // the end of that
+  Descriptor ended, errors;  // readable after the exit; its standard error
+  std::string said;          // the last part of its standard error
 };
 
 std::vector<char*> Pointers(std::vector<std::string>& texts) {
@@ -110,7 +112,7 @@ absl::StatusOr<Child> Spawn(const PlayerOptions& options, PlayFile file) {
   return child;
 }
 
-// At most so many bytes; no code point is cut.
+// Shortens the text to `most` bytes without splitting a code point.
 std::string Shortened(std::string text, size_t most) {
   if (text.size() <= most) return text;
   constexpr char kMore[] = "…";
@@ -119,7 +121,8 @@ std::string Shortened(std::string text, size_t most) {
   return text.substr(0, end) + kMore;
 }
 
-// What it said last, in the words of who sent the file: the last of its errors, with the lines that belong to it.
+// Returns: the last error that the process printed, including its continuation lines, with the
+// client's name of the file.
 std::string WhyOf(const Child& child, int status) {
   size_t begin = child.said.rfind(absl::StrCat("\n", kErrorLine));
   begin = begin != std::string::npos ? begin + 1 : child.said.starts_with(kErrorLine) ? 0 : begin;
@@ -141,7 +144,7 @@ std::string WhyOf(const Child& child, int status) {
 
 class Player::Impl {
  public:
-  // `wake`: an eventfd that does not block.
+  // `wake` is a non-blocking eventfd.
   Impl(PlayerOptions options, Descriptor wake)
       : options_(std::move(options)), wake_(std::move(wake)), thread_([this] { Run(); }) {}
 
@@ -197,7 +200,8 @@ class Player::Impl {
     (void)!write(wake_.get(), &one, sizeof(one));
   }
 
-  // On the thread; of what it has played last, which another may be to take the place of by now.
+  // Call on the player's thread. Sets the state of the last file, unless another file is about to
+  // replace it.
   void Tell(Playing state) {
     std::function<void()> tell;
     {
@@ -242,7 +246,8 @@ class Player::Impl {
     Tell({.name = name});
   }
 
-  // Until something is said or has happened, `milliseconds` at the most (−1: any time). `asked`: or until another thread wakes it.
+  // Waits until the process prints something or exits, for at most `milliseconds` (−1: no limit).
+  // `asked`: also until another thread calls Wake.
   void Await(int milliseconds, bool asked) {
     std::array<pollfd, 3> fds = {{{wake_.get(), POLLIN, 0}, {-1, POLLIN, 0}, {-1, POLLIN, 0}}};
     if (!asked) fds[0].fd = -1;
@@ -273,7 +278,7 @@ class Player::Impl {
     }
   }
 
-  // It has ended by itself.
+  // Handles a process that has exited by itself.
   void Reap() {
     if (child_->errors.ok()) Listen();
     const int status = TakeAway();
@@ -284,7 +289,7 @@ class Player::Impl {
     Tell(good ? Playing() : Playing{.failed = name, .why = why});
   }
 
-  // Whoever it has started goes, too. Its number is nobody else's until it is waited for.
+  // Kills the remaining process group. Its id cannot be reused before waitpid.
   int TakeAway() {
     int status = 0;
     kill(-child_->pid, SIGKILL);
@@ -315,7 +320,7 @@ class Player::Impl {
   bool stop_ VOXELD_GUARDED_BY(mutex_) = false, quit_ VOXELD_GUARDED_BY(mutex_) = false;
   Playing state_ VOXELD_GUARDED_BY(mutex_);
   std::function<void()> on_change_ VOXELD_GUARDED_BY(mutex_);
-  std::optional<Child> child_;  // the thread's own
+  std::optional<Child> child_;  // used by the player's thread only
   std::thread thread_;
 };
 

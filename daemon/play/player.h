@@ -1,5 +1,6 @@
-// Plays a file by `voxelctl play`, in a process of its own: whatever reads files of others is not in the daemon. One at a time;
-// the next one takes the place of the last, and what a process has up goes with its session.
+// Plays a file with `voxelctl play` in a separate process, because code that parses clients' files
+// must not run in the daemon. It plays one file at a time; the next one replaces it. The content
+// that a process displays is removed with its session.
 #pragma once
 
 #include <functional>
@@ -14,41 +15,44 @@ namespace voxeld::daemon::play {
 
 struct PlayerOptions {
   std::string program;  // voxelctl's path
-  std::string server;   // where it finds the daemon, as --server has it
-  // From being asked to end to being killed. What it has up goes either way.
+  std::string server;   // the daemon's address, in the syntax of --server
+  // Time between asking the process to exit and killing it. Its content is removed in either case.
   sync::TimeNs grace_ns = 500 * sync::kMillisecond;
-  // Before all else, on its thread: removes what players of daemons that were killed have left (PrivateFolder::RemoveLeft).
+  // First removes, on the player's thread, the files of daemons that were killed
+  // (PrivateFolder::RemoveLeft).
   bool remove_left = false;
 };
 
 struct Playing {
-  std::string name;    // of the file; empty: nothing plays
-  std::string failed;  // of the file that could not be played last; empty: none since
-  std::string why;     // a sentence, at most kLongestWhy bytes; anything may be in it
+  std::string name;    // of the file; empty: nothing is playing
+  std::string failed;  // the last file that could not be played; empty: none since
+  std::string why;     // a sentence of at most kLongestWhy bytes; may contain any text
   bool operator==(const Playing&) const = default;
 };
 inline constexpr size_t kLongestWhy = 600;
 
-// Thread-safe. The process has a process group and an environment of its own, and no descriptor of the daemon's; it ends with
-// the player, and where there is setpriv(1) also with the daemon, however that ends. When memory is short it goes first.
+// Thread-safe. The process has its own process group and environment, and inherits no descriptor
+// from the daemon. It ends with the player, and with the daemon in any case if setpriv(1) exists.
+// It is the first to be killed if memory is short.
 class Player {
  public:
-  // ResourceExhausted if the system has no descriptor or no thread for it.
+  // Errors: ResourceExhausted if the system has no descriptor or thread left.
   static absl::StatusOr<std::unique_ptr<Player>> Make(PlayerOptions options);
   ~Player();
   Player(const Player&) = delete;
   Player& operator=(const Player&) = delete;
 
-  // Ends what plays, then plays `file`. Does not wait.
+  // Stops the current file, then plays `file`. Does not block.
   void Play(PlayFile file);
-  // Does not wait.
+  // Stops playing. Does not block.
   void Stop();
-  // Ends what plays, for good: nothing is played any more. Waits, grace_ns at the most.
+  // Stops playing for good. Blocks for at most grace_ns.
   void End();
 
   Playing state() const;
-  // Called on the player's thread, or on that which calls Play or Stop, when the state is another. Not once this has returned
-  // with nothing, but for a call that is under way.
+  // Sets the callback for state changes. It runs on the player's thread, or in the thread that
+  // calls Play or Stop. After this function has returned for an empty callback, only a call that is
+  // already running may still be active.
   void SetOnChange(std::function<void()> on_change);
 
  private:

@@ -1,4 +1,4 @@
-// Whether files can be played here, and how voxelctl comes to the daemon.
+// Determines whether files can be played, and how voxelctl connects to the daemon.
 #pragma once
 
 #include <memory>
@@ -13,17 +13,18 @@
 namespace voxeld::daemon::play {
 
 struct PlaySetup {
-  // Goes after the player, and after whoever listens in it.
+  // Destroy it after the player and after the server that listens in it.
   std::optional<PrivateFolder> folder;
-  // To be listened on for gRPC beside the others, in the folder; nothing: it is among those that are already.
+  // An additional address for gRPC, in the folder. Nothing: the player uses an address that is
+  // already served.
   std::optional<Address> listen;
-  std::unique_ptr<Player> player;  // none: see why_not
+  std::unique_ptr<Player> player;  // null: see why_not
   std::string why_not;             // a sentence
 };
 
-// `listen`: where gRPC is to be served. The daemon's own user may do everything over a unix socket, whatever its grants are
-// (access.h), so the first one of these is taken; where there is none one is made that nobody else can reach. The program is
-// the voxelctl beside this one.
+// `listen` lists the gRPC addresses. The daemon's own user has all scopes over a unix socket
+// regardless of the grants (access.h), so the first unix socket is used. If there is none, a
+// private one is created. The program is the voxelctl in the daemon's folder.
 PlaySetup SetUpPlaying(const std::vector<Address>& listen);
 
 }  // namespace voxeld::daemon::play

@@ -1,4 +1,4 @@
-// A thread for what may block, in the order in which it was asked for.
+// Runs blocking functions on a separate thread, in the order of the calls.
 #pragma once
 
 #include <cstddef>
@@ -15,16 +15,16 @@ namespace voxeld::daemon::play {
 class Worker {
  public:
   Worker() = default;
-  // Waits for what has begun; the rest is not done, but destroyed, here. Not on the worker's own thread: what is posted
-  // owns nothing that owns the worker.
+  // Waits for the function that is running; destroys the rest without running it. Must not be
+  // called on the worker's own thread, so posted functions must not own an owner of the worker.
   ~Worker();
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  // The first one begins the thread. ResourceExhausted if there is none to be had, and `work` is not done; another may be
-  // tried later.
+  // Queues `work`. The first call starts the thread. Errors: ResourceExhausted if no thread can be
+  // started; `work` is then not run, and later calls may succeed.
   absl::Status Post(std::function<void()> work);
-  // How much has not begun.
+  // Returns: the number of functions that have not started.
   size_t waiting() const;
 
  private:
