@@ -1,13 +1,14 @@
-// How long this process may take to end.
+// Limits the time that this process takes to exit.
 #pragma once
 
 #include "display/sync/clock.h"
 
 namespace voxeld::daemon {
 
-// While one is there: after `limit`, above 0, the process ends with status 1 and a line on standard error, whatever it
-// waits for. Libraries wait without end for threads that the system did not give them. Uses SIGALRM and its timer; one
-// at a time.
+// While an object exists, the process exits with status 1 and a line on standard error after
+// `limit`, whatever it is waiting for. Needed because libraries wait forever for threads that the
+// system could not create. Requires: `limit` above 0; one object at a time. Uses SIGALRM and its
+// timer.
 class EndLimit {
  public:
   explicit EndLimit(sync::TimeNs limit);

@@ -10,10 +10,10 @@ namespace voxeld::daemon {
 void SayAtOnce(std::string_view line) noexcept {
   const int before = errno;
   pollfd out = {.fd = STDERR_FILENO, .events = POLLOUT, .revents = 0};
-  // Written to where nobody reads any more, it would be a signal's turn.
+  // Writing to a closed pipe would raise a signal.
   if (poll(&out, 1, 0) == 1 && (out.revents & (POLLOUT | POLLERR | POLLHUP)) == POLLOUT) {
     const ssize_t written = write(STDERR_FILENO, line.data(), line.size());
-    (void)written;  // nobody may read it any more
+    (void)written;  // the reader may be gone
   }
   errno = before;
 }

@@ -1,11 +1,13 @@
-// A line on standard error where nothing may be allocated, locked or waited for: in handlers of signals, and without memory.
+// Writes a line to standard error without allocating, locking or blocking: for signal handlers and
+// when memory has run out.
 #pragma once
 
 #include <string_view>
 
 namespace voxeld::daemon {
 
-// Left out where nobody reads it. Async-signal-safe; `line` ends with a newline. Keeps errno.
+// Drops the line if it cannot be written at once. Async-signal-safe; preserves errno. `line` must
+// end with a newline.
 void SayAtOnce(std::string_view line) noexcept;
 
 }  // namespace voxeld::daemon

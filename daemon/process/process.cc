@@ -14,12 +14,13 @@
 namespace voxeld::daemon {
 namespace {
 
-// Of each of the allocator's arenas. Messages are read in slices of some kilobytes and freed together; without
-// these every message of a mebibyte costs hundreds of page faults.
+// Free memory that each arena of the allocator keeps. Messages are read in slices of several
+// kilobytes that are freed together; without this, every message of 1 MiB would cause hundreds of
+// page faults.
 constexpr int kKeptBytes = 16 << 20;
 constexpr int kGrownBytes = 1 << 20;
-constexpr int kMappedBytes = 4 << 20;  // from here on memory is mapped, and goes back at once
-// By itself the C library has eight for each core, and each keeps what its threads once needed together.
+constexpr int kMappedBytes = 4 << 20;  // larger blocks are mapped, and returned at once
+// By default glibc creates eight arenas per core, and each keeps the peak memory of its threads.
 constexpr unsigned kLeastArenas = 4;
 
 }  // namespace

@@ -1,4 +1,4 @@
-// What a process that serves gRPC sets for itself as a whole, once, before it has a second thread.
+// Process-wide settings of a gRPC server. Apply them once, before a second thread exists.
 #pragma once
 
 #include <cstdint>
@@ -7,23 +7,28 @@
 
 namespace voxeld::daemon {
 
-// Has the allocator keep what messages need from one to the next, up to a bound, in place of giving it back to the
-// system and faulting it in again, in as many arenas as there are cores (four at least); and leaves out Abseil's search
-// for deadlocks, with which distributions build it and which gRPC would make for every message.
+// Lets the allocator keep memory for the next message, up to a limit, instead of returning it to
+// the system and faulting it in again. Limits the arenas to the number of cores (at least four).
+// Disables Abseil's deadlock detection, which distributions enable and gRPC would run for every
+// message.
 void TuneProcess();
 
-// Gives the system what the allocator keeps and nobody holds, from between what is held too. A moment's peaks would stay
-// for ever else, each arena's, and higher ones come the longer the daemon runs. Takes longer the more
-// places are free, and others who want memory of that arena wait for it; what is wanted again is faulted in again.
+// Returns free memory of the allocator to the system, including memory between used blocks. Without
+// this, each arena would keep its peak forever, and higher peaks accumulate while the daemon runs.
+// It takes longer the more free blocks there are, blocks other threads that allocate from the same
+// arena, and memory that is needed again is faulted in again.
 void GiveBackFreeMemory();
 
-// Returns: allocated bytes, as the allocator counts them, with its caches of each thread; 0 if it does not count.
+// Returns: the allocated bytes according to the allocator, including its per-thread caches; 0 if it
+// does not count them.
 uint64_t HeapBytes();
 
-// As many descriptors as the process may have: every client holds two, what serves it and what guards it.
+// Raises the descriptor limit to the maximum that the process may have. Every client uses two
+// descriptors: one for serving and one for the guard.
 void RaiseDescriptorLimit();
 
-// What ends a daemon that is starting, for people: what the system refuses, and which limit to look at.
+// Explains an exception that ends a starting daemon: what the system refuses, and which limit to
+// check.
 std::string WhyItEnds(const std::exception& error);
 
 }  // namespace voxeld::daemon

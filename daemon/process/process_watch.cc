@@ -12,7 +12,7 @@ bool ProcessWatch::Look(uint64_t held_bytes, uint64_t peak_bytes) {
   }
   most_bytes_ = std::max<uint64_t>(most_bytes_, heap_bytes_);
   most_held_ = std::max({most_held_, held_bytes, peak_bytes});
-  // The budget falls at once; the count of the heap may be late.
+  // The budget falls at once; the count of the heap may lag.
   const bool much = most_bytes_ - heap_bytes_ >= kMuch || most_held_ - held_bytes >= kMuch;
   const sync::TimeNs begun = clock_.Now();
   if (begun < give_back_at_ && !(much && begun >= much_at_)) return false;

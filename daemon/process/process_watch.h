@@ -1,4 +1,4 @@
-// Looks after the process as a whole: its memory, and whether it runs and by which time.
+// Monitors the process: its memory, pauses in its execution, and steps of the wall clock.
 #pragma once
 
 #include <atomic>
@@ -13,15 +13,17 @@
 
 namespace voxeld::daemon {
 
-// Thread-safe but for Look. One a process; all that it is made with outlives it.
+// Thread-safe except for Look. Create one per process; all constructor arguments must outlive it.
 class ProcessWatch {
  public:
-  // How often free memory is returned to the system, and how often allocated memory is counted. Both walk through all free
-  // blocks while other threads that allocate wait, so they may take a thousandth of the time.
+  // How often free memory is returned to the system, and how often allocated memory is counted.
+  // Both walk through all free blocks while other threads that allocate wait, so they may take at
+  // most a thousandth of the time.
   static constexpr sync::TimeNs kGiveBack = 60 * sync::kSecond, kCount = sync::kSecond;
   static constexpr int64_t kRest = 1000;
-  // If this much was freed since memory was last returned, as when a large scene goes, it is returned at once, and again after
-  // kGiveBackAgain, when the rest of the scene may have followed. This may take a twentieth of the time.
+  // If this much was freed since memory was last returned, for example because a large scene was
+  // removed, it is returned at once, and again after kGiveBackAgain, when the rest of the scene may
+  // have been freed. This may take a twentieth of the time.
   static constexpr uint64_t kMuch = uint64_t{8} << 20;
   static constexpr sync::TimeNs kGiveBackAgain = 3 * sync::kSecond;
   static constexpr int64_t kRestOfMuch = 20;
@@ -41,15 +43,16 @@ class ProcessWatch {
         give_back_at_(clock.Now() + kGiveBack),
         count_at_(clock.Now() + kCount) {}
 
-  // Call every second or so, from one thread. `held_bytes`: the memory of clients' scenes according to the budget, and
-  // `peak_bytes` its peak since the last call. Returns true if free memory was returned to the system; the caller then
-  // returns the unused memory of its own pools.
+  // Call about once a second, from one thread. `held_bytes` is the memory of clients' scenes
+  // according to the budget, `peak_bytes` its peak since the last call. Returns: true if free
+  // memory was returned to the system; the caller should then return the unused memory of its own
+  // pools.
   bool Look(uint64_t held_bytes = 0, uint64_t peak_bytes = 0);
-  void LookAtTime() { time_.Look(); }  // as TimeWatch says
+  void LookAtTime() { time_.Look(); }  // see TimeWatch::Look
   ProcessFigures figures() const;
 
  private:
-  // When it is time again for what has begun at `begun`, each `period` if it is quick.
+  // Returns: when to repeat work that began at `begun`: after `period` if it was quick, else later.
   sync::TimeNs Next(sync::TimeNs begun, sync::TimeNs period, int64_t rest = kRest) const;
 
   sync::Clock& clock_;
@@ -57,9 +60,9 @@ class ProcessWatch {
   SegmentWatch segments_;
   TimeWatch time_;
   std::atomic<uint64_t> heap_bytes_;
-  // Used by the thread that calls Look.
+  // Only the thread that calls Look uses these.
   sync::TimeNs give_back_at_, count_at_, much_at_ = 0;
-  // The greatest values since memory was last returned.
+  // Peaks since memory was last returned.
   uint64_t most_bytes_ = 0, most_held_ = 0;
 };
 

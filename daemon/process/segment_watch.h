@@ -17,11 +17,12 @@ class SegmentWatch {
   // How long health is degraded after a refusal.
   static constexpr sync::TimeNs kDegradedFor = 60 * sync::kSecond;
 
-  // `clock` and `log` outlive it. `refused` returns the number of refusals since the process started; thread-safe.
+  // `clock` and `log` must outlive this object. `refused` returns the number of refusals since the
+  // process started and must be thread-safe.
   SegmentWatch(sync::Clock& clock, Logger& log, uint64_t (*refused)() = &gpu::Segment::Refused)
       : refused_(refused), clock_(clock), log_(log), logged_(refused()) {}
 
-  // Logs refusals since the last call. Call it about once a second.
+  // Logs refusals since the last call. Call about once a second.
   void Look();
 
   // Sets segments_refused and trouble.

@@ -22,7 +22,7 @@ constexpr int kFirstSocket = 3;  // SD_LISTEN_FDS_START
 constexpr const char* kVariables[] = {"NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID",
                                       "LISTEN_FDS",    "LISTEN_PID",    "LISTEN_FDNAMES"};
 
-// Nothing if it is not there, or no number.
+// Returns: nothing if the variable is unset or not a number.
 std::optional<int64_t> Number(const Supervisor::Environment& environment, const char* name) {
   const std::optional<std::string> text = environment(name);
   int64_t number = 0;
@@ -81,7 +81,7 @@ void Supervisor::Status(std::string_view status) const {
 
 void Supervisor::Tell(std::string text) const {
   if (!present()) return;
-  // A field is one line.
+  // A field is a single line.
   const size_t status = text.find("STATUS=");
   if (status != std::string::npos) {
     std::replace(text.begin() + static_cast<std::ptrdiff_t>(status), text.end(), '\n', ' ');

@@ -1,8 +1,8 @@
-// Whoever started the process and watches it, as systemd does: it is told when the daemon is ready, alive
-// and ending, and may have opened the listening sockets already, so that no client is refused while the
-// daemon starts anew. The protocol is sd_notify(3)'s and sd_listen_fds(3)'s, by its documentation: a few
-// lines, for which the library would bring compression and cryptography into a process that strangers
-// talk to.
+// The process that started and supervises the daemon, such as systemd. It is notified when the
+// daemon is ready, alive or stopping. It may pass listening sockets, so that no client is refused
+// while the daemon restarts. Implements the protocols of sd_notify(3) and sd_listen_fds(3) from
+// their documentation, in a few lines; the library would add compression and cryptography code to a
+// process that is exposed to strangers.
 #pragma once
 
 #include <cstdint>
@@ -17,38 +17,41 @@
 
 namespace voxeld::daemon {
 
-// A listening socket that was open when the process began.
+// A listening socket that the process inherited.
 struct InheritedSocket {
   Descriptor descriptor;
   std::string name;  // FileDescriptorName=; empty: none
 };
 
-// Telling is thread-safe, and does nothing where nobody asked for it. What cannot be told is left out.
+// Notifications are thread-safe, do nothing without a supervisor, and are dropped if they cannot be
+// sent.
 class Supervisor {
  public:
   using Environment = std::function<std::optional<std::string>(const char* name)>;
 
-  // NOTIFY_SOCKET, WATCHDOG_USEC and WATCHDOG_PID, LISTEN_FDS, LISTEN_PID and LISTEN_FDNAMES; the last
-  // three of another process are nobody's. Once a process: the descriptors are then this object's.
+  // Reads NOTIFY_SOCKET, WATCHDOG_USEC, WATCHDOG_PID, LISTEN_FDS, LISTEN_PID and LISTEN_FDNAMES.
+  // The LISTEN variables are ignored if they are meant for another process. Create one per process:
+  // it owns the descriptors.
   explicit Supervisor(const Environment& environment);
-  // From the process's own environment, from which they are taken away, so that no child finds them.
+  // Reads the process's environment and removes these variables, so that no child inherits them.
   static Supervisor OfProcess();
 
   bool present() const { return !socket_.empty(); }
-  // How often it wants to be told Alive at the latest; 0: it does not.
+  // Returns: the longest interval between calls of Alive that the supervisor accepts; 0: it expects
+  // none.
   sync::TimeNs watchdog_ns() const { return watchdog_ns_; }
   std::vector<InheritedSocket> TakeSockets() { return std::move(sockets_); }
 
   void Ready(std::string_view status) const;
   void Alive() const;
-  void Reloading() const;  // until Ready is told again
+  void Reloading() const;  // until the next Ready
   void Stopping() const;
-  void Status(std::string_view status) const;  // a line for people
+  void Status(std::string_view status) const;  // one line for people
 
  private:
   void Tell(std::string text) const;
 
-  std::string socket_;  // empty: nobody is to be told; "@" begins an abstract name
+  std::string socket_;  // empty: no supervisor; "@" begins an abstract name
   sync::TimeNs watchdog_ns_ = 0;
   std::vector<InheritedSocket> sockets_;
 };

@@ -1,5 +1,6 @@
-// Sees what a process cannot see while it happens: that it did not run (it was stopped, or its machine was, or had no
-// time for it), and that the wall clock stepped. Tells people of both.
+// Detects that the process did not run (it or its machine was stopped, or got no processor time),
+// and that the wall clock stepped. Both can be noticed only afterwards. Reports both in the log and
+// in the statistics.
 #pragma once
 
 #include <cstdint>
@@ -16,33 +17,35 @@ namespace voxeld::daemon {
 // Thread-safe.
 class TimeWatch {
  public:
-  static constexpr sync::TimeNs kTurn = sync::kSecond / 4;  // how often Look is to be called
-  // What is told: of a turn that came late, and of what the wall clock did beside the other within one.
+  static constexpr sync::TimeNs kTurn = sync::kSecond / 4;  // interval between calls of Look
+  // Thresholds for reports: for the delay of a call of Look, and for the deviation of the wall
+  // clock from the running clock within one interval.
   static constexpr sync::TimeNs kPause = sync::kSecond;
   static constexpr sync::TimeNs kStep = sync::kSecond / 2;
-  // How long AddTo tells of it.
+  // How long AddTo reports an event.
   static constexpr sync::TimeNs kTold = 60 * sync::kSecond;
 
-  // Both at one moment.
+  // Both clocks, read at the same moment.
   struct Reading {
-    sync::TimeNs running = 0;  // never steps, and goes on while the machine sleeps
+    sync::TimeNs running = 0;  // never steps; continues while the machine sleeps
     sync::TimeNs wall = 0;     // since 1970
   };
-  // Of the system: CLOCK_BOOTTIME and CLOCK_REALTIME, with less than a millisecond between if the process can have
-  // that within a few tries.
+  // Reads CLOCK_BOOTTIME and CLOCK_REALTIME, less than a millisecond apart if a few attempts
+  // suffice.
   static Reading OfSystem();
 
-  // `log` outlives it.
+  // `log` must outlive this object.
   explicit TimeWatch(Logger& log, std::function<Reading()> read = OfSystem);
 
-  // Each kTurn, from one thread that does nothing else: what is late in it is taken for the process.
+  // Call every kTurn from a thread that does nothing else: a late call is interpreted as a pause of
+  // the process.
   void Look();
 
-  // pauses, clock_steps and time_trouble.
+  // Sets pauses, clock_steps and time_trouble.
   void AddTo(ProcessFigures& figures) const;
 
  private:
-  // The last of a kind.
+  // The last event of one kind.
   struct Seen {
     uint64_t count = 0;
     sync::TimeNs at = 0, length = 0;

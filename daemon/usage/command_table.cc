@@ -26,7 +26,7 @@ OptionEntry Describe(const CLI::Option& option) {
   for (const std::string& name : option.get_lnames())
     entry.names.push_back(absl::StrCat("--", name));
   if (entry.names.empty()) entry.argument = option.get_name(true);
-  // A flag expects nothing, and CLI11 calls a value without a name of its own by its type.
+  // A flag expects no value, and CLI11 names an unnamed value by its type.
   if (option.get_items_expected_max() > 0) entry.value = option.get_type_name();
   if (option.get_positional() && !absl::StrContains(entry.value, '|')) entry.value.clear();
   if (absl::StrContains(entry.value, '|')) {
@@ -49,7 +49,7 @@ CommandEntry DescribeCommand(const CLI::App& app) {
   entry.about = app.get_description();
   entry.footer = app.get_footer();
   for (const CLI::Option* option : app.get_options()) {
-    // Help is of the program, and of each command anew.
+    // Each command repeats the program's help option.
     const bool again = app.get_parent() != nullptr && option == app.get_help_ptr();
     if (option->get_group().empty() || again) continue;
     (option->get_positional() ? entry.arguments : entry.options).push_back(Describe(*option));

@@ -1,4 +1,4 @@
-// What a program's command line has, as plain data: for its manual pages and for shells that complete it.
+// Describes a program's command line as plain data, for manual pages and shell completion.
 #pragma once
 
 #include <string>
@@ -11,25 +11,25 @@ class App;
 namespace voxeld::usage {
 
 struct OptionEntry {
-  std::vector<std::string> names;    // "--fps"; short ones first; empty: an argument by its place
-  std::string argument;              // of one by its place, its name: "FILE"
-  std::string value;                 // "N", "auto|x|y|z"; empty: it takes none
-  std::vector<std::string> choices;  // what the value may be, where it is one of a few words
+  std::vector<std::string> names;    // "--fps"; short names first; empty: a positional argument
+  std::string argument;              // name of a positional argument: "FILE"
+  std::string value;                 // "N", "auto|x|y|z"; empty: takes no value
+  std::vector<std::string> choices;  // allowed values, if these are a few words
   std::string about;
-  std::string fallback;   // what holds without it, where the program says so
-  bool repeated = false;  // may be given again, or takes several
+  std::string fallback;   // default value, if the program documents one
+  bool repeated = false;  // may be repeated, or takes several values
 };
 
 struct CommandEntry {
-  std::string name;   // "voxelctl"; of a command of it "play"
+  std::string name;   // "voxelctl"; for one of its commands "play"
   std::string about;  // lines; those that begin with two spaces are examples
   std::string footer;
-  std::vector<OptionEntry> arguments;  // in their order
+  std::vector<OptionEntry> arguments;  // positional, in their order
   std::vector<OptionEntry> options;
   std::vector<CommandEntry> commands;
 };
 
-// All of it that is not hidden (CLI11's group ""), in the order in which it was declared.
+// Returns: everything that is not hidden (CLI11's group ""), in the order of declaration.
 CommandEntry DescribeCommand(const CLI::App& app);
 
 }  // namespace voxeld::usage

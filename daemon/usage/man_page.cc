@@ -18,7 +18,7 @@ namespace {
 
 constexpr size_t kLine = 78;
 
-// One code point, taken from the front of well-formed UTF-8.
+// Removes the first code point from well-formed UTF-8 text and returns it.
 uint32_t TakeCodePoint(absl::string_view* text) {
   const auto first = static_cast<unsigned char>(text->front());
   const size_t length = first < 0x80 ? 1 : first < 0xe0 ? 2 : first < 0xf0 ? 3 : 4;
@@ -30,7 +30,7 @@ uint32_t TakeCodePoint(absl::string_view* text) {
   return code;
 }
 
-// Words of ours as roff's: what it would take for its own is written out.
+// Escapes text for roff.
 std::string Roff(absl::string_view text) {
   std::string out;
   while (!text.empty()) {
@@ -62,11 +62,11 @@ std::string Roff(absl::string_view text) {
         }
     }
   }
-  // A line that begins with a dot would be a request.
+  // roff would interpret a line that begins with a dot as a request.
   return absl::StartsWith(out, ".") ? absl::StrCat("\\&", out) : out;
 }
 
-// Words in lines of a decent length, each of which ends; what they look like is roff's business.
+// Wraps text into lines of moderate length, each with a newline. roff decides on the final layout.
 std::string Filled(absl::string_view roff) {
   std::string out;
   size_t length = 0;
@@ -88,7 +88,7 @@ std::string Quoted(absl::string_view text) {
 std::string Bold(absl::string_view text) { return absl::StrCat("\\fB", Roff(text), "\\fR"); }
 std::string Italic(absl::string_view text) { return absl::StrCat("\\fI", Roff(text), "\\fR"); }
 
-// Lines are joined to paragraphs; those that begin with two spaces stay as they are.
+// Joins lines to paragraphs; lines that begin with two spaces stay as they are.
 std::string Paragraphs(absl::string_view text) {
   std::string out;
   bool example = false;
@@ -124,7 +124,8 @@ std::string Sections(const std::vector<std::pair<std::string, std::string>>& sec
   return out;
 }
 
-// The first sentence, for NAME: no comma or line of it may be a roff request.
+// Returns: the beginning of the description, for NAME: up to the end of the first line, sentence or
+// clause.
 std::string Summary(const CommandEntry& command) {
   std::string first = command.about.substr(0, command.about.find('\n'));
   for (const char* end : {". ", ": ", "; "}) first = first.substr(0, first.find(end));

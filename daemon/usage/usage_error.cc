@@ -23,7 +23,7 @@ const CLI::Option* Find(absl::string_view name, const std::vector<const CLI::App
   return nullptr;
 }
 
-// "NAME: 1 required TYPE missing", as CLI11 has it.
+// Handles CLI11's "NAME: 1 required TYPE missing".
 std::string MissingValue(absl::string_view what, const std::vector<const CLI::App*>& apps) {
   const size_t colon = what.find(": ");
   if (colon == absl::string_view::npos) return std::string(what);
@@ -35,7 +35,7 @@ std::string MissingValue(absl::string_view what, const std::vector<const CLI::Ap
                       about.empty() ? "" : ": ", about);
 }
 
-// "Could not convert: --NAME = VALUE", of a flag.
+// Handles CLI11's "Could not convert: --NAME = VALUE" for flags.
 std::string WrongValue(absl::string_view what, const std::vector<const CLI::App*>& apps) {
   absl::string_view rest = what;
   const size_t equals = what.find(" = ");

@@ -1,4 +1,4 @@
-// What a program says of a command line that is wrong.
+// Error messages for an invalid command line.
 #pragma once
 
 #include <string>
@@ -11,12 +11,13 @@ class Error;
 
 namespace voxeld::usage {
 
-// "--wacth is no option here; did you mean --watch?". `word` is what was given, with its value if there is one behind a "=";
-// the options of `apps` are known.
+// Returns: a message such as "--wacth is no option here; did you mean --watch?". `word` is the
+// given option, with "=" and its value if present. The options of `apps` are the known ones.
 std::string UnknownOption(const std::string& word, const std::vector<const CLI::App*>& apps);
 
-// Of CLI11's errors, with what would be right: a value that is missing, or given where none is taken, a word too many. `apps`
-// as above, the one whose arguments are meant first. Not fit for a terminal where what was given is not.
+// Returns: CLI11's error with the remedy: a missing value, an unexpected value or a superfluous
+// word. `apps` is as above; the arguments of the first one are meant. Escape the text before
+// printing it to a terminal, because it repeats input.
 std::string ExplainError(const CLI::Error& error, const std::vector<const CLI::App*>& apps);
 
 }  // namespace voxeld::usage
