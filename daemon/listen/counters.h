@@ -1,4 +1,4 @@
-// What the listener counts, for the statistics.
+// Counts the listener's events for the statistics.
 #pragma once
 
 #include <atomic>
@@ -15,11 +15,11 @@
 
 namespace voxeld::daemon::listen {
 
-// Thread-safe. Lives as long as whoever reads it; the listener may be gone.
+// Thread-safe. Must outlive its readers; the listener may be destroyed earlier.
 class Counters {
  public:
   using Count = std::atomic<uint64_t>;
-  // How long Read tells that no connection could be accepted.
+  // How long Read reports that no connection could be accepted.
   static constexpr sync::TimeNs kTold = 60 * sync::kSecond;
 
   Count open = 0;
@@ -31,13 +31,13 @@ class Counters {
   Count probe_failures = 0;
   Count calls_turned_away = 0, calls_revoked = 0;
 
-  // Why nobody can connect, as the probe sees it; empty: all is well.
+  // Sets why clients cannot connect, as found by the probe; empty: they can.
   void SetUnreachable(std::string why) {
     sync::MutexLock lock(mutex_);
     unreachable_ = std::move(why);
   }
 
-  // No connection could be accepted, at `now`.
+  // Records that no connection could be accepted at `now`.
   void NoteAcceptFailure(sync::TimeNs now, std::string why) {
     ++accept_failures;
     sync::MutexLock lock(mutex_);
@@ -45,7 +45,8 @@ class Counters {
     accept_failed_why_ = std::move(why);
   }
 
-  // To be called with the reason whenever no connection can be accepted by another than the listener; logs it. All outlive it.
+  // Returns: a function that records and logs why no connection can be accepted, for servers other
+  // than the listener. All arguments and this object must outlive it.
   std::function<void(const std::string&)> Noting(sync::Clock& clock, Logger& log) {
     return [this, &clock, &log](const std::string& why) {
       NoteAcceptFailure(clock.Now(), why);
@@ -56,7 +57,7 @@ class Counters {
     };
   }
 
-  // `now`: by which accept_trouble is told; 0: without it.
+  // `now` is the time for accept_trouble; 0: leave it empty.
   ListenFigures Read(sync::TimeNs now = 0) const {
     ListenFigures out{.open = open,
                       .accepted = accepted,
@@ -86,7 +87,7 @@ class Counters {
  private:
   mutable sync::Mutex mutex_;
   std::string unreachable_ VOXELD_GUARDED_BY(mutex_);
-  std::string accept_failed_why_ VOXELD_GUARDED_BY(mutex_);  // empty: it never did
+  std::string accept_failed_why_ VOXELD_GUARDED_BY(mutex_);  // empty: never failed
   sync::TimeNs accept_failed_ns_ VOXELD_GUARDED_BY(mutex_) = 0;
 };
 

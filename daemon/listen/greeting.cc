@@ -13,7 +13,7 @@ constexpr std::string_view kPreface = "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 constexpr size_t kHeadBytes = 9;
 constexpr uint8_t kData = 0, kHeaders = 1, kReset = 3, kSettings = 4, kContinuation = 9;
 constexpr uint8_t kAck = 1, kEndStream = 1, kEndHeaders = 4, kPadded = 8;
-constexpr size_t kPrefixBytes = 5;  // of a gRPC message: compressed or not, and its length
+constexpr size_t kPrefixBytes = 5;  // a gRPC message's prefix: compressed flag and length
 constexpr size_t kShownBytes = 16;
 
 uint32_t BigEndian(std::string_view bytes) {
@@ -49,7 +49,7 @@ Greeting::Verdict Greeting::Read(std::string_view received) {
 }
 
 Greeting::Verdict Greeting::ReadTls(std::string_view received) {
-  constexpr std::string_view kHandshake("\x16\x03", 2);  // of version 3.x, as all are
+  constexpr std::string_view kHandshake("\x16\x03", 2);  // version 3.x, as in all versions of TLS
   constexpr size_t kRecordHead = 5, kHelloHead = 4;
   constexpr char kClientHello = 1;
   received = received.substr(0, kMostBytes);
@@ -82,7 +82,7 @@ Greeting::Verdict Greeting::ReadFrame(std::string_view received, const Head& hea
       if ((head.flags & kEndHeaders) == 0) {
         return Wrong("the headers of its first call go on in further frames; give them in one");
       }
-      if ((head.flags & kEndStream) != 0) return Verdict::kCall;  // gRPC will say what is missing
+      if ((head.flags & kEndStream) != 0) return Verdict::kCall;  // gRPC reports what is missing
       prefixes_[head.stream];
       break;
     case kContinuation:
@@ -109,7 +109,7 @@ Greeting::Verdict Greeting::ReadData(std::string_view received, const Head& head
     padding = static_cast<uint8_t>(received[begin++]);
     if (begin + padding > end) return Wrong("DATA has more padding than it is long");
   }
-  // The message behind its length may be long, and is not waited for.
+  // Waits only for the message's length, because the message may be long.
   const size_t wanted = std::min(kPrefixBytes - stream->second.size(), end - padding - begin);
   if (received.size() < begin + wanted) return Await(begin + wanted);
   stream->second.append(received.substr(begin, wanted));
@@ -122,7 +122,7 @@ Greeting::Verdict Greeting::ReadData(std::string_view received, const Head& head
                      " KiB in all, and on a stream it sends nothing but Open before Opened"));
   }
   if ((head.flags & kEndStream) != 0) return Verdict::kCall;
-  at_ = end;  // with the padding that may be yet to come
+  at_ = end;  // including padding that may not have arrived yet
   return Verdict::kMore;
 }
 

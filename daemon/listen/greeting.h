@@ -1,17 +1,16 @@
-// How a connection over HTTP/2 begins (RFC 9113), as far as a stranger's must be known before gRPC is
-// given it: gRPC parses headers of any length, at any price, and what it never sees costs nothing.
+// Checks the beginning of an HTTP/2 connection (RFC 9113) from an unknown client before gRPC gets
+// it. gRPC parses headers of any length at any cost, so it should never see an invalid beginning.
 //
-//   preface, SETTINGS    first of all; then, in any order and number:
-//   other small frames   they are let by; gRPC sees to them
-//   HEADERS              of the first call, whole in one frame: no CONTINUATION
-//   DATA                 up to the length of the call's first message; what the message says is
-//                        gRPC's
+//   preface, SETTINGS    first; then, in any order and number:
+//   other small frames   accepted; gRPC handles them
+//   HEADERS              of the first call, complete in one frame: no CONTINUATION
+//   DATA                 up to the length of the call's first message; gRPC checks the message
 //
-// Over TLS (RFC 8446) it is a ClientHello, whole in one record; gRPC gets the handshake, and nothing that
-// is parsed as HTTP/2 before a client's certificate is verified.
+// Over TLS (RFC 8446) the beginning is a ClientHello, complete in one record. gRPC does the
+// handshake, and parses no HTTP/2 before it has verified a client's certificate.
 //
-// All this within kMostBytes. What clients send before the daemon's SETTINGS have come is the preface
-// and SETTINGS alone, so whoever reads a greeting sends kServerSettings in between.
+// All of this must fit into kMostBytes. Before clients receive the daemon's SETTINGS they send only
+// the preface and SETTINGS, so the caller sends kServerSettings in between.
 #pragma once
 
 #include <cstddef>
@@ -22,38 +21,38 @@
 
 namespace voxeld::daemon::listen {
 
-// No thread's; touches no socket.
+// Not thread-safe; accesses no socket.
 class Greeting {
  public:
   static constexpr size_t kMostBytes = 12u << 10;
-  // Empty SETTINGS: HTTP/2's defaults, until gRPC sends its own.
+  // Empty SETTINGS: HTTP/2's defaults apply until gRPC sends its own.
   static constexpr std::string_view kServerSettings{"\0\0\0\x04\0\0\0\0\0", 9};
 
-  // Sent to a client when there is no room for its connection, which is then closed: HTTP/1.1 status 503. HTTP/2 clients treat
-  // this as a failed connection and retry with a delay. After SETTINGS and GOAWAY they would reconnect at once until the
-  // deadline of the call.
+  // Sent to a client whose connection exceeds a limit, before closing it: HTTP/1.1 status 503.
+  // HTTP/2 clients treat this as a failed connection and retry with a delay. After SETTINGS and
+  // GOAWAY they would reconnect at once until the deadline of the call.
   static constexpr std::string_view kRefusal =
       "HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\nContent-Length: 42\r\n"
       "Connection: close\r\n\r\nvoxeld has no room for another connection\n";
 
   enum class Verdict : uint8_t {
-    kMore,   // as it should be so far
-    kCall,   // a call has begun: gRPC's turn
-    kWrong,  // it will never be; see why()
+    kMore,   // valid so far
+    kCall,   // a call has begun: pass the connection to gRPC
+    kWrong,  // invalid; see why()
   };
 
-  // `most_message`: bytes of the first message.
+  // `most_message` is the limit on the bytes of the first message.
   explicit Greeting(uint64_t most_message) : most_message_(most_message) {}
 
-  // `received`: all that has come so far, from the connection's first byte on; kMostBytes of it are
-  // enough. After kCall and kWrong it is not asked again.
+  // `received` is everything since the connection's first byte; kMostBytes are enough. Do not call
+  // again after kCall or kWrong.
   Verdict Read(std::string_view received);
-  // The same for a connection that is to speak TLS. One of the two is asked, always the same.
+  // Does the same for a TLS connection. Always call the same one of the two functions.
   Verdict ReadTls(std::string_view received);
 
-  // Fewer bytes than this, from the first on, have nothing new to say.
+  // Returns: the number of bytes from the beginning below which the verdict cannot change.
   size_t needed() const { return needed_; }
-  // The preface was right: the other end speaks HTTP/2.
+  // Returns: whether the preface was valid, so that the client speaks HTTP/2.
   bool speaks_http2() const { return at_ > 0; }
   const std::string& why() const { return why_; }
 
@@ -63,18 +62,18 @@ class Greeting {
     uint8_t type = 0, flags = 0;
     uint32_t stream = 0;
   };
-  // What the frame at at_ comes to; kMore: at_ moves behind it.
+  // Reads the frame at at_. kMore: at_ moves to the next frame.
   Verdict ReadFrame(std::string_view received, const Head& head);
   Verdict ReadData(std::string_view received, const Head& head);
-  // So many bytes, or else it is wrong.
+  // Waits for this many bytes. Returns: kMore, or kWrong if they exceed the limit.
   Verdict Await(size_t bytes);
   Verdict Wrong(std::string why);
 
   const uint64_t most_message_;
-  size_t at_ = 0;  // where the next frame begins
+  size_t at_ = 0;  // beginning of the next frame
   size_t needed_ = 1;
-  bool settings_ = false;                     // have come
-  std::map<uint32_t, std::string> prefixes_;  // of messages, by the streams whose headers came
+  bool settings_ = false;                     // received
+  std::map<uint32_t, std::string> prefixes_;  // of messages, by streams whose headers were received
   std::string why_;
 };
 

@@ -8,8 +8,8 @@
 namespace voxeld::daemon::listen {
 namespace {
 
-// Sixteenths of a limit that are left of it when a connection is cut. Of the bytes as many as may come
-// at once while the receive buffer is small, and still more than a first call has.
+// Sixteenths of a limit that remain when a connection is disconnected. For bytes this covers what
+// can arrive at once while the receive buffer is small, and leaves more than a first call needs.
 constexpr int kTimeLeft = 1, kBytesLeft = 3;
 
 }  // namespace
@@ -64,13 +64,14 @@ ConnectionId Guard::Enter(const Peer& peer, bool own, std::unique_ptr<Wire> wire
     connection.counted = true;
     for (Counted* counted : {&by_address_[peer.address], &counted_}) {
       ++counted->open;
-      counted->authorised += peer.unix_socket;  // the kernel says whose they are
+      counted->authorised += peer.unix_socket;  // the kernel identifies the user
     }
     ++counters_.accepted;
     ++counters_.open;
   }
   if (!peer.unix_socket) {
-    // A name that is still there is of a connection that has ended, and whose end is not known yet.
+    // An existing entry belongs to a connection that has ended but whose end has not been reported
+    // yet.
     by_name_[peer.name] = id;
     connection.watched = true;
     watched_.emplace(id, &connection);
@@ -91,13 +92,14 @@ void Guard::OnWrongGreeting(ConnectionId id, const std::string& why) {
 
 void Guard::Leave(ConnectionId id) {
   std::vector<Doomed> doomed;
-  std::shared_ptr<Wire> wire;  // closed without the lock
+  std::shared_ptr<Wire> wire;  // destroyed without the lock
   {
     sync::MutexLock lock(mutex_);
     const auto it = connections_.find(id);
     if (it == connections_.end()) return;
     Connection& connection = it->second;
-    // Whoever ends it first is not spared, and what gRPC has not read yet it need not.
+    // A client that closes the connection first is disconnected and penalised as well, and gRPC
+    // need not read the remaining bytes.
     if (connection.watched) BytesAreMany(connection, true, doomed);
     wire = std::move(connection.wire);
     watched_.erase(id);
@@ -120,7 +122,7 @@ void Guard::OnBytes(ConnectionId id) {
     const auto it = connections_.find(id);
     if (it == connections_.end() || it->second.unix_socket || it->second.cut) return;
     if (it->second.watched && BytesAreMany(it->second, false, doomed)) {
-      // it is no more
+      // It has been removed.
     } else {
       MarkBusy(it->second);
     }
@@ -136,7 +138,7 @@ sync::TimeNs Guard::Look() {
     const sync::TimeNs now = clock_.Now();
     const sync::TimeNs most = limits_.unauthorised_limit_ns / 16 * (16 - kTimeLeft);
     for (auto it = watched_.begin(); it != watched_.end();) {
-      Connection& connection = *(it++)->second;  // a cut takes it out
+      Connection& connection = *(it++)->second;  // Doom removes it
       if (BytesAreMany(connection, false, doomed)) continue;
       if (connection.waiting > 0 || now - connection.since < most) continue;
       Doom(connection, counters_.cut_for_time,
@@ -224,7 +226,7 @@ std::vector<Guard::Busy> Guard::TakeBusy() {
     sync::MutexLock lock(mutex_);
     for (const ConnectionId id : busy_) {
       const Connection& connection = connections_.at(id);
-      // What is still watched tells of every byte anyway.
+      // Connections in watched_ report every byte anyway.
       taken.push_back({{connection.name, 0}, connection.wire});
       if (!connection.watched) continue;
       taken.back().first.bytes = connection.wire->BytesReceived();
@@ -236,7 +238,7 @@ std::vector<Guard::Busy> Guard::TakeBusy() {
   out.reserve(taken.size());
   for (auto& [busy, wire] : taken) {
     if (wire != nullptr) {
-      wire->Arm();  // before the bytes are asked for: later ones are told of
+      wire->Arm();  // before reading the count: later bytes are reported
       busy.bytes = wire->BytesReceived();
     }
     out.push_back(std::move(busy));
@@ -334,7 +336,8 @@ bool Guard::MakeRoom(const std::string& address, std::vector<Doomed>& doomed) {
   for (const auto& [id, connection] : watched_) {
     if (!connection->counted || now - connection->entered < kFirstCall) continue;
     if (!address.empty() && connection->address != address) continue;
-    // A call that goes on though it was answered, as one that watches health does, comes after those that are idle.
+    // A call that is answered but continues, such as a health watch, is considered only if no
+    // connection is idle.
     if (connection->waiting > 0 && !connection->answered) continue;
     Connection*& found = connection->waiting > 0 ? answered : longest;
     if (found == nullptr || connection->since < found->since) found = connection;
@@ -382,8 +385,8 @@ void Guard::Punish(const Connection& connection) {
   sync::TimeNs length = limits_.cut_penalty_ns;
   if (found != penalties_.end()) {
     const Penalty& last = found->second;
-    if (now < last.until) return;  // it was there before; what came with it is cut with it
-    // Good for as long as it was refused: forgotten.
+    if (now < last.until) return;  // it was opened before the penalty, which covers it as well
+    // The penalty is forgotten if the address behaved well for as long as it had been refused.
     if (connection.entered >= last.until && now < last.until + last.length) {
       length = std::min(2 * last.length, kLongestPenalty * limits_.cut_penalty_ns);
     }
@@ -398,7 +401,7 @@ void Guard::Punish(const Connection& connection) {
 void Guard::Cut(const std::vector<Doomed>& doomed) {
   for (const Doomed& one : doomed) {
     one.wire->Cut();
-    one.wire->Arm();  // its end is told of, whether or not its bytes were taken meanwhile
+    one.wire->Arm();  // reports the end even if TakeBusy has disarmed it
     gate_.Log(Logger::Level::kWarn, "connection cut", one.name, one.why);
   }
 }

@@ -1,31 +1,36 @@
-// Cuts connections that cost more than a client may before it is trusted. gRPC parses headers, at any
-// length and price, before anybody can refuse them; what it is fed is what can be bounded.
+// Disconnects connections that use more resources than an unauthorised client may. gRPC parses
+// headers of any length at any cost before a service can reject them, so the input of gRPC has to
+// be limited.
 //
-//   greeting      what comes is not the beginning of a call (greeting.h): cut, before gRPC saw it
-//   bytes         more than unauthorised_bytes came: cut. Looked at whenever some come, at each
-//                 Look, when a call of it is answered, and when it ends
-//   time          unauthorised_limit_ns went by: cut. It stands still while a call waits for the
-//                 daemon's answer, as a core that is busy is no fault of the client's
-//   authorised    a call that authorises (call_watch.h) was answered: from then on bytes and time are
-//                 not limited any more. The answer of another, health's say, begins both anew
-//   cancelling    always: more calls than max_cancelled_calls_per_second ended without an answer
-//                 within a second: cut
-//   flooding      of the authorised: more bytes than messages and calls under way can have came, and
-//                 no call began and no message was whole: cut
+//   greeting      The first bytes are not the beginning of a call (greeting.h). gRPC never sees
+//                 them.
+//   bytes         More than unauthorised_bytes arrived. Checked when bytes arrive, at each Look,
+//                 when a call of the connection is answered, and when the connection ends.
+//   time          unauthorised_limit_ns has passed. The time stops while a call waits for the
+//                 daemon's answer, because a busy core is not the client's fault.
+//   authorised    Once a call that authorises (call_watch.h) is answered, bytes and time are no
+//                 longer limited. The answer of any other call, such as health, resets both.
+//   cancelling    Always checked: more than max_cancelled_calls_per_second calls ended without an
+//                 answer within a second.
+//   flooding      For authorised connections: more bytes arrived than messages and running calls
+//                 can have, and no call began and no message was completed.
 //
-// Looking takes time, so what is near a limit is cut as well: a sixteenth before the end of the time,
-// and where less than three sixteenths of the bytes are left for kGrace. Until it is authorised a
-// connection's receive buffer is small (Wire::Trust), so that little comes between a limit and the cut.
+// Checks take time, so connections are disconnected close to a limit: when a sixteenth of the time
+// is left, or when less than three sixteenths of the bytes have been left for kGrace. Until a
+// connection is authorised its receive buffer is small (Wire::Trust), so that few bytes can arrive
+// between the limit and the disconnect.
 //
-// The address of a connection that was cut, but for time or for room, is refused for a while: cut_penalty_ns, and
-// twice as long each time that it comes back and is cut again.
+// After a disconnect (except for time or for room) the address is refused for cut_penalty_ns, and
+// twice as long each time that it returns and is disconnected again.
 //
-// Where max_connections or max_connections_per_address are open, the unauthorised connection that has been idle longest is cut,
-// so that strangers who say nothing keep nobody away. Each has kFirstCall, in which to make its first call; meanwhile twice
-// as many may be open. Only where all are authorised or at work is a further one refused.
+// When max_connections or max_connections_per_address are open, the unauthorised connection that
+// has been idle longest is disconnected, so that silent strangers cannot exclude others. Each
+// connection has kFirstCall to make its first call; meanwhile twice as many may be open. A further
+// connection is refused only if all are authorised or active.
 //
-// Unix sockets, whose users the kernel names, are free of all this but the limits on connections:
-// gRPC has no names for them by which their calls could be told apart. Times are the clock's.
+// Unix sockets, whose users the kernel identifies, are exempt from all this except the limits on
+// connections: gRPC has no names for them by which their calls could be distinguished. Times are
+// those of the clock.
 #pragma once
 
 #include <cstdint>
@@ -49,85 +54,89 @@
 
 namespace voxeld::daemon::listen {
 
-// A connection's socket, as the guard needs it. Thread-safe.
+// A connection's socket, as used by the guard. Thread-safe.
 class Wire {
  public:
   virtual ~Wire() = default;
   virtual uint64_t BytesReceived() = 0;
-  virtual void Cut() = 0;    // at once, in both directions; what was received is thrown away
-  virtual void Trust() = 0;  // as much may come at once as with any other socket
-  // Guard::OnBytes is called once, when there are bytes to read, or Leave, when it has ended; again only
-  // after the next Arm. Until the first one that is so whenever some come.
+  virtual void Cut() = 0;    // immediately, in both directions; discards received data
+  virtual void Trust() = 0;  // sets the normal receive buffer
+  // Enables one report: Guard::OnBytes when bytes arrive, or Leave when the connection has ended;
+  // the next one requires another Arm. Before the first Arm, bytes are always reported.
   virtual void Arm() = 0;
 };
 
 using ConnectionId = uint64_t;
 
-// What gRPC says of a connection's calls, since it was accepted.
+// gRPC's counts of a connection's calls since it was accepted.
 struct CallFigures {
   uint64_t cancelled = 0;  // ended without an answer
-  uint64_t progress = 0;   // calls that began and messages that came: more is better
-  uint64_t open = 0;       // calls under way
+  uint64_t progress = 0;   // calls begun and messages completed; an increase is progress
+  uint64_t open = 0;       // running calls
 };
 
 // Thread-safe.
 class Guard {
  public:
-  // How often unauthorised connections are looked at.
+  // How often unauthorised connections are checked.
   static constexpr sync::TimeNs kLookInterval = 20 * sync::kMillisecond;
-  // Shorter than a system waits before it tries a closed window again (200 ms): a client that sends
-  // on before it is answered waits in its own system, and is not cut if the answer comes within it.
+  // Shorter than the time (200 ms) after which a system retries a closed window. A client that
+  // keeps sending before it is answered waits in its own system, and is not disconnected if the
+  // answer arrives in time.
   static constexpr sync::TimeNs kGrace = 100 * sync::kMillisecond;
-  static constexpr int64_t kLongestPenalty = 64;  // of cut_penalty_ns
+  static constexpr int64_t kLongestPenalty = 64;  // times cut_penalty_ns
   static constexpr sync::TimeNs kFirstCall = 200 * sync::kMillisecond;
   // Connections younger than kFirstCall may exceed a limit by this factor.
   static constexpr uint32_t kYoungBeyond = 2;
-  // Addresses that are refused at once; further ones replace those whose time is over first.
+  // Maximum number of refused addresses. Further ones replace those that expire first.
   static constexpr size_t kMostPenalties = 4096;
 
-  // All outlive the guard; `log` may be none.
+  // All arguments must outlive the guard; `log` may be null.
   Guard(const ConnectionLimits& limits, sync::Clock& clock, Counters& counters, Logger* log)
       : limits_(limits), clock_(clock), counters_(counters), gate_(clock, log) {}
 
-  // Of the first message of a first call: what unauthorised_bytes leaves it.
+  // Returns: the limit on the first message of a first call, derived from unauthorised_bytes.
   uint64_t most_first_message() const { return limits_.unauthorised_bytes / 4 * 3; }
 
-  // ---- from the listener
+  // ---- called by the listener
 
-  // Whether another connection of `peer` may be had, counted and logged: ResourceExhausted says
-  // which limit it would go beyond, Unavailable that its address is refused for a while. May cut another one to make room.
+  // Checks whether another connection of `peer` is allowed. Counts and logs refusals. May
+  // disconnect another connection to make room. Errors: ResourceExhausted with the exceeded limit,
+  // or Unavailable while the address is refused.
   absl::Status MayEnter(const Peer& peer);
-  // From accept on. `own`: the daemon's own, which counts against no limit but those of bytes and
-  // time.
+  // Adds an accepted connection. `own`: it is the daemon's own and counts only against the limits
+  // on bytes and time.
   ConnectionId Enter(const Peer& peer, bool own, std::unique_ptr<Wire> wire);
-  // What came is no beginning of a call, `why`: it is cut.
+  // Disconnects a connection that did not begin with a call, because of `why`.
   void OnWrongGreeting(ConnectionId id, const std::string& why);
-  // It has been closed. The wire goes.
+  // Removes a closed connection and destroys its wire.
   void Leave(ConnectionId id);
-  // Bytes came.
+  // Reports that bytes have arrived.
   void OnBytes(ConnectionId id);
-  // Looks at all unauthorised connections. When to look again; kNever if there are none.
+  // Checks all unauthorised connections. Returns: the time of the next check; kNever if there are
+  // no such connections.
   sync::TimeNs Look();
 
-  // ---- from the services: `peer` as PeerName gives it
+  // ---- called by the services: `peer` is the result of PeerName
 
-  // A call got its first message, and will answer it or end.
+  // Reports that a call has received its first message. The call will be answered or end.
   void OnMessage(const std::string& peer);
-  // It is about to be answered. `authorises`: for good; else bytes and time begin anew.
+  // Reports that a call is about to be answered. `authorises`: removes the limits on bytes and
+  // time; otherwise resets them.
   void OnAnswer(const std::string& peer, bool authorises);
-  // Of a call for which OnMessage was called.
+  // Reports the end of a call for which OnMessage was called.
   void OnCallEnd(const std::string& peer);
 
-  // Who looks at the calls of connections that get bytes; null: nobody. `on_busy` is called, with the
-  // guard's lock held, when TakeBusy has something after it had nothing.
+  // Sets the callback that announces connections with new bytes, or null. It is called with the
+  // guard's lock held when TakeBusy has something to return and had nothing before.
   void SetOnBusy(std::function<void()> on_busy);
   struct Busy {
     std::string peer;
-    uint64_t bytes = 0;  // in all
+    uint64_t bytes = 0;  // in total
   };
-  // Connections over TCP that have got bytes since they were taken last.
+  // Returns: the TCP connections that have received bytes since the last call.
   std::vector<Busy> TakeBusy();
-  // `bytes` as TakeBusy gave them, before the figures were asked for.
+  // `bytes` must be the value from TakeBusy, which was read before `figures`.
   void OnFigures(const Busy& busy, const CallFigures& figures);
 
  private:
@@ -138,48 +147,49 @@ class Guard {
     std::shared_ptr<Wire> wire;
     sync::TimeNs entered = 0;
     sync::TimeNs since = 0;  // accepted, or a call ended or was answered without authorising it
-    uint64_t base = 0;       // bytes that had come by then, if it was answered
-    uint32_t waiting = 0;    // calls that the daemon has yet to answer
+    uint64_t base = 0;       // bytes received by then, if a call was answered
+    uint32_t waiting = 0;    // calls that the daemon has not answered yet
     bool watched = false;    // not authorised yet
     bool answered = false;   // a call was answered that does not authorise it
     bool cut = false;
     bool counted = false;  // against the limits
     bool authorised = false;
-    sync::TimeNs many_since = sync::kNever;  // few of the bytes are left
-    // The second in which cancelled calls are counted, and those before it.
+    sync::TimeNs many_since = sync::kNever;  // since when few of the bytes have been left
+    // The start of the second in which cancelled calls are counted, and their number before it.
     sync::TimeNs cancelled_since = 0;
     uint64_t cancelled_before = 0;
-    // When something last came of the bytes.
+    // State of the call counts and bytes at the last progress.
     uint64_t progress = 0, progress_bytes = 0;
   };
   struct Penalty {
     sync::TimeNs length = 0, until = 0;
   };
-  // Connections that count against a limit.
+  // Numbers of connections that count against a limit.
   struct Counted {
     uint32_t open = 0, authorised = 0;
   };
-  // A connection that is to be cut when the lock is free.
+  // A connection to disconnect after the lock is released.
   struct Doomed {
     std::shared_ptr<Wire> wire;
     std::string name, why;
   };
 
   Connection* Find(const std::string& peer) VOXELD_REQUIRES(mutex_);
-  // Whether its bytes are too many: then it is doomed. `ended`: there will be no later look.
+  // Returns: whether the connection has received too many bytes; it is then doomed. `ended`: there
+  // will be no later check.
   bool BytesAreMany(Connection& connection, bool ended, std::vector<Doomed>& doomed)
       VOXELD_REQUIRES(mutex_);
   void MarkBusy(const Connection& connection) VOXELD_REQUIRES(mutex_);
   void Uncount(Connection& connection) VOXELD_REQUIRES(mutex_);
   Counted CountOf(const std::string& address) const VOXELD_REQUIRES(mutex_);
-  // Returns: whether another connection has no place. `address`: its address if the limit is for one address; empty: the limit is
-  // for all.
+  // Returns: whether there is no place for another connection. `address`: its address if the limit
+  // is for one address; empty: the limit is for all.
   bool IsFull(const Counted& counted, uint32_t limit, const std::string& address,
               std::vector<Doomed>& doomed) VOXELD_REQUIRES(mutex_);
-  // Cuts the unauthorised connection that has been idle longest, of `address` or (empty) of all. Returns: false if none has had its
-  // time for a first call.
+  // Disconnects the unauthorised connection that has been idle longest, of `address` or (empty) of
+  // all. Returns: false if all are still within the time for their first call.
   bool MakeRoom(const std::string& address, std::vector<Doomed>& doomed) VOXELD_REQUIRES(mutex_);
-  // Cuts connections until no limit is exceeded, as far as that is possible yet.
+  // Disconnects connections until no limit is exceeded, as far as kFirstCall permits.
   void MakeAllRoom(std::vector<Doomed>& doomed) VOXELD_REQUIRES(mutex_);
   void Doom(Connection& connection, Counters::Count& counter, std::string why, bool punished,
             std::vector<Doomed>& doomed) VOXELD_REQUIRES(mutex_);
@@ -197,7 +207,7 @@ class Guard {
   std::set<ConnectionId> busy_ VOXELD_GUARDED_BY(mutex_);
   std::function<void()> on_busy_ VOXELD_GUARDED_BY(mutex_);
   std::unordered_map<std::string, ConnectionId> by_name_ VOXELD_GUARDED_BY(mutex_);
-  // Of those that count against limits.
+  // Counts of connections by address.
   std::unordered_map<std::string, Counted> by_address_ VOXELD_GUARDED_BY(mutex_);
   std::map<std::string, Penalty> penalties_ VOXELD_GUARDED_BY(mutex_);
   Counted counted_ VOXELD_GUARDED_BY(mutex_);

@@ -23,12 +23,12 @@
 namespace voxeld::daemon::listen {
 namespace {
 
-// epoll's words: listening sockets have those from 1 on, connections those from kConnections on.
+// Values of epoll events: listening sockets use 1 and up, connections kConnections and up.
 constexpr uint64_t kWake = 0, kConnections = uint64_t{1} << 32;
 constexpr int kEvents = 64;
-constexpr int kAcceptsAtOnce = 64;  // of one address, before others have their turn
+constexpr int kAcceptsAtOnce = 64;  // per address, before other addresses have their turn
 
-// What one connection's failure before it was accepted looks like; the next one may be well.
+// Returns: whether the error concerns only one connection that failed before it was accepted.
 bool OfOneConnection(int error) {
   switch (error) {
     case EINTR:
@@ -160,10 +160,11 @@ class Listener::Impl {
     Greet(stranger, (event.events & EPOLLRDHUP) != 0);
   }
 
-  // So that a connection whose second descriptor cannot be had is the last one, and not lost.
+  // Reserves a descriptor, so that the last connection that can be accepted also gets its second
+  // descriptor and is not lost.
   bool Reserve() {
     rlimit limit = {};
-    // A number beyond the limit, which was lowered meanwhile, gives nobody a place.
+    // If the limit was lowered, a reserved number beyond it cannot be reused.
     if (reserve_.ok() && getrlimit(RLIMIT_NOFILE, &limit) == 0 &&
         static_cast<rlim_t>(reserve_.get()) >= limit.rlim_cur) {
       reserve_.Reset(-1);
@@ -196,14 +197,14 @@ class Listener::Impl {
     return Descriptor(fcntl(descriptor, F_DUPFD_CLOEXEC, 0));
   }
 
-  // False: the listener pauses.
+  // Takes an accepted connection. Returns: false if the listener pauses.
   bool Take(const ListeningSocket& socket, const SocketName& name, Descriptor connection) {
     Peer peer = PeerOf(name.address, name.length);
     const bool own = own_.Has(peer.name);
     Accepted accepted{.listening = socket.descriptor(), .tls = socket.address().tls};
     if (peer.unix_socket) {
       const absl::StatusOr<PeerCredentials> who = CredentialsOf(connection.get());
-      if (!who.ok()) return true;  // it is gone
+      if (!who.ok()) return true;  // the client has gone
       peer.address = absl::StrCat("user ", who->user);
       accepted.user = who->user;
       if (!own) {
@@ -232,7 +233,7 @@ class Listener::Impl {
       return false;
     }
     const absl::StatusOr<ConnectionId> id = watcher_->Add(peer, own, std::move(second));
-    if (!id.ok()) {  // unguarded it would be worse than refused
+    if (!id.ok()) {  // an unguarded connection would be worse than a refused one
       Pause(std::string(id.status().message()));
       return false;
     }
@@ -247,23 +248,24 @@ class Listener::Impl {
     const auto stranger =
         strangers_.try_emplace(*id, accepted, std::move(connection), guard_.most_first_message())
             .first;
-    // What has come already is an edge as well.
+    // Data that has already arrived triggers an edge as well.
     if (!Watch(descriptor, EPOLLIN | EPOLLRDHUP | EPOLLET, kConnections + *id)) Drop(stranger);
     return true;
   }
 
-  // A connection over TCP of which no call has begun.
+  // A TCP connection on which no call has begun.
   struct Stranger {
     Stranger(const Accepted& accepted, Descriptor connection, uint64_t most_message)
         : accepted(accepted), connection(std::move(connection)), greeting(most_message) {}
     Accepted accepted;
     Descriptor connection;
     Greeting greeting;
-    bool answered = false;  // with the daemon's SETTINGS
+    bool answered = false;  // the daemon's SETTINGS were sent
   };
   using Strangers = std::map<ConnectionId, Stranger>;
 
-  // Something came. `over`: nothing more will. What was read stays, for whoever serves it.
+  // Reads what has arrived. `over`: nothing more will arrive. The bytes stay in the socket for the
+  // server.
   void Greet(Strangers::iterator at, bool over) {
     Stranger& stranger = at->second;
     const int descriptor = stranger.connection.get();
@@ -301,7 +303,7 @@ class Listener::Impl {
     serve_(accepted, std::move(connection));
   }
 
-  // The guard's descriptor is closed when the watcher sees the end.
+  // Closes the connection. The guard's descriptor is closed when the watcher sees the end.
   void Drop(Strangers::iterator at) {
     const int descriptor = at->second.connection.get();
     epoll_ctl(epoll_.get(), EPOLL_CTL_DEL, descriptor, nullptr);
@@ -375,13 +377,13 @@ class Listener::Impl {
   bool deaf_ VOXELD_GUARDED_BY(mutex_) = false;
   bool sockets_closed_ VOXELD_GUARDED_BY(mutex_) = false;
 
-  // The thread's own.
+  // Used by the listener's thread only.
   std::vector<ListeningSocket> sockets_;
   Strangers strangers_;
   Descriptor reserve_;
   sync::TimeNs retry_ = sync::kNever;
-  bool paused_ = false;  // during Resume: again
-  // Refused since `refusing_since_`; addresses that are not listened to until `rest_until_`.
+  bool paused_ = false;  // accepting failed again during Resume
+  // Refusals since `refusing_since_`. Some addresses rest until `rest_until_`.
   int refusals_ = 0;
   sync::TimeNs refusing_since_ = 0, rest_until_ = sync::kNever;
   std::vector<bool> resting_;

@@ -1,11 +1,12 @@
-// The daemon's own listener: accepts on every address and hands connections to whoever serves them.
-// gRPC's own gives up for good when descriptors run out once, and has no limits.
+// The daemon's own listener accepts connections on every address and hands them to a server. gRPC's
+// listener stops for good once descriptors run out, and has no limits.
 //
-//   out of descriptors   clients wait in the system's queue; the listener tries again every kRetry
-//   over a limit         closed at once, counted, logged (guard.h); when many are, an address is left
-//                        alone for the rest of kRefusalInterval, so that they cost others little
-//   over TCP             kept here until a call begins (greeting.h), and only then served
-//   the rest             under the guard until it is closed
+//   out of descriptors   Clients wait in the system's queue; the listener retries every kRetry.
+//   over a limit         The connection is closed at once, counted and logged (guard.h). After many
+//                        refusals the address rests for the remainder of kRefusalInterval, so that
+//                        they cost other clients little.
+//   over TCP             The listener keeps connections until a call begins (greeting.h).
+//   the rest             Stays under the guard until it is closed.
 #pragma once
 
 #include <functional>
@@ -25,7 +26,7 @@
 
 namespace voxeld::daemon::listen {
 
-// Names (PeerOf) of sockets that the daemon connects with to itself. Thread-safe.
+// Names (PeerOf) of sockets with which the daemon connects to itself. Thread-safe.
 class OwnPeers {
  public:
   void Add(const std::string& name) {
@@ -46,44 +47,45 @@ class OwnPeers {
   std::set<std::string> names_ VOXELD_GUARDED_BY(mutex_);
 };
 
-// What is known of an accepted connection.
+// Properties of an accepted connection.
 struct Accepted {
-  int listening = -1;            // the socket that it came to
-  bool tls = false;              // what it speaks
-  std::optional<uint32_t> user;  // of a unix socket: whose it is, by the kernel's word
+  int listening = -1;            // the socket that accepted it
+  bool tls = false;              // whether it uses TLS
+  std::optional<uint32_t> user;  // user of a unix socket, according to the kernel
 };
 
-// Takes an accepted connection, whose descriptor is non-blocking and now theirs. False: it was closed,
-// as nobody can serve it. Called on the listener's thread.
+// Takes ownership of an accepted connection, whose descriptor is non-blocking. Returns: false if it
+// was closed because no server can take it. Called on the listener's thread.
 using Serve = std::function<bool(const Accepted& accepted, Descriptor connection)>;
 
 struct ListenerOptions {
-  // A connection whose other end does not acknowledge what is sent is given up after it.
+  // A connection is closed if its other end does not acknowledge sent data within this time.
   sync::TimeNs send_limit_ns = 10 * sync::kSecond;
-  Logger* log = nullptr;  // outlives the listener; may be none
+  Logger* log = nullptr;  // outlives the listener; may be null
 };
 
-// Thread-safe. Waits are the system's, as sockets know no other; all else goes by the clock.
+// Thread-safe. Socket timeouts use system time; all other times are those of the clock.
 class Listener {
  public:
   static constexpr sync::TimeNs kRetry = 100 * sync::kMillisecond;
-  // So many are refused in an interval; those beyond wait in the system's queue, and with them
-  // whoever comes after them.
+  // Refusals per interval. Further connections wait in the system's queue, together with all that
+  // follow them.
   static constexpr int kRefusals = 16;
   static constexpr sync::TimeNs kRefusalInterval = 10 * sync::kMillisecond;
 
-  // `guard`, `counters`, `own` and the clock outlive the listener. Accepts from now on, on a thread
-  // of its own.
+  // Starts accepting on a separate thread. `guard`, `counters`, `own` and the clock must outlive
+  // the listener.
   static absl::StatusOr<std::unique_ptr<Listener>> Start(std::vector<ListeningSocket> sockets,
                                                          Guard& guard, Counters& counters,
                                                          const OwnPeers& own, sync::Clock& clock,
                                                          Serve serve, ListenerOptions options);
-  // Lets go of the connections; whoever serves them goes on.
+  // Drops its connections; those that a server has taken continue.
   ~Listener();
   Listener(const Listener&) = delete;
   Listener& operator=(const Listener&) = delete;
 
-  // Closes the listening sockets. When it returns `serve` will not be called again; the guard goes on.
+  // Closes the listening sockets. `serve` is not called again after this returns; the guard
+  // continues.
   void StopAccepting();
 
  private:

@@ -1,4 +1,5 @@
-// Log lines whose number clients decide: at most so many a second, and how many were left out.
+// Limits log lines whose number clients control: writes at most a few per second and counts the
+// dropped ones.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,7 @@ class LogGate {
  public:
   static constexpr uint32_t kLinesPerSecond = 10;
 
-  // `clock` and `log`, which may be none, outlive the gate.
+  // `clock` and `log` must outlive the gate; `log` may be null.
   LogGate(sync::Clock& clock, Logger* log) : clock_(clock), log_(log) {}
 
   void Log(Logger::Level level, std::string_view event, const std::string& peer,

@@ -14,7 +14,7 @@
 namespace voxeld::daemon::listen {
 namespace {
 
-constexpr size_t kSubscriberPrefixBytes = 8;  // what one subscriber usually has: a /64
+constexpr size_t kSubscriberPrefixBytes = 8;  // a subscriber usually has a /64
 constexpr size_t kMappedBytes = 12;
 
 std::string Number(int family, const void* bytes) {

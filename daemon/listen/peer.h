@@ -1,4 +1,4 @@
-// Who is at the other end of a connection.
+// Identifies the other end of a connection.
 #pragma once
 
 #include <sys/socket.h>
@@ -10,19 +10,19 @@
 namespace voxeld::daemon::listen {
 
 struct Peer {
-  // One connection: "ipv4:192.0.2.1:40000", "ipv6:[2001:db8::1]:40000"; of a unix socket "unix:"
-  // and the name that its client gave it, mostly none.
+  // Name of one connection: "ipv4:192.0.2.1:40000", "ipv6:[2001:db8::1]:40000"; for a unix socket
+  // "unix:" and the client's socket name, which is mostly empty.
   std::string name;
-  // Whom it is counted with: "192.0.2.1", "2001:db8:0:0::/64", "user 1000". For a unix socket set by
-  // whoever asked the kernel.
+  // Key for limits per address: "192.0.2.1", "2001:db8:0:0::/64", "user 1000". For a unix socket
+  // the caller sets it after asking the kernel.
   std::string address;
   bool unix_socket = false;
 };
 
-// An IPv4 number that is written as an IPv6 one is an IPv4 number.
+// Returns: the peer. An IPv4-mapped IPv6 address becomes an IPv4 address.
 Peer PeerOf(const sockaddr_storage& address, socklen_t length);
 
-// A name as gRPC writes it (percent-encoded: "ipv6:%5B::1%5D:40000") as PeerOf does.
+// Converts gRPC's percent-encoded name ("ipv6:%5B::1%5D:40000") to the form of PeerOf.
 std::string PeerName(std::string_view grpc_peer);
 
 }  // namespace voxeld::daemon::listen

@@ -22,7 +22,7 @@ namespace {
 
 using std::chrono::steady_clock;
 
-// HTTP/2 (RFC 9113): a frame's head is 24 bits of length, type, flags, 31 bits of stream.
+// HTTP/2 (RFC 9113): a frame header has 24 bits of length, type, flags and 31 bits of stream.
 constexpr size_t kFrameHeadBytes = 9;
 constexpr char kDataFrame = 0, kHeadersFrame = 1, kSettingsFrame = 4, kGoAwayFrame = 7;
 constexpr char kEndStreamFlag = 1, kEndHeadersFlag = 4;
@@ -43,7 +43,7 @@ void AddFrame(char type, char flags, char stream, std::string_view payload, std:
   out->append(payload);
 }
 
-// A field as a literal that is not kept (RFC 7541, 6.2.2); both texts are short.
+// Adds a literal field without indexing (RFC 7541, 6.2.2). Requires: both texts are short.
 void AddField(std::string_view name, std::string_view value, std::string* out) {
   out->push_back('\0');
   for (const std::string_view text : {name, value}) {
@@ -52,7 +52,7 @@ void AddField(std::string_view name, std::string_view value, std::string* out) {
   }
 }
 
-// grpc.health.v1.Health/Check with an empty request, on stream 1.
+// Returns: a call of grpc.health.v1.Health/Check with an empty request, on stream 1.
 std::string HealthCheck() {
   std::string fields;
   AddField(":method", "POST", &fields);
@@ -83,14 +83,14 @@ class Attempt {
     return error == 0 ? absl::OkStatus() : absl::ErrnoToStatus(error, "connect");
   }
 
-  // Until the daemon has shown its certificate, or has answered with an alert.
+  // Does the handshake until the daemon has sent its certificate or an alert.
   absl::Status ShakeHands() {
     const std::unique_ptr<SSL_CTX, decltype(&SSL_CTX_free)> context(
         SSL_CTX_new(TLS_client_method()), &SSL_CTX_free);
     if (context == nullptr) return absl::ResourceExhaustedError("TLS");
     constexpr unsigned char kHttp2[] = {2, 'h', '2'};
     SSL_CTX_set_alpn_protos(context.get(), kHttp2, sizeof(kHttp2));
-    SSL_CTX_set_verify(context.get(), SSL_VERIFY_NONE, nullptr);  // it is our own
+    SSL_CTX_set_verify(context.get(), SSL_VERIFY_NONE, nullptr);  // the daemon's own certificate
     const std::unique_ptr<SSL, decltype(&SSL_free)> ssl(SSL_new(context.get()), &SSL_free);
     if (ssl == nullptr || SSL_set_fd(ssl.get(), descriptor_) != 1) {
       return absl::ResourceExhaustedError("TLS");
@@ -106,7 +106,7 @@ class Attempt {
         case SSL_ERROR_WANT_WRITE:
           if (absl::Status status = Await(POLLOUT); !status.ok()) return status;
           break;
-        case SSL_ERROR_SSL:  // it speaks TLS, and did not like us
+        case SSL_ERROR_SSL:  // an alert: the address speaks TLS and rejected the probe
           return absl::OkStatus();
         default:
           return absl::UnavailableError("the connection was closed without an answer");
@@ -156,7 +156,7 @@ class Attempt {
   const steady_clock::time_point end_;
 };
 
-// Where a client of this machine finds what listens on `name`.
+// Returns: the address at which a client on this machine reaches the socket `name`.
 SocketName Near(SocketName name) {
   if (name.address.ss_family == AF_INET) {
     auto* v4 = reinterpret_cast<sockaddr_in*>(&name.address);
@@ -168,8 +168,8 @@ SocketName Near(SocketName name) {
   return name;
 }
 
-// A name of the socket's own, so that the listener knows it: any port, or any name of a unix socket
-// that the kernel chooses.
+// Binds the socket to any port, or to any unix socket name that the kernel chooses, so that the
+// listener recognises it. Returns: its name.
 absl::StatusOr<std::string> BindAnywhere(int descriptor, const SocketName& target) {
   SocketName name = target;
   if (name.address.ss_family == AF_INET) {

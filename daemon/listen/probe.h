@@ -1,6 +1,6 @@
-// Whether the daemon can be reached at all: it connects to each of its own addresses, as a client
-// would, and asks for its health. A process that lives, and answers on connections that are open, may
-// have long been deaf to new ones.
+// Checks whether the daemon is reachable: connects to each of its addresses like a client and asks
+// for its health. A process that runs and answers on open connections may still no longer accept
+// new ones.
 #pragma once
 
 #include <functional>
@@ -20,32 +20,34 @@
 namespace voxeld::daemon::listen {
 
 struct ProbeTarget {
-  SocketName name;   // that a listening socket has
+  SocketName name;   // of a listening socket
   std::string text;  // for people
-  bool tls = false;  // what it speaks
+  bool tls = false;  // whether it uses TLS
 };
 
-// Connects (to itself, if `target` is every address), asks for the health over HTTP/2, waits for the
-// beginning of an answer; over TLS, for which it has no certificate that is trusted, for that of the
-// handshake. The socket is among `own` while it is open. Blocks, `limit` at most.
+// Connects (to this machine if `target` is a wildcard address), asks for health over HTTP/2 and
+// waits for the beginning of an answer. Over TLS it waits only for the handshake to begin, because
+// it has no trusted certificate. The socket is registered in `own` while it is open. Blocks for at
+// most `limit`.
 absl::Status Reach(const ProbeTarget& target, OwnPeers& own, sync::TimeNs limit);
 
-// Asks every interval, by the clock, on a thread of its own. Thread-safe.
+// Probes every interval of the clock, on a separate thread. Thread-safe.
 class Probe {
  public:
-  // So many in a row of one address make it unreachable; one that succeeds makes it well.
+  // An address is unreachable after this many consecutive failures, and reachable after one
+  // success.
   static constexpr int kFailures = 2;
   static constexpr sync::TimeNs kLimit = 2 * sync::kSecond;  // for one address
 
-  using Try = std::function<absl::Status(const ProbeTarget& target)>;  // mostly Reach
-  // On the probe's thread, when it changes.
+  using Try = std::function<absl::Status(const ProbeTarget& target)>;  // normally Reach
+  // Called on the probe's thread when the state changes.
   using OnChange = std::function<void(bool reachable)>;
 
-  // `counters`, the clock and `log`, which may be none, outlive the probe.
+  // `counters`, the clock and `log` must outlive the probe; `log` may be null.
   Probe(std::vector<ProbeTarget> targets, sync::TimeNs interval, Try attempt, OnChange on_change,
         Counters& counters, sync::Clock& clock, Logger* log);
-  ~Probe();  // waits for an attempt that is under way
-  // No further attempt, and nobody is told what becomes of the present one. Does not wait.
+  ~Probe();  // waits for a running attempt
+  // Starts no further attempt and discards the result of the current one. Does not block.
   void Stop();
   Probe(const Probe&) = delete;
   Probe& operator=(const Probe&) = delete;
@@ -62,7 +64,7 @@ class Probe {
   Counters& counters_;
   sync::Clock& clock_;
   Logger* const log_;
-  std::vector<int> failures_;  // in a row, of each target; the thread's own
+  std::vector<int> failures_;  // consecutive, for each target; used by the probe's thread only
   bool reachable_ = true;
   sync::Mutex mutex_;
   sync::CondVar changed_;

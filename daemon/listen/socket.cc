@@ -2,7 +2,7 @@
 
 #include <arpa/inet.h>
 #include <fcntl.h>
-#include <linux/tcp.h>  // tcp_info with bytes_received, which glibc's has not
+#include <linux/tcp.h>  // tcp_info with bytes_received, which glibc's header lacks
 #include <netdb.h>
 #include <netinet/in.h>
 #include <sys/stat.h>
@@ -23,8 +23,8 @@ namespace {
 
 constexpr mode_t kSocketMode = 0660;
 constexpr size_t kDiscardBytes = 1u << 20;
-constexpr int kBufferLock = 72;       // SO_BUF_LOCK, which glibc's headers have not
-constexpr int kFixedBytes = 4 << 20;  // of a buffer that the system cannot adjust
+constexpr int kBufferLock = 72;       // SO_BUF_LOCK, which glibc's headers lack
+constexpr int kFixedBytes = 4 << 20;  // for a buffer that the system cannot adjust
 
 absl::Status Failed(int error, const Address& address) {
   if (error == EADDRINUSE) {
@@ -39,7 +39,7 @@ void Set(int descriptor, int level, int option, int value) {
   setsockopt(descriptor, level, option, &value, sizeof(value));
 }
 
-// Since Linux 5.14.
+// Lets the system adjust the receive buffer again. Requires Linux 5.14.
 bool LetBufferGo(int descriptor) {
   const int none = 0;
   return setsockopt(descriptor, SOL_SOCKET, kBufferLock, &none, sizeof(none)) == 0;
@@ -136,7 +136,7 @@ absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::ListenUnix(const A
     made.inode_ = found.st_ino;
   }
   made.address_ = address;
-  // Nobody can connect before listen().
+  // Clients cannot connect before listen().
   if (chmod(address.path.c_str(), kSocketMode) != 0 ||
       ::listen(made.descriptor(), SOMAXCONN) != 0) {
     return Failed(errno, address);
@@ -166,16 +166,17 @@ absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::ListenTcp(const Ad
     ListeningSocket made;
     made.descriptor_.Reset(
         socket(at->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, at->ai_protocol));
-    if (!made.descriptor_.ok()) continue;  // no IPv6 here, say
+    if (!made.descriptor_.ok()) continue;  // for example, without IPv6
     const int descriptor = made.descriptor();
     Set(descriptor, SOL_SOCKET, SO_REUSEADDR, 1);
-    // Its connections begin with this buffer. Were it not let go, they could never have a great window.
+    // Connections inherit this buffer size. If the size stayed locked, they could never get a large
+    // window.
     if (LetBufferGo(descriptor)) {
       Set(descriptor, SOL_SOCKET, SO_RCVBUF, SocketWire::kUnreadBytes);
       LetBufferGo(descriptor);
     }
     if (at->ai_family == AF_INET6) {
-      // [::] is every address of this machine, as everywhere.
+      // [::] means every address of this machine, including IPv4.
       Set(descriptor, IPPROTO_IPV6, IPV6_V6ONLY,
           IN6_IS_ADDR_UNSPECIFIED(&reinterpret_cast<sockaddr_in6*>(at->ai_addr)->sin6_addr) ? 0
                                                                                             : 1);
@@ -217,7 +218,7 @@ void SocketWire::Trust() {
   if (!tcp_) return;
   const int descriptor = descriptor_.get();
   Set(descriptor, SOL_SOCKET, SO_RCVBUF, kTrustedBytes);
-  // A size that was set is not adjusted any more, unless it is let go.
+  // The system does not adjust a size that was set explicitly unless it is unlocked.
   if (!LetBufferGo(descriptor)) Set(descriptor, SOL_SOCKET, SO_RCVBUF, kFixedBytes);
   Set(descriptor, IPPROTO_TCP, TCP_WINDOW_CLAMP, std::numeric_limits<int>::max() / 2);
 }
@@ -225,20 +226,22 @@ void SocketWire::Trust() {
 uint64_t SocketWire::BytesReceived() {
   tcp_info info = {};
   socklen_t length = sizeof(info);
-  // A unix socket has none.
+  // A unix socket has no such count.
   if (getsockopt(descriptor_.get(), IPPROTO_TCP, TCP_INFO, &info, &length) != 0) return 0;
   return info.tcpi_bytes_received;
 }
 
 void SocketWire::Cut() {
-  // Resets the connection at once, whoever else has it open, and throws away what was received.
+  // Resets the connection at once, even if other descriptors refer to it, and discards received
+  // data.
   const sockaddr nobody = {.sa_family = AF_UNSPEC, .sa_data = {}};
   if (connect(descriptor_.get(), &nobody, sizeof(nobody)) == 0) return;
-  // The last to close it resets it: no waiting for a client that still sends.
+  // The last descriptor to close resets the connection, without waiting for a client that still
+  // sends.
   const linger reset = {.l_onoff = 1, .l_linger = 0};
   setsockopt(descriptor_.get(), SOL_SOCKET, SO_LINGER, &reset, sizeof(reset));
   shutdown(descriptor_.get(), SHUT_RDWR);
-  // Else whoever serves the connection would still read and parse what is here.
+  // Otherwise the server would still read and parse the remaining data.
   while (recv(descriptor_.get(), nullptr, kDiscardBytes, MSG_TRUNC | MSG_DONTWAIT) > 0) {
   }
 }

@@ -1,4 +1,4 @@
-// Sockets of the system: those that listen, and what can be asked of a connection.
+// Wraps listening sockets and the properties of a connection's socket.
 #pragma once
 
 #include <sys/socket.h>
@@ -22,18 +22,19 @@ struct SocketName {
   sockaddr* get() { return reinterpret_cast<sockaddr*>(&address); }
 };
 
-// A socket that listens, non-blocking. Removes the file of a unix socket when it goes, if it still is
-// the one that was made.
+// A non-blocking listening socket. Its destructor removes the file of a unix socket if that is
+// still the one that was created.
 class ListeningSocket {
  public:
-  // One for each number that the address' host has (one is enough; all have the same port), or the
-  // one unix socket, mode 0660 from before anybody can connect. AlreadyExists if somebody listens
-  // there. `type`: a unix socket's, SOCK_STREAM or SOCK_SEQPACKET.
+  // Returns: one socket per address of the host (one success is enough; all have the same port), or
+  // one unix socket, which has mode 0660 before clients can connect. `type`: of a unix socket,
+  // SOCK_STREAM or SOCK_SEQPACKET. Errors: AlreadyExists if another server listens there.
   static absl::StatusOr<std::vector<ListeningSocket>> Listen(const Address& address,
                                                              int type = SOCK_STREAM);
 
-  // One that was open when the process began and listens for streams; whoever made it keeps it, and a unix
-  // socket's file. `tls`: what its connections speak. InvalidArgument if it is something else.
+  // Adopts an inherited listening stream socket. The creator keeps the socket, and the file of a
+  // unix socket. `tls`: whether its connections use TLS. Errors: InvalidArgument if it is anything
+  // else.
   static absl::StatusOr<ListeningSocket> Adopt(Descriptor descriptor, bool tls);
 
   ListeningSocket(ListeningSocket&&) = default;
@@ -41,7 +42,7 @@ class ListeningSocket {
   ~ListeningSocket();
 
   int descriptor() const { return descriptor_.get(); }
-  const SocketName& name() const { return name_; }  // with the port that was chosen
+  const SocketName& name() const { return name_; }  // with the chosen port
   const Address& address() const { return address_; }
 
  private:
@@ -56,23 +57,22 @@ class ListeningSocket {
   ino_t inode_ = 0;
 };
 
-// A connection's socket under a descriptor of its own: whoever serves the connection may close
-// theirs at any time.
+// A second descriptor of a connection's socket, so that the server may close its own at any time.
 //
-// Over TCP its receive buffer is small until it is trusted: what a stranger sends waits in its own
-// system. Sizes are as SO_RCVBUF has them; the system doubles them.
+// Over TCP the receive buffer is small until the connection is trusted, so that a stranger's data
+// waits in the stranger's system. Sizes are values of SO_RCVBUF; the system doubles them.
 class SocketWire : public Wire {
  public:
-  // While nobody reads: a listening socket hands it to its connections.
+  // Buffer before a server reads: connections inherit it from the listening socket.
   static constexpr int kUnreadBytes = 32 << 10;
-  // When somebody does: less than half of the window that was offered first, so that a sender's system
-  // waits for the next one, 200 ms, before it sends a little.
+  // Buffer once a server reads: less than half of the first window, so that the sender's system
+  // waits 200 ms for the next window before it sends small segments.
   static constexpr int kReadBytes = 6 << 10;
-  // What Linux begins with, and adjusts.
+  // Linux's initial value, which it adjusts.
   static constexpr int kTrustedBytes = 64 << 10;
 
   SocketWire(Descriptor descriptor, bool tcp);
-  // From now on somebody reads what comes on `descriptor`, a connection over TCP.
+  // Sets kReadBytes on `descriptor`, a TCP connection that a server is about to read.
   static void Narrow(int descriptor);
   int descriptor() const { return descriptor_.get(); }
   uint64_t BytesReceived() override;
@@ -84,7 +84,7 @@ class SocketWire : public Wire {
   const bool tcp_;
 };
 
-// Who made the connected unix socket, by the kernel's word.
+// The user and process of a connected unix socket's peer, according to the kernel.
 struct PeerCredentials {
   uid_t user = 0;
   pid_t process = 0;

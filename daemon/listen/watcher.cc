@@ -17,7 +17,7 @@
 namespace voxeld::daemon::listen {
 namespace {
 
-constexpr ConnectionId kWakeConnection = 0;  // epoll's word; no connection has it
+constexpr ConnectionId kWakeConnection = 0;  // value of epoll events; no connection has it
 constexpr int kWatcherEvents = 64;
 
 bool Control(int operation, int epoll, int descriptor, uint32_t events, ConnectionId word) {
@@ -27,10 +27,11 @@ bool Control(int operation, int epoll, int descriptor, uint32_t events, Connecti
   return epoll_ctl(epoll, operation, descriptor, &event) == 0;
 }
 
-// Connections that epoll tells nothing of any more. Wires may outlive the watcher.
+// Connections that epoll no longer reports. Wires may outlive the watcher, so they share this
+// object.
 class Unwatched {
  public:
-  Descriptor wake;  // an eventfd of the watcher's thread
+  Descriptor wake;  // eventfd of the watcher's thread
 
   void Wake() const {
     const uint64_t one = 1;
@@ -56,13 +57,15 @@ class WatchedWire final : public SocketWire {
   WatchedWire(Descriptor descriptor, bool tcp, int epoll, std::shared_ptr<Unwatched> unwatched)
       : SocketWire(std::move(descriptor), tcp), epoll_(epoll), unwatched_(std::move(unwatched)) {}
   void SetWord(ConnectionId word) { word_ = word; }
-  // With it the end is told of once as well: whoever lets it be armed arms it again.
+  // EPOLLONESHOT applies to the end of the connection too: it is reported only while the wire is
+  // armed.
   void Arm() override {
     if (Rearm()) return;
-    // Add is about to watch it: by the name of one before it, it was answered before that.
+    // Add has not registered this descriptor yet. The guard found the wire by the name of an
+    // earlier connection, whose call was answered before.
     if (errno == ENOENT) return;
     if (Rearm()) return;
-    // Nobody would be told of its end, so it ends here.
+    // The end would not be reported, so disconnect now.
     Cut();
     unwatched_->Add(word_);
   }
@@ -110,21 +113,21 @@ class Watcher::Impl {
     ConnectionId id = 0;
     auto wire = std::make_unique<WatchedWire>(std::move(connection), !peer.unix_socket,
                                               epoll_.get(), unwatched_);
-    WatchedWire* const watched = wire.get();  // the guard's, until Leave below or on the thread
+    WatchedWire* const watched = wire.get();  // the guard's until Leave, here or on the thread
     {
       sync::MutexLock lock(mutex_);
       id = guard_.Enter(peer, own, std::move(wire));
       watched->SetWord(id);
       connections_.insert(id);
     }
-    // Edges alone; of the end epoll always tells.
+    // Edge-triggered; epoll always reports the end.
     const uint32_t events = peer.unix_socket ? EPOLLET : EPOLLET | EPOLLIN;
     if (!Control(EPOLL_CTL_ADD, epoll_.get(), descriptor, events, id)) {
       const int error = errno;
       Leave(id);
       return absl::ErrnoToStatus(error, "watching a connection");
     }
-    unwatched_->Wake();  // what is looked at may just have begun
+    unwatched_->Wake();  // the thread may have to begin its checks
     return id;
   }
 
@@ -179,7 +182,7 @@ class Watcher::Impl {
   const std::shared_ptr<Unwatched> unwatched_ = std::make_shared<Unwatched>();
   sync::Mutex mutex_;
   bool stop_ VOXELD_GUARDED_BY(mutex_) = false;
-  // That have entered and not left.
+  // Connections that have entered and not left.
   std::unordered_set<ConnectionId> connections_ VOXELD_GUARDED_BY(mutex_);
   std::thread thread_;
 };

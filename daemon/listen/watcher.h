@@ -1,5 +1,5 @@
-// Looks at guarded connections, on a thread of its own: nothing that accepting and serving them
-// involves may hold it up.
+// Watches guarded connections on a separate thread, so that accepting and serving them never delays
+// it.
 #pragma once
 
 #include <memory>
@@ -12,17 +12,17 @@
 
 namespace voxeld::daemon::listen {
 
-// Thread-safe. Waits are the system's, all else goes by the clock.
+// Thread-safe. Waits use system time; all other times are those of the clock.
 class Watcher {
  public:
-  // `guard` and the clock outlive the watcher.
+  // `guard` and the clock must outlive the watcher.
   static absl::StatusOr<std::unique_ptr<Watcher>> Start(Guard& guard, sync::Clock& clock);
-  ~Watcher();  // the guard forgets the connections
+  ~Watcher();  // removes the connections from the guard
   Watcher(const Watcher&) = delete;
   Watcher& operator=(const Watcher&) = delete;
 
-  // A connection enters; it leaves when it has been closed in both directions. `own`: see
-  // Guard::Enter. An error if the system has no means for it: then it has not entered.
+  // Adds a connection; it is removed when it has been closed in both directions. `own`: see
+  // Guard::Enter. Errors: the system's, if it cannot watch the connection, which is then not added.
   absl::StatusOr<ConnectionId> Add(const Peer& peer, bool own, Descriptor connection);
 
  private:
