@@ -9,11 +9,11 @@
 namespace voxeld::daemon::local {
 namespace {
 
-// Of a connection that is over: with packets unread it would be reset, and the client would see
-// that before the answer that says why.
+// Packets to discard when a connection ends: unread packets would reset it, and the client would
+// see the reset before the answer with the reason.
 constexpr int kMostDiscarded = 64;
 
-// What is wrong with the descriptors that came; empty: nothing.
+// Returns: what is wrong with the received descriptors; empty: nothing.
 std::string DescriptorsWrong(const Packet& packet, size_t wanted) {
   if (packet.descriptors_lost) {
     return "its descriptor was lost: the server has none left; try again later";

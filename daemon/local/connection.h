@@ -1,4 +1,4 @@
-// One connection of the local socket: its Hello, then the memory that it brings.
+// One connection of the local socket: its Hello, then the memory that it hands over.
 #pragma once
 
 #include <sys/socket.h>
@@ -15,25 +15,26 @@
 
 namespace voxeld::daemon::local {
 
-// One answer to every packet, in order: the next packet is read once the answer has gone out, so a
-// client that does not read holds up nobody but itself. Not thread-safe.
+// Answers every packet in order. The next packet is read after the answer was sent, so a client
+// that does not read delays only itself. Not thread-safe.
 class Connection {
  public:
-  // `log` may be none, and outlives it.
+  // `log` may be null; otherwise it must outlive the connection.
   Connection(Descriptor socket, sync::TimeNs hello_deadline, Logger* log);
-  ~Connection();  // lets its memories go
+  ~Connection();  // releases its memories
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
 
-  // When the socket can be read or written: takes one packet at most. False: it is over.
+  // Call when the socket is readable or writable. Handles at most one packet. Returns: false when
+  // the connection is over.
   [[nodiscard]] bool Serve(const Tokens& tokens);
-  // As a last word; what has not been read is lost.
+  // Sends a last message; unread packets are lost.
   void Refuse(std::string_view message);
 
   int socket() const { return socket_.get(); }
   bool wants_to_write() const { return !answer_.empty(); }  // and not to read
   sync::TimeNs hello_deadline() const { return hello_deadline_; }
-  // Null: no Hello yet.
+  // Null before Hello.
   const std::shared_ptr<LocalMemory>& memory() const { return memory_; }
 
  private:
@@ -41,7 +42,7 @@ class Connection {
     std::string bytes;
     bool last = false;
   };
-  // The packet's descriptors are closed before its answer goes out.
+  // Handles a packet. Its descriptors are closed before the answer is sent.
   Answer Take(Packet packet, const Tokens& tokens);
   Answer Hello(const Packet& packet, const Message& message, const Tokens& tokens);
   std::string Hold(const Packet& packet, const Message& message);
@@ -57,7 +58,7 @@ class Connection {
   ucred peer_ = {};
   SessionId session_ = 0;
   std::shared_ptr<LocalMemory> memory_;
-  std::string answer_;  // that could not be sent yet; never a last one
+  std::string answer_;  // an answer that could not be sent yet; never the last one
   std::string why_ = "the client has closed it";
 };
 

@@ -16,7 +16,7 @@ absl::StatusOr<std::shared_ptr<Doorbell>> Doorbell::Make() {
 }
 
 void Doorbell::Ring() const {
-  // Fails only if it is rung already, 2⁶⁴ - 2 times.
+  // Fails only if it has been rung 2⁶⁴ - 2 times already.
   const uint64_t one = 1;
   [[maybe_unused]] const ssize_t written = write(descriptor_.get(), &one, sizeof(one));
 }

@@ -1,4 +1,4 @@
-// Wakes a thread that waits for descriptors.
+// Wakes a thread that polls descriptors.
 #pragma once
 
 #include <memory>
@@ -11,12 +11,12 @@ namespace voxeld::daemon::local {
 // Thread-safe.
 class Doorbell {
  public:
-  // ResourceExhausted if there is no descriptor left.
+  // Errors: ResourceExhausted if no descriptor is left.
   static absl::StatusOr<std::shared_ptr<Doorbell>> Make();
 
   void Ring() const;
-  void Quiet() const;                                   // until the next Ring
-  int descriptor() const { return descriptor_.get(); }  // readable once rung
+  void Quiet() const;                                   // resets it until the next Ring
+  int descriptor() const { return descriptor_.get(); }  // readable after Ring
 
  private:
   explicit Doorbell(Descriptor descriptor) : descriptor_(std::move(descriptor)) {}

@@ -27,8 +27,8 @@ constexpr const char* kSealNames = "F_SEAL_SHRINK, F_SEAL_GROW and F_SEAL_WRITE"
 
 std::string ErrorText() { return std::generic_category().message(errno); }
 
-// Seals before all else: only of memory does one ask more, as another file's system may keep whoever
-// asks waiting.
+// Checks the seals first. Only memfds have them, and operations on a file of another file system
+// may block.
 absl::Status CheckSeals(uint64_t id, int fd) {
   const int seals = fcntl(fd, F_GET_SEALS);
   if (seals < 0) {
@@ -67,10 +67,10 @@ absl::Status CheckSize(uint64_t id, uint64_t size, int fd) {
 
 }  // namespace
 
-// Counted and charged for as long as it lives.
+// Counted and charged to the budget while it exists.
 class LocalMemory::Mapping {
  public:
-  // `budget` may be none.
+  // `budget` may be null.
   static absl::StatusOr<std::shared_ptr<const Mapping>> Make(
       uint64_t size, int fd, std::shared_ptr<std::atomic<uint32_t>> mapped,
       std::shared_ptr<Budget> budget) {
@@ -104,8 +104,8 @@ class LocalMemory::Mapping {
     return {static_cast<const char*>(data_) + offset, size};
   }
 
-  // Has the pages of a range there. A page that was never written has no memory yet, and if the
-  // system has none left for it, reading would end the process.
+  // Populates the pages of a range. A page that was never written has no memory yet, and reading it
+  // would terminate the process if the system had none left.
   bool Populate(uint64_t offset, uint64_t size) const {
     if (size == 0) return true;
     const uint64_t page = static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
@@ -114,7 +114,7 @@ class LocalMemory::Mapping {
     char* at = static_cast<char*>(data_) + first;
     while (madvise(at, bytes, MADV_POPULATE_READ) != 0) {
       if (errno == EAGAIN || errno == EINTR) continue;
-      return errno == EINVAL;  // a kernel before 5.14, or a kind of page that it does not do
+      return errno == EINVAL;  // a kernel before 5.14, or an unsupported kind of page
     }
     return true;
   }

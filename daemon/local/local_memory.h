@@ -1,4 +1,4 @@
-// The memory that one session's client has handed over: sealed memfds, mapped for reading.
+// The memory that the client of one session has handed over: sealed memfds, mapped for reading.
 #pragma once
 
 #include <atomic>
@@ -15,33 +15,34 @@
 namespace voxeld::daemon::local {
 
 struct LocalLimits {
-  // Of one session, held at once.
+  // Per session, held at the same time.
   uint32_t max_memories = 256;
   uint64_t max_bytes = uint64_t{1} << 30;
-  // Of all sessions together: the kernel gives a process 65,530 mappings, and most of them are for
-  // others.
+  // For all sessions together: the kernel gives a process 65,530 mappings, most of which are needed
+  // for other purposes.
   uint32_t max_memories_total = 16'384;
 };
 
-// Thread-safe. What Find gave stays mapped until it is let go, also when it is released meanwhile;
-// only what is held counts against the session's limits, but all that is mapped is charged to the
+// Thread-safe. The result of Find stays mapped while it is used, even if it is released meanwhile.
+// Only held memory counts against the session's limits, but all mapped memory is charged to the
 // budget.
 class LocalMemory final : public wire::MemorySource {
  public:
-  // `mapped` counts the mappings of all sessions. `budget` may be none.
+  // `mapped` counts the mappings of all sessions. `budget` may be null.
   LocalMemory(const LocalLimits& limits, std::shared_ptr<std::atomic<uint32_t>> mapped,
               std::shared_ptr<Budget> budget)
       : limits_(limits), mapped_(std::move(mapped)), budget_(std::move(budget)) {}
 
-  // Maps `fd`, which stays the caller's: sealed against shrinking, growing and writing, of `size`
-  // bytes. Else InvalidArgument; AlreadyExists if `id` is in use; ResourceExhausted beyond a limit
-  // or the budget, or if it cannot be mapped; FailedPrecondition once the session has ended.
+  // Maps `fd`, which the caller keeps. Requires: it has `size` bytes and is sealed against
+  // shrinking, growing and writing; otherwise the error is InvalidArgument. Other errors:
+  // AlreadyExists if `id` is in use; ResourceExhausted beyond a limit or the budget, or if mapping
+  // fails; FailedPrecondition after End.
   absl::Status Hold(uint64_t id, uint64_t size, int fd);
 
-  absl::Status Release(uint64_t id);  // NotFound
-  void ReleaseAll();                  // the connection that brought it has ended
+  absl::Status Release(uint64_t id);  // error: NotFound
+  void ReleaseAll();                  // for the end of the connection that handed it over
 
-  void End();  // the session has: lets all go, and takes nothing more
+  void End();  // ends the session: releases everything and accepts nothing more
   bool ended() const;
 
   absl::StatusOr<wire::MappedRange> Find(uint64_t memory, uint64_t offset,

@@ -1,4 +1,4 @@
-// What a stream holds of the local socket: its token and memory.
+// A stream's share of the local socket: its token and memory.
 #pragma once
 
 #include <memory>
@@ -12,12 +12,12 @@
 
 namespace voxeld::daemon::local {
 
-// Nothing is offered by one that was made without a socket. May outlive the socket. Not thread-safe;
-// what memory() gave is.
+// Offers nothing if it was created without a socket. May outlive the socket. Not thread-safe, but
+// the result of memory() is.
 class LocalSession {
  public:
   LocalSession() = default;
-  // `socket` may be none. Without random bytes nothing is offered either.
+  // `socket` may be null. Offers nothing if the system has no random bytes.
   LocalSession(const LocalSocket* socket, SessionId session);
   ~LocalSession() { Close(); }
   LocalSession(LocalSession&& other) noexcept { Swap(other); }
@@ -26,13 +26,13 @@ class LocalSession {
     return *this;
   }
 
-  // For Opened; empty: nothing is offered.
+  // Path for Opened; empty: nothing is offered.
   const std::string& path() const { return path_; }
   const std::string& token() const { return token_; }
-  // For DecodeStreamRequest; null: nothing is offered. After Close it finds nothing.
+  // Source for DecodeStreamRequest; null: nothing is offered. After Close it finds nothing.
   std::shared_ptr<const wire::MemorySource> memory() const { return memory_; }
 
-  // The stream has let its session go: so its connection ends, and its memory is let go.
+  // The stream has left its session: ends the session's connection and releases its memory.
   void Close();
 
  private:

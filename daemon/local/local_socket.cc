@@ -24,11 +24,11 @@
 namespace voxeld::daemon::local {
 namespace {
 
-// How often the clock is asked while a connection owes its Hello (the clock need not be the
-// kernel's), or accepting is tried again.
+// How often the clock is checked while a connection has not sent its Hello (the clock may differ
+// from the kernel's), and how often accepting is retried.
 constexpr int kTickMs = 50;
 
-// What an event is about; connections count on from here.
+// Values of epoll events; connections count on from here.
 constexpr uint64_t kBell = 0, kListener = 1, kFirstConnection = 2;
 
 absl::StatusOr<std::vector<listen::ListeningSocket>> Listen(const Address& address) {
@@ -41,7 +41,7 @@ absl::StatusOr<std::vector<listen::ListeningSocket>> Listen(const Address& addre
 
 }  // namespace
 
-// Everything but Make, Begin and the destructor runs on the one thread.
+// Everything except Make, Begin and the destructor runs on the socket's thread.
 class LocalSocket::Impl {
  public:
   Impl(sync::Clock& clock, LocalSocketOptions options, std::shared_ptr<Doorbell> bell)
@@ -112,7 +112,7 @@ class LocalSocket::Impl {
         accept4(listener_.front().descriptor(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
     if (socket.get() < 0) {
       if (errno == EAGAIN || errno == EINTR || errno == ECONNABORTED) return;
-      accept_failed_ = true;  // out of descriptors, say: what is open may close
+      accept_failed_ = true;  // no descriptors left, for example; open ones may be closed
       return StopAccepting();
     }
     auto connection = std::make_unique<Connection>(
@@ -128,7 +128,7 @@ class LocalSocket::Impl {
     Watch(EPOLL_CTL_MOD, listener_.front().descriptor(), kListener, 0);
   }
 
-  // After a failure only once more has happened, or a tick has passed.
+  // After a failure, accepts again only after another event or a tick.
   void ListenAgain() {
     if (std::exchange(accept_failed_, false) || accepting_) return;
     if (without_hello_ >= options_.max_without_hello) return;
@@ -137,7 +137,7 @@ class LocalSocket::Impl {
 
   void Serve(uint64_t number) {
     const auto found = connections_.find(number);
-    if (found == connections_.end()) return;  // ended by an event before
+    if (found == connections_.end()) return;  // ended by an earlier event
     Connection& connection = *found->second;
     const bool waited = connection.wants_to_write();
     const bool had_hello = connection.memory() != nullptr;
@@ -198,13 +198,13 @@ class LocalSocket::Impl {
   const std::shared_ptr<Doorbell> bell_;
   const std::shared_ptr<Tokens> tokens_;
   Descriptor epoll_;
-  std::vector<listen::ListeningSocket> listener_;  // one
+  std::vector<listen::ListeningSocket> listener_;  // exactly one
   std::atomic<bool> stopping_ = false;
   Connections connections_;
   uint64_t next_ = kFirstConnection;
   uint32_t without_hello_ = 0;
   bool accepting_ = true;
-  bool accept_failed_ = false;  // just now
+  bool accept_failed_ = false;  // in this round
   std::thread thread_;
 };
 

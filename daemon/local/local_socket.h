@@ -1,5 +1,5 @@
-// The local socket: where producers on this machine hand over bulk content without sending it
-// (voxeld/v1/local.proto). One thread; nothing that a client does or leaves holds up another.
+// The local socket, through which producers on this machine hand over bulk content without sending
+// it (voxeld/v1/local.proto). It uses one thread; no client can delay another.
 #pragma once
 
 #include <cstdint>
@@ -16,24 +16,24 @@
 namespace voxeld::daemon::local {
 
 struct LocalSocketOptions {
-  Address listen;  // a unix socket
+  Address listen;  // must be a unix socket
   LocalLimits limits;
-  // Connections that have not said Hello: further ones wait to be accepted. With Hello there is one
-  // of each session: a newer one takes the place of the older, which ends.
+  // Connections that have not sent Hello; further ones wait to be accepted. After Hello there is
+  // one connection per session: a newer one replaces the older one, which is closed.
   uint32_t max_without_hello = 64;
   sync::TimeNs hello_limit_ns = 2 * sync::kSecond;
-  std::shared_ptr<Budget> budget;  // charged for what is held; may be none
-  Logger* log = nullptr;           // may be none
+  std::shared_ptr<Budget> budget;  // charged for held memory; may be null
+  Logger* log = nullptr;           // may be null
 };
 
 class LocalSocket {
  public:
-  // Listens and serves, with the mode 0660; AlreadyExists if somebody listens there. The clock and
-  // the log outlive it.
+  // Listens and serves with mode 0660. The clock and the log must outlive the socket. Errors:
+  // AlreadyExists if another server listens there.
   static absl::StatusOr<std::unique_ptr<LocalSocket>> Start(sync::Clock& clock,
                                                             LocalSocketOptions options);
-  // Ends every connection, removes the socket and joins the thread. Sessions that are registered
-  // still keep their tokens, which are good for nothing then.
+  // Closes every connection, removes the socket and joins the thread. Registered sessions keep
+  // their tokens, which no longer work.
   ~LocalSocket();
   LocalSocket(const LocalSocket&) = delete;
   LocalSocket& operator=(const LocalSocket&) = delete;

@@ -1,4 +1,4 @@
-// The packets of the local socket (voxeld/v1/local.proto), read and written.
+// Reads and writes the packets of the local socket (voxeld/v1/local.proto).
 #pragma once
 
 #include <cstdint>
@@ -13,31 +13,31 @@ namespace voxeld::daemon::local {
 
 inline constexpr size_t kGreatestPacket = 4096;
 
-// What came in at once.
+// The result of one receive call.
 struct Packet {
   enum class What : uint8_t {
-    kNothing,  // not now
-    kEnd,      // the other side is gone, or has sent a packet of no bytes
+    kNothing,  // would block
+    kEnd,      // the client has gone, or has sent an empty packet
     kPacket,
   };
   What what = What::kNothing;
   std::string bytes;
-  std::vector<Descriptor> descriptors;  // closed on exec; as many as there was room for
-  bool more_descriptors = false;        // there was no room for; they are gone
-  bool truncated = false;               // it had more than kGreatestPacket bytes
-  bool descriptors_lost = false;        // there was none left to put a descriptor of the packet in
+  std::vector<Descriptor> descriptors;  // close-on-exec; as many as there was room for
+  bool more_descriptors = false;        // further ones did not fit and are lost
+  bool truncated = false;               // the packet had more than kGreatestPacket bytes
+  bool descriptors_lost = false;  // the process had no descriptor left for one of the packet's
 };
 
-// How many descriptors a packet may bring. One is right, and a second shows that there are too many:
-// no more than that, as those that are about to be closed again must not make the process run out.
-// None from whom nobody knows: closing may wait for the file's own system, and what is not taken
-// need not be closed.
+// How many descriptors a packet may carry. One is valid, and a second one shows that there are too
+// many. More are not received, so that descriptors that are closed at once cannot exhaust the
+// process's limit. None are received from unknown clients: closing one may block in its file
+// system, and those that are not received need not be closed.
 inline constexpr size_t kNoDescriptors = 0, kDescriptors = 2;
 
-// Does not block.
+// Receives a packet without blocking.
 Packet Receive(int socket, size_t room);
 
-// A LocalMessage.
+// A parsed LocalMessage.
 struct Message {
   enum class What : uint8_t { kHello, kMemory, kRelease };
   What what = What::kHello;
@@ -46,10 +46,10 @@ struct Message {
   uint64_t size = 0;  // kMemory
 };
 
-// InvalidArgument: bytes that are no LocalMessage, or one that says nothing.
+// Errors: InvalidArgument if the bytes are not a LocalMessage, or if it is empty.
 absl::StatusOr<Message> ParseMessage(const Packet& packet);
 
-// LocalAnswers.
+// Serialize LocalAnswers.
 std::string Welcome(uint32_t max_memories, uint64_t max_bytes);
 std::string Held(uint64_t id);
 std::string Released(uint64_t id);

@@ -11,7 +11,7 @@
 namespace voxeld::daemon::local {
 namespace {
 
-// Both of the same size.
+// Compares in constant time. Requires: both have the same size.
 bool Same(std::string_view a, std::string_view b) {
   unsigned difference = 0;
   for (size_t i = 0; i < a.size(); ++i) {
@@ -51,7 +51,7 @@ void Tokens::Unregister(const std::string& token) {
 }
 
 Tokens::Found Tokens::Find(std::string_view token) const {
-  // Another size is known to be wrong by everybody; compared all the same.
+  // A token of another size is invalid, but is compared all the same.
   std::string padded(token.substr(0, kBytes));
   padded.resize(kBytes, '\0');
   Found found;

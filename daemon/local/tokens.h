@@ -1,4 +1,4 @@
-// Which session a connection to the local socket belongs to: whoever says a session's token.
+// Assigns connections of the local socket to sessions by the token that a client presents.
 #pragma once
 
 #include <atomic>
@@ -22,7 +22,7 @@ class Tokens {
  public:
   static constexpr size_t kBytes = 16;
 
-  // `ended` is rung when a session ends. `budget` is charged for what is held; it may be none.
+  // `ended` is rung when a session ends. `budget` is charged for held memory; it may be null.
   Tokens(const LocalLimits& limits, std::shared_ptr<const Doorbell> ended,
          std::shared_ptr<Budget> budget)
       : limits_(limits), ended_(std::move(ended)), budget_(std::move(budget)) {}
@@ -31,18 +31,19 @@ class Tokens {
     std::string token;  // kBytes random bytes
     std::shared_ptr<LocalMemory> memory;
   };
-  // Unavailable if the system has no random bytes. Each stream of a session registers for itself: one
-  // that takes the session up may come before the older one has gone.
+  // Registers a session. Each stream of a session registers separately, because a stream that
+  // resumes the session may arrive before the older one has gone. Errors: Unavailable if the system
+  // has no random bytes.
   absl::StatusOr<Registered> Register(SessionId session);
 
-  // Ends the memory that goes with the token. Nothing if there is none.
+  // Ends the memory of the token. Does nothing if the token is unknown.
   void Unregister(const std::string& token);
 
   struct Found {
     SessionId session = 0;
-    std::shared_ptr<LocalMemory> memory;  // null: nobody has this token
+    std::shared_ptr<LocalMemory> memory;  // null: the token is unknown
   };
-  // Takes as long whatever is wrong with the token.
+  // Takes the same time for every invalid token.
   Found Find(std::string_view token) const;
 
   const LocalLimits& limits() const { return limits_; }
