@@ -12,9 +12,9 @@
 namespace voxeld::daemon::state {
 namespace {
 
-// Of changes that are held at once.
+// Bytes of changes that are held in memory at once.
 constexpr size_t kChunkBytes = 4u << 20;
-// What a row weighs beside its bytes.
+// Cost of a row in addition to its bytes.
 constexpr size_t kRowBytes = 64;
 
 class Collector final : public SceneChangeVisitor {
@@ -72,7 +72,7 @@ class Collector final : public SceneChangeVisitor {
   uint64_t rows_ = 0, bytes_ = 0, left_out_ = 0;
 };
 
-// Records of those who have layers in the view.
+// Returns: the records of owners that have layers in the view.
 OwnerRecords KeptOwners(const Snapshot& view, const OwnerRecords& all) {
   OwnerRecords kept;
   view.layers.ForEach([&](const OwnedName& key, const LayerPtr&) {
@@ -96,7 +96,7 @@ Keeper::Keeper(std::unique_ptr<StateFile> file, KeeperOptions options, sync::Clo
 Keeper::~Keeper() { (void)Stop(); }
 
 void Keeper::Knows(const SnapshotPtr& snapshot, OwnerRecords owners) {
-  sync::MutexLock lock(mutex_);  // for the thread to see it
+  sync::MutexLock lock(mutex_);  // makes the values visible to the thread
   written_ = KeptView(snapshot);
   written_owners_ = std::move(owners);
 }
@@ -110,7 +110,7 @@ void Keeper::Offer(SnapshotPtr snapshot, std::shared_ptr<const OwnerRecords> own
   sync::MutexLock lock(mutex_);
   offered_ = {std::move(snapshot), std::move(owners)};
   const sync::TimeNs due = clock_.Now() + (at_once ? 0 : options_.interval_ns);
-  // While the file fails, its own pace holds.
+  // While writing fails, the retry interval applies.
   if (last_.ok() || due_ == sync::kNever) due_ = std::min(due_, due);
   changed_.NotifyAll();
 }
@@ -145,7 +145,7 @@ void Keeper::Run() {
     if (target.snapshot == nullptr) continue;
     absl::Status status = Write(target);
     if (absl::IsDataLoss(status)) {
-      // The scene is here, whole: it goes into a new file.
+      // The complete scene is in memory, so write all of it to a new file.
       written_ = nullptr;
       written_owners_.clear();
       const absl::Status anew = file_->StartAnew(std::string(status.message()));
@@ -175,7 +175,7 @@ absl::Status Keeper::Write(const Target& target) {
   Collector collector({now, options_.unix_ns(now)});
   SceneChanges changes({.objects = true}, written_, view);
   bool owners_told = false, told = false;
-  // Nothing is known of the file: it is emptied first.
+  // If the file's content is unknown, empty it first.
   bool emptied = written_ != nullptr;
   std::vector<Change> first;
   const auto next = [&]() -> std::vector<Change> {
@@ -204,7 +204,7 @@ absl::Status Keeper::Write(const Target& target) {
     }
     return taken;
   };
-  // A difference of nothing needs no transaction.
+  // An empty difference needs no transaction.
   if (emptied) {
     first = next();
     if (first.empty()) {

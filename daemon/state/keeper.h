@@ -1,6 +1,6 @@
-// Writes down what outlives the daemon: the newest snapshot's kept part, as the difference from what the
-// file has, in one transaction. Commits that come while one is under way go together into the next, so
-// that many durable ones cost one sync.
+// Writes the persistent part of the newest snapshot to disk, as the difference from the file's
+// content, in one transaction. Commits that arrive during a transaction are combined into the next
+// one, so that many durable commits cost one sync.
 #pragma once
 
 #include <cstdint>
@@ -20,36 +20,39 @@
 namespace voxeld::daemon::state {
 
 struct KeeperOptions {
-  // What nobody waits for is written this long after it came, at the latest.
+  // Longest delay before changes that no client waits for are written.
   sync::TimeNs interval_ns = 100 * sync::kMillisecond;
-  // After a failure it is tried again this often.
+  // Interval between retries after a failure.
   sync::TimeNs retry_ns = sync::kSecond;
-  // Returns: the wall clock in Unix nanoseconds at `now`, which was just read from the keeper's clock.
+  // Returns: the wall clock in Unix nanoseconds at `now`, which was just read from the keeper's
+  // clock.
   std::function<int64_t(sync::TimeNs now)> unix_ns;
-  Logger* log = nullptr;  // outlives the keeper; may be none
+  Logger* log = nullptr;  // outlives the keeper; may be null
 };
 
-// Thread-safe. One thread of its own.
+// Thread-safe. Runs its own thread.
 class Keeper final : public StateSink {
  public:
-  // The clock outlives it. The first snapshot that comes is written whole, in place of what the file has;
-  // or, after Knows, as what differs.
+  // The clock must outlive the keeper. The first snapshot replaces the file's content; after Knows,
+  // only its difference is written.
   Keeper(std::unique_ptr<StateFile> file, KeeperOptions options, sync::Clock& clock);
   ~Keeper() override;
   Keeper(const Keeper&) = delete;
   Keeper& operator=(const Keeper&) = delete;
 
-  // The file has all that is kept of this snapshot, and nothing else: it was read from there. Before any
-  // Offer.
+  // Declares that the file contains exactly the persistent part of this snapshot, which was read
+  // from it. Call before any Offer.
   void Knows(const SnapshotPtr& snapshot, OwnerRecords owners);
 
-  // On the keeper's thread, after each transaction: the snapshot that is on the disk.
+  // Sets the callback that reports, on the keeper's thread and after each transaction, the snapshot
+  // that is on the disk.
   void SetOnDurable(std::function<void(uint64_t snapshot)> on_durable);
 
   void Offer(SnapshotPtr snapshot, std::shared_ptr<const OwnerRecords> owners,
              bool at_once) override;
 
-  // Writes what was offered last, unless the file fails, and closes it. OK if all is on the disk.
+  // Writes the last offered snapshot, unless writing fails, and closes the file. Returns: OK if
+  // everything is on the disk.
   absl::Status Stop();
 
   StateFigures figures() const;
@@ -63,18 +66,18 @@ class Keeper final : public StateSink {
   absl::Status Write(const Target& target);
   void Report(const absl::Status& status) VOXELD_REQUIRES(mutex_);
 
-  std::unique_ptr<StateFile> file_;  // the thread's, until it ends
+  std::unique_ptr<StateFile> file_;  // used by the thread only, until it ends
   const KeeperOptions options_;
   sync::Clock& clock_;
 
-  // What the file has; the thread's, once something was offered.
-  SnapshotPtr written_;  // a kept view; null: not known, all is written
+  // Content of the file. Used by the thread only, after the first Offer.
+  SnapshotPtr written_;  // a persistent view; null: unknown, so everything is written
   OwnerRecords written_owners_;
 
   mutable sync::Mutex mutex_;
   sync::CondVar changed_;
   std::function<void(uint64_t)> on_durable_ VOXELD_GUARDED_BY(mutex_);
-  Target offered_ VOXELD_GUARDED_BY(mutex_);  // newer than what was taken; else null
+  Target offered_ VOXELD_GUARDED_BY(mutex_);  // newer than the snapshot being written; else null
   sync::TimeNs due_ VOXELD_GUARDED_BY(mutex_) = sync::kNever;
   bool stop_ VOXELD_GUARDED_BY(mutex_) = false;
   absl::Status last_ VOXELD_GUARDED_BY(mutex_);

@@ -1,4 +1,5 @@
-// What outlives the daemon, as a whole: read into the core before it starts, written from then on.
+// The persistent state as a whole: restored into the core before it starts, then written
+// continuously.
 //
 //   auto state = KeptState::Open(dir, …);
 //   Core core({.state = (*state)->sink(), …});
@@ -22,25 +23,26 @@ namespace voxeld::daemon::state {
 
 class KeptState {
  public:
-  // In the folder, which is made (mode 0700) if it is not there, in the file state.db. `clock` and `log`
-  // outlive it. Errors as of StateFile::Open.
+  // Opens the file state.db in `dir`, which is created (mode 0700) if it does not exist. `clock`
+  // and `log` must outlive this object. Errors: as for StateFile::Open.
   static absl::StatusOr<std::unique_ptr<KeptState>> Open(const std::string& dir,
                                                          sync::TimeNs interval_ns,
                                                          sync::Clock& clock, Logger& log);
 
   StateSink* sink() { return &sink_; }
-  // From any thread, after Restore.
+  // May be called from any thread after Restore.
   StateFigures figures() const { return keeper_ == nullptr ? StateFigures() : keeper_->figures(); }
 
-  // Into a core that has its displays and has not started; it outlives Stop. A file that turns out to be
-  // damaged is put aside, and the core begins with nothing. What cannot be had any more is logged.
+  // Restores into a core that has its displays and has not started. The core must outlive Stop. A
+  // damaged file is moved aside, and the core starts empty. Entities and objects that cannot be
+  // restored are logged.
   absl::Status Restore(Core& core);
 
-  // When the core offers nothing any more: writes what it offered last. What fails is logged.
+  // Call when the core offers no more snapshots. Writes the last offered one; logs errors.
   void Stop();
 
  private:
-  // What the core is given before there is a keeper.
+  // The sink that the core uses before the keeper exists.
   struct Sink final : StateSink {
     void Offer(SnapshotPtr snapshot, std::shared_ptr<const OwnerRecords> owners,
                bool at_once) override {

@@ -1,13 +1,13 @@
-// The part of a scene that outlives its clients: layers of sessions that keep them, and the objects of
-// their owners.
+// Extracts the persistent part of a scene: layers of sessions that keep them, and their owners'
+// objects.
 #pragma once
 
 #include "daemon/scene/snapshot.h"
 
 namespace voxeld::daemon::state {
 
-// Layers and objects alone, with the snapshot's number. Shares what it has with `snapshot`, so that the
-// difference of two views costs what differs.
+// Returns: a snapshot of these layers and objects only, with the same number. It shares data with
+// `snapshot`, so that computing the difference of two views costs only as much as they differ.
 SnapshotPtr KeptView(const SnapshotPtr& snapshot);
 
 }  // namespace voxeld::daemon::state

@@ -18,7 +18,7 @@ class Reader {
   Reader(const wire::TwoClocks& now, const Limits& limits, gpu::BulkPool* pool, text::Fonts* fonts)
       : now_(now), limits_(limits), pool_(pool), fonts_(fonts) {}
 
-  // In the order of StateFile::Read: owners, objects, layers, entities.
+  // Takes a row, in the order of StateFile::Read: owners, objects, layers, entities.
   void Take(const RowKey& key, std::string_view bytes) {
     switch (key.kind) {
       case RowKind::kOwner:
@@ -101,7 +101,7 @@ class Reader {
     entities_.back().operations.push_back(**std::move(operation));
   }
 
-  // Layers are blended in the order in which they were made.
+  // Restores layers in the order of their creation, in which they are blended.
   void PutLayers() {
     std::vector<std::pair<OwnedName, wire::KeptLayerRow*>> order;
     order.reserve(layers_.size());
@@ -116,14 +116,15 @@ class Reader {
     }
   }
 
-  // Those that others refer to come first.
+  // Restores objects that others refer to first.
   void PutObjects() {
     for (auto& of_owner : objects_) {
       const uint64_t owner = of_owner.first;
       auto& objects = of_owner.second;
       std::set<std::string> begun;
       std::vector<Operation> operations;
-      // From each to what it refers to, however many there are one behind the other; and how many of those are done.
+      // The path of references from an object to the one being restored, with the number of
+      // completed references of each. It is explicit because chains may be arbitrarily long.
       std::vector<std::pair<wire::KeptObjectRow*, size_t>> path;
       const auto begin = [&](const std::string& name) {
         const auto found = objects.find(name);
@@ -162,7 +163,7 @@ class Reader {
 absl::StatusOr<RestoredState> ReadState(StateFile& file, const wire::TwoClocks& now,
                                         const Limits& limits, gpu::BulkPool* pool,
                                         text::Fonts* fonts) {
-  // What came in one message may be more than a message may be now.
+  // Content that arrived in one message may exceed today's limit on messages.
   Limits roomy = limits;
   roomy.max_message_bytes = std::max<uint64_t>(roomy.max_message_bytes, uint64_t{2} << 30);
   Reader reader(now, roomy, pool, fonts);

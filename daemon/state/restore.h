@@ -1,4 +1,4 @@
-// What a state file has, as a scene that a core takes.
+// Converts a state file to a scene that a core can restore.
 #pragma once
 
 #include <string>
@@ -14,13 +14,13 @@ namespace voxeld::daemon::state {
 struct RestoredState {
   RestoredScene scene;
   uint64_t layers = 0, entities = 0, objects = 0, expired = 0;
-  // Rows that could not be had any more, each as "entity layer/id: why"; the first kMostSaid of them.
+  // Rows that could not be restored, each as "entity layer/id: why"; only the first kMostSaid.
   static constexpr size_t kMostSaid = 20;
   uint64_t left_out = 0;
   std::vector<std::string> why;
 };
 
-// DataLoss if the file is damaged. A row that is wrong by itself is left out.
+// Reads the file. Invalid rows are skipped. Errors: DataLoss if the file is damaged.
 absl::StatusOr<RestoredState> ReadState(StateFile& file, const wire::TwoClocks& now,
                                         const Limits& limits, gpu::BulkPool* pool,
                                         text::Fonts* fonts);

@@ -17,7 +17,7 @@ namespace {
 
 constexpr const char* kBeside[] = {"", "-wal", "-journal", "-shm"};
 
-// As SQLite keeps it, behind CREATE TABLE.
+// The table definition as SQLite stores it after CREATE TABLE.
 constexpr char kTable[] =
     "rows("
     "kind INTEGER NOT NULL, owner INTEGER NOT NULL, name BLOB NOT NULL, id BLOB NOT NULL,"
@@ -85,7 +85,7 @@ absl::StatusOr<std::unique_ptr<StateFile>> StateFile::Open(StateFileOptions opti
   if (!status.ok() && !was_there && stat(file->options_.path.c_str(), &info) == 0 &&
       info.st_size == 0) {
     unlink(
-        file->options_.path.c_str());  // else the next start would take it for one that was emptied
+        file->options_.path.c_str());  // otherwise the next start would take it for a truncated one
   }
   if (!status.ok()) return status;
   return file;
@@ -93,7 +93,7 @@ absl::StatusOr<std::unique_ptr<StateFile>> StateFile::Open(StateFileOptions opti
 
 absl::Status StateFile::OpenDatabase() {
   if (options_.vfs.empty()) {
-    // SQLite would make it for everybody to read; what stands beside it takes its mode.
+    // SQLite would create the file readable for everybody. The files beside it inherit its mode.
     constexpr int kFlags = O_RDWR | O_CLOEXEC | O_NOFOLLOW;
     int file = open(options_.path.c_str(), kFlags | O_CREAT | O_EXCL, 0600);
     const bool was_there = file < 0 && errno == EEXIST;
@@ -102,7 +102,7 @@ absl::Status StateFile::OpenDatabase() {
     struct stat info {};
     const bool is_empty = was_there && fstat(file, &info) == 0 && info.st_size == 0;
     close(file);
-    // SQLite would take it for a new one, and nobody would know that something was lost.
+    // SQLite would treat it as a new file, and the loss would go unnoticed.
     if (is_empty) return absl::DataLossError("it is empty, as if it had been truncated");
   }
   int code = sqlite3_open_v2(
@@ -110,7 +110,7 @@ absl::Status StateFile::OpenDatabase() {
       SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE,
       options_.vfs.empty() ? nullptr : options_.vfs.c_str());
   if (code != SQLITE_OK) return Fault(code, "open");
-  // One process, which keeps what tells others where the log ends to itself.
+  // Only one process uses the file, so the index of the write-ahead log stays in its memory.
   for (const char* sql :
        {"PRAGMA locking_mode=EXCLUSIVE", "PRAGMA mmap_size=0", "PRAGMA trusted_schema=OFF",
         "PRAGMA cell_size_check=ON", "PRAGMA journal_mode=WAL", "PRAGMA synchronous=FULL",
@@ -155,7 +155,7 @@ absl::Status StateFile::Prepare() {
                                          ";PRAGMA user_version=", kVersion, ";COMMIT");
     if (status = Run(sql.c_str()); !status.ok()) return status;
   } else {
-    // Triggers, views and constraints of somebody else's would have a say in what is kept.
+    // Foreign triggers, views and constraints could change what is stored.
     int64_t ours = 0;
     const std::string sql =
         absl::StrCat("SELECT count(*) FROM sqlite_schema WHERE type='table' AND sql='CREATE TABLE ",
@@ -179,12 +179,13 @@ absl::Status StateFile::Prepare() {
         {Statements::kCommit, "COMMIT"}}) {
     if (const int code = statements_->Make(which, sql); code != SQLITE_OK) return Fault(code, sql);
   }
-  // A page that could not be read, or had no memory, is found fault with as one that is damaged: what is wrong must be so again.
+  // A page that could not be read, or an allocation that failed, is reported like a damaged page,
+  // so check again before reporting damage.
   status = Check();
   return absl::IsDataLoss(status) ? Check() : status;
 }
 
-// Every page is looked at, and whether rows are in the order by which they are found, before anybody relies on it.
+// Checks every page and the order of the index before the content is used.
 absl::Status StateFile::Check() {
   sqlite3_stmt* check = nullptr;
   int code = sqlite3_prepare_v2(database_, "PRAGMA integrity_check(1)", -1, &check, nullptr);
@@ -299,7 +300,7 @@ absl::Status StateFile::Apply(const Source& next) {
     }
   }
   if (status.ok()) status = step(Statements::kCommit, "committing a transaction");
-  // Some faults have rolled it back themselves.
+  // Some errors have already rolled back the transaction.
   if (!status.ok() && sqlite3_get_autocommit(database_) == 0) {
     sqlite3_exec(database_, "ROLLBACK", nullptr, nullptr, nullptr);
   }

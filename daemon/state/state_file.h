@@ -1,13 +1,13 @@
-// What a daemon keeps over its end, in one SQLite file: rows of bytes under names. It knows neither what
-// is in them nor who asks.
+// The persistent state of a daemon in one SQLite file: rows of bytes under names. It does not
+// interpret the rows.
 //
-//   written    in transactions, each whole or not at all, and synced to the disk before Apply returns
-//              (WAL, synchronous=FULL): so what Apply has answered for survives the machine's power
+//   written    in transactions that apply completely or not at all and are synced to the disk
+//              before Apply returns (WAL, synchronous=FULL), so that they survive a power failure
 //   opened     by one process at a time
-//   damaged    put aside under a name with ".damaged" and the time, and reported; an empty one takes its
-//              place. Made by a later version: left alone, and an error
+//   damaged    moved aside under a name with ".damaged" and the time, and reported; an empty file
+//              replaces it. A file of a later version is left alone and is an error
 //
-// Not thread-safe; any thread, one at a time.
+// Not thread-safe, but may be used by different threads one after another.
 #pragma once
 
 #include <cstdint>
@@ -24,10 +24,10 @@ struct sqlite3;
 
 namespace voxeld::daemon::state {
 
-// What a row is of. Numbers are in the file.
+// Kinds of rows. The numbers are part of the file format.
 enum class RowKind : uint8_t { kOwner = 1, kObject = 2, kLayer = 3, kEntity = 4 };
 
-// `name` within the owner: an object's or a layer's; `id` within the layer.
+// `name` is the name of an object or layer of the owner; `id` is the entity's id in the layer.
 struct RowKey {
   RowKind kind = RowKind::kEntity;
   uint64_t owner = 0;
@@ -37,10 +37,10 @@ struct RowKey {
 
 struct Change {
   enum class What : uint8_t {
-    kPut,          // in place of what has the key
-    kRemove,       // that row
-    kRemoveLayer,  // the layer `key` names and all its entities
-    kRemoveAll     // whatever there is
+    kPut,          // inserts or replaces the row
+    kRemove,       // removes the row
+    kRemoveLayer,  // removes the layer of `key` and all its entities
+    kRemoveAll     // removes everything
   };
   What what = What::kPut;
   RowKey key;
@@ -49,38 +49,39 @@ struct Change {
 
 struct StateFileOptions {
   std::string path;
-  // SQLite's name of what stands between it and the disk; empty: the system's own.
+  // Name of an SQLite VFS; empty: the default.
   std::string vfs;
-  // For the names of files that are put aside; Unix time.
+  // Unix time for the names of files that are moved aside.
   std::function<int64_t()> now;
 };
 
 class StateFile {
  public:
-  // Of the file's format: application_id, and user_version.
+  // Identify the file's format: application_id and user_version.
   static constexpr int32_t kApplicationId = 0x7678'6c64;  // "vxld"
   static constexpr int32_t kVersion = 1;
 
-  // AlreadyExists: another process has it. FailedPrecondition: a later version made it, or it is
-  // somebody else's. Otherwise there is a file that can be used, whatever was there.
+  // Opens or creates the file; a damaged one is moved aside. Errors: AlreadyExists if another
+  // process has opened it; FailedPrecondition if a later version or another application has created
+  // it.
   static absl::StatusOr<std::unique_ptr<StateFile>> Open(StateFileOptions options);
   ~StateFile();
   StateFile(const StateFile&) = delete;
   StateFile& operator=(const StateFile&) = delete;
 
-  // What was put aside when it was opened, and why; empty: nothing.
+  // Returns: the name of the file that was moved aside on opening, and the reason; empty: none.
   const std::string& quarantined() const { return quarantined_; }
 
-  // All rows, by kind, owner, name, id. DataLoss if the file turns out to be damaged.
+  // Reads all rows, ordered by kind, owner, name and id. Errors: DataLoss if the file is damaged.
   absl::Status Read(const std::function<void(const RowKey&, std::string_view)>& row);
 
-  // Gives the next changes; none: that was all.
+  // Returns: the next changes; empty at the end.
   using Source = std::function<std::vector<Change>()>;
-  // All changes, in their order, or none. OK when they are on the disk. ResourceExhausted if the disk is
-  // full, DataLoss if the file is damaged, else Unavailable.
+  // Applies all changes in their order, or none. Returns OK when they are on the disk. Errors:
+  // ResourceExhausted if the disk is full, DataLoss if the file is damaged, else Unavailable.
   absl::Status Apply(const Source& next);
 
-  // Puts the file aside, as damaged, and begins an empty one.
+  // Moves the file aside as damaged and creates an empty one.
   absl::Status StartAnew(const std::string& why);
 
  private:
