@@ -26,12 +26,12 @@ namespace {
 
 constexpr size_t kMostFallbacks = 64;
 
-// A font's file, open, in its own units.
+// An open font file, in the font's units.
 struct Face {
   FT_Face ft = nullptr;
   hb_font_t* hb = nullptr;
   double capital = 0;  // height of a capital letter
-  double line = 0;     // from one line to the next
+  double line = 0;     // distance between lines
   std::map<uint32_t, std::shared_ptr<const Glyph>> glyphs;
 
   Face() = default;
@@ -64,7 +64,7 @@ absl::StatusOr<std::vector<FriBidiChar>> Characters(std::string_view utf8) {
       return absl::InvalidArgumentError(
           absl::StrCat("is wrong at byte ", i, ", which begins no character of UTF-8"));
     }
-    // Tabs and other controls are as wide as a space.
+    // Tabs and other control characters are as wide as a space.
     characters.push_back(code < 0x20 && code != '\n' ? ' ' : code);
     i += length;
   }
@@ -136,18 +136,18 @@ class Fonts::Library {
   }
 
  private:
-  using FontFile = std::pair<std::string, int>;  // and which of its fonts
-  // Fonts to be tried one after another.
+  using FontFile = std::pair<std::string, int>;  // path, and index of the font in it
+  // Fonts that are tried one after another.
   struct Family {
     std::vector<std::shared_ptr<Face>> faces;
-    std::vector<FontFile> fallbacks;  // that are not open yet
-    size_t opened = 0;                // of fallbacks
+    std::vector<FontFile> fallbacks;  // not opened yet
+    size_t opened = 0;                // number of opened fallbacks
   };
   struct ShapedGlyph {
     std::shared_ptr<const Glyph> glyph;
     double x = 0, y = 0;
   };
-  // A word as it stands, from left to right.
+  // A laid-out word, from left to right.
   struct Shaped {
     std::vector<ShapedGlyph> glyphs;
     double advance = 0;
@@ -163,7 +163,7 @@ class Fonts::Library {
       return slot;
     if (!FT_IS_SCALABLE(face->ft) || face->ft->units_per_EM == 0) return slot;
     hb_face_t* const tables = hb_ft_face_create_referenced(face->ft);
-    face->hb = hb_font_create(tables);  // in the font's own units
+    face->hb = hb_font_create(tables);  // in the font's units
     hb_face_destroy(tables);
     const double em = face->ft->units_per_EM;
     face->capital = CapitalOf(face->ft);
@@ -172,7 +172,7 @@ class Fonts::Library {
     return slot = std::move(face);
   }
 
-  // How tall an H is; of a font without one what it says of itself, or what is usual.
+  // Returns: the height of an H; without one, the height that the font states, or a common value.
   static double CapitalOf(FT_Face ft) {
     const FT_UInt glyph = FT_Get_Char_Index(ft, 'H');
     if (glyph != 0 && FT_Load_Glyph(ft, glyph, FT_LOAD_NO_SCALE | FT_LOAD_NO_HINTING) == 0 &&
@@ -184,7 +184,8 @@ class Fonts::Library {
                                                                       : 0.7 * ft->units_per_EM;
   }
 
-  // `name` in any case; empty: sans. There are as many as there are names.
+  // Returns: the family `name` in any case; empty: sans. The cache is bounded, because only
+  // existing names are added.
   absl::StatusOr<const Family*> FindFamily(const std::string& name) VOXELD_REQUIRES(mutex_) {
     const auto named = names_.find(name.empty() ? "sans" : absl::AsciiStrToLower(name));
     if (named == names_.end()) {
@@ -223,7 +224,7 @@ class Fonts::Library {
     return &(families_[named->first] = std::move(found));
   }
 
-  // For messages.
+  // Escapes a name for messages.
   static std::string Shown(const std::string& name) {
     constexpr size_t kMost = 40;
     std::string shown = absl::CHexEscape(name.substr(0, kMost));
@@ -243,7 +244,7 @@ class Fonts::Library {
     return absl::StrJoin(few, ", ");
   }
 
-  // Of what is seen: no controls, formats, and the like.
+  // Returns: false for invisible characters such as controls and formats.
   static bool IsSeen(FriBidiChar c) {
     switch (hb_unicode_general_category(hb_unicode_funcs_get_default(), c)) {
       case HB_UNICODE_GENERAL_CATEGORY_CONTROL:
@@ -257,7 +258,8 @@ class Fonts::Library {
     }
   }
 
-  // The first of a family's faces that has the character; its first face if none has, of which `missing` is told.
+  // Returns: the family's first face that has the character. If none has it, returns the first face
+  // and sets `missing`.
   std::shared_ptr<Face> FaceOf(const Family& given, FriBidiChar c, FriBidiChar* missing)
       VOXELD_REQUIRES(mutex_) {
     auto& family = const_cast<Family&>(given);
@@ -285,7 +287,7 @@ class Fonts::Library {
     return kept = std::move(glyph);
   }
 
-  // Characters of one face, script and direction.
+  // Shapes characters of one face, script and direction.
   void ShapeRun(std::span<const FriBidiChar> text, size_t begin, size_t end, Face& face,
                 bool right_to_left, Shaped* out) VOXELD_REQUIRES(mutex_) {
     hb_buffer_t* const buffer = hb_buffer_create();
@@ -306,7 +308,7 @@ class Fonts::Library {
     hb_buffer_destroy(buffer);
   }
 
-  // Runs of one level of a line, which stand one after another from left to right.
+  // Shapes runs of one level of a line, which are laid out from left to right.
   Shaped ShapeStretch(std::span<const FriBidiChar> text, size_t begin, size_t end,
                       bool right_to_left, const Family& family, FriBidiChar* missing)
       VOXELD_REQUIRES(mutex_) {
@@ -321,7 +323,7 @@ class Fonts::Library {
       const hb_script_t now = hb_unicode_script(unicode, text[i]);
       const bool plain =
           now == HB_SCRIPT_COMMON || now == HB_SCRIPT_INHERITED || now == HB_SCRIPT_UNKNOWN;
-      // Marks stay with what they are put on.
+      // Combining marks use the face of their base character.
       std::shared_ptr<Face> face = now == HB_SCRIPT_INHERITED && !runs.empty()
                                        ? runs.back().face
                                        : FaceOf(family, text[i], missing);
@@ -342,7 +344,7 @@ class Fonts::Library {
     return shaped;
   }
 
-  // Characters of a line in the order in which they stand.
+  // Shapes the characters of a line in visual order.
   Shaped ShapeLine(std::span<const FriBidiChar> text, size_t begin, size_t end,
                    const std::vector<FriBidiLevel>& levels, const Family& family,
                    FriBidiChar* missing) VOXELD_REQUIRES(mutex_) {
@@ -360,7 +362,7 @@ class Fonts::Library {
         stretches.push_back({i, i + 1, levels[i]});
       }
     }
-    // From the highest level down, what is at it or above is turned around (UAX #9, L2).
+    // From the highest level down, reverse every sequence at that level or above (UAX #9, L2).
     for (FriBidiLevel level = most; level >= 1; --level) {
       for (size_t i = 0; i < stretches.size();) {
         size_t j = i;
@@ -426,8 +428,7 @@ class Fonts::Library {
   sync::Mutex mutex_;
   FcConfig* config_ = nullptr;
   FT_Library freetype_ = nullptr;
-  std::map<std::string, std::string>
-      names_;  // of families, by lower case; as they are from the beginning
+  std::map<std::string, std::string> names_;  // of families, by lower-case name; constant
   std::map<FontFile, std::shared_ptr<Face>> faces_ VOXELD_GUARDED_BY(mutex_);
   std::map<std::string, Family> families_ VOXELD_GUARDED_BY(mutex_);
   std::map<std::string, std::shared_ptr<const StrokeFont>> strokes_ VOXELD_GUARDED_BY(mutex_);

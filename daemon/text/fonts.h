@@ -1,7 +1,7 @@
-// Text in any script as outlines: the system's fonts (fontconfig), their letters (FreeType), and how these
-// follow one another (HarfBuzz, right-to-left by FriBidi).
+// Converts text in any script to outlines, with the system's fonts (fontconfig), their glyphs
+// (FreeType), shaping (HarfBuzz) and bidirectional layout (FriBidi).
 //
-// Lengths are in heights of a capital letter, x along the line, y upwards from its base line.
+// Lengths are in heights of a capital letter; x runs along the line, y upwards from the base line.
 #pragma once
 
 #include <cstdint>
@@ -18,16 +18,16 @@ namespace voxeld::text {
 struct OutlinePoint {
   double x = 0, y = 0;
 };
-// A closed curve: cubic Béziers, 4 points each, each from where the one before ends.
+// A closed curve of cubic Béziers with 4 points each. Each begins where the previous one ends.
 using Contour = std::vector<OutlinePoint>;
 
-// A letter, or what a font makes of several; its origin at 0, 0.
+// The outline of a letter or ligature, with its origin at 0, 0.
 struct Glyph {
   std::vector<Contour> contours;
 };
 
 struct PlacedGlyph {
-  std::shared_ptr<const Glyph> glyph;  // the same for the same letter
+  std::shared_ptr<const Glyph> glyph;  // shared by equal letters
   double x = 0, y = 0;
 };
 
@@ -36,9 +36,9 @@ enum class Alignment : uint8_t { kLeft, kCenter, kRight };
 struct Layout {
   std::string font;  // a family; empty: "sans"
   Alignment alignment = Alignment::kLeft;
-  double line_spacing = 1;  // times the font's
-  double width = 0;         // lines are broken between words so as not to be longer; 0: only at \n
-  size_t most = 4096;       // characters
+  double line_spacing = 1;  // factor of the font's spacing
+  double width = 0;         // lines are broken between words to fit; 0: only at \n
+  size_t most = 4096;       // limit on characters
 };
 
 struct LaidOut {
@@ -53,12 +53,12 @@ class Fonts {
   Fonts(const Fonts&) = delete;
   Fonts& operator=(const Fonts&) = delete;
 
-  // `utf8` is checked. InvalidArgument says which byte is wrong, or which character no font has; NotFound that there
-  // is no font of that family, and which there are; ResourceExhausted that there are too many characters;
-  // Unavailable that there are no fonts at all.
+  // Lays out the text. Checks `utf8`. Errors: InvalidArgument with the invalid byte, or with the
+  // character that no font has; NotFound if the family does not exist, with the existing ones;
+  // ResourceExhausted if there are too many characters; Unavailable if there are no fonts at all.
   absl::StatusOr<LaidOut> Lay(std::string_view utf8, const Layout& layout);
 
-  // A stroke font by its name, as StrokeFont::Load, which is read once.
+  // Returns: the stroke font of this name, as StrokeFont::Load, which is called once per name.
   absl::StatusOr<std::shared_ptr<const StrokeFont>> Strokes(const std::string& name);
 
  private:

@@ -7,7 +7,7 @@
 namespace voxeld::text {
 namespace {
 
-// A contour as FreeType tells it.
+// Receives a contour from FreeType.
 struct Reader {
   double scale;
   std::vector<Contour> contours;

@@ -1,4 +1,4 @@
-// Outlines as FreeType has them into contours of cubic Béziers. Words only; reentrant.
+// Converts FreeType outlines to contours of cubic Béziers. Stateless and reentrant.
 #pragma once
 
 #include <ft2build.h>
@@ -10,7 +10,7 @@
 
 namespace voxeld::text {
 
-// All lengths times `scale`. Empty if the outline is broken.
+// Returns: the contours with all lengths multiplied by `scale`; empty if the outline is broken.
 std::vector<Contour> ContoursOf(FT_Outline& outline, double scale);
 
 }  // namespace voxeld::text

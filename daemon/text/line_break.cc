@@ -5,7 +5,7 @@ namespace voxeld::text {
 std::vector<TextLine> BreakLines(std::span<const Word> words, double width) {
   std::vector<TextLine> lines;
   TextLine line;
-  double advance = 0, pending = 0;  // of spaces since the last word
+  double advance = 0, pending = 0;  // width of the spaces since the last word
   bool any = false;
   for (size_t i = 0; i < words.size(); ++i) {
     const Word& word = words[i];

@@ -1,4 +1,4 @@
-// Where a text's lines end. Works in the order in which text is read.
+// Breaks text into lines, in reading order.
 #pragma once
 
 #include <cstddef>
@@ -7,18 +7,19 @@
 
 namespace voxeld::text {
 
-// A run of characters that is kept together: a word, or the space between two.
+// A run of characters that is not broken: a word, or the space between two words.
 struct Word {
-  size_t begin = 0, end = 0;  // characters
+  size_t begin = 0, end = 0;  // character indices
   double advance = 0;
   bool space = false;
 };
 
 struct TextLine {
-  size_t begin = 0, end = 0;  // of words, without spaces at either end
+  size_t begin = 0, end = 0;  // word indices, without spaces at either end
 };
 
-// Greedily: as many words a line as fit `width` (0: all). A word that is longer has a line of its own.
+// Puts as many words on a line as fit into `width` (0: all). A word that is longer gets its own
+// line.
 std::vector<TextLine> BreakLines(std::span<const Word> words, double width);
 
 }  // namespace voxeld::text

@@ -16,7 +16,7 @@ namespace voxeld::text {
 namespace {
 
 constexpr const char* kFolder = "/usr/share/hershey-fonts";
-// Capitals reach from 12 above the middle to the baseline 9 below.
+// Capitals extend from 12 above the middle to the baseline, 9 below it.
 constexpr float kBaseline = 9, kCapital = 21;
 constexpr size_t kHead = 8;
 
@@ -44,7 +44,7 @@ absl::StatusOr<StrokeFont> StrokeFont::Parse(std::string_view jhf) {
   StrokeFont font;
   std::string line;
   size_t number = 0;
-  // A glyph's line may be broken: it goes on until it has its pairs.
+  // A glyph may continue on further lines until it has all its pairs.
   for (const absl::string_view part :
        absl::StrSplit(absl::string_view(jhf.data(), jhf.size()), '\n')) {
     ++number;
