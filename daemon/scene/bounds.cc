@@ -29,7 +29,7 @@ Bounds MapBounds(const gpu::Affine& map, const Bounds& box) {
     for (int axis = 0; axis < 3; ++axis) {
       const double a = map.m[row * 4 + axis] * box.min[axis];
       const double b = map.m[row * 4 + axis] * box.max[axis];
-      // A NaN (infinity times 0) must come through, so no std::min.
+      // Not std::min, because a NaN (infinity times 0) must propagate.
       low += a < b ? a : b;
       high += a < b ? b : a;
     }
@@ -66,8 +66,8 @@ bool IsSingular(const gpu::Affine& map) {
     const double length = std::sqrt(m[0] * m[0] + m[1] * m[1] + m[2] * m[2]);
     for (int col = 0; col < 3; ++col) m[col] /= length;
   }
-  // What is drawn takes the determinant of the map as it stands,
-  // so that must not vanish or overflow either.
+  // Drawing uses the map's determinant without normalisation, so it must not vanish or overflow
+  // either.
   const double determinant = gpu::Determinant(map);
   return !(std::abs(gpu::Determinant(unit)) >= kLeast) || determinant == 0 ||
          !std::isfinite(determinant);

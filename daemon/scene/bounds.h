@@ -1,4 +1,5 @@
-// Axis-aligned boxes in double precision, for range checks: conservative, never for what is drawn.
+// Axis-aligned boxes in double precision for range checks. They are conservative and never used for
+// drawing.
 #pragma once
 
 #include <string>
@@ -7,7 +8,7 @@
 
 namespace voxeld::daemon {
 
-// Empty when made.
+// A new box is empty.
 struct Bounds {
   double min[3] = {0, 0, 0};
   double max[3] = {0, 0, 0};
@@ -17,19 +18,19 @@ struct Bounds {
   bool operator==(const Bounds&) const = default;
 };
 
-// A box around the image of `box`. Not finite if a corner's is not.
+// Returns: a box around the image of `box`. Not finite if a corner's image is not.
 Bounds MapBounds(const gpu::Affine& map, const Bounds& box);
 
-// The coordinate of greatest magnitude; infinity if one is not finite; 0 if empty.
+// Returns: the greatest absolute coordinate; infinity if one is not finite; 0 if the box is empty.
 double LargestMagnitude(const Bounds& box);
 
 bool IsFinite(const gpu::Affine& map);
 
-// True if the linear part has no usable inverse: its determinant is not finite, or below 10⁻¹² of
-// the product of its rows' lengths (which stretching alone never brings about).
+// Returns: whether the linear part has no usable inverse: its determinant is not finite, or below
+// 10⁻¹² of the product of its rows' lengths (which scaling alone never causes).
 bool IsSingular(const gpu::Affine& map);
 
-// "determinant 0 of [1 0 0; 0 1 0; 0 0 0]", for messages.
+// Returns: text such as "determinant 0 of [1 0 0; 0 1 0; 0 0 0]", for messages.
 std::string DescribeLinear(const gpu::Affine& map);
 
 }  // namespace voxeld::daemon

@@ -10,14 +10,14 @@ bool IsSound(const gpu::ClipPlane& p) {
          (p.a != 0 || p.b != 0 || p.c != 0);
 }
 
-// Where n · p ≥ `least`.
+// Adds the half-space n · p ≥ `least`.
 bool AddPlane(const double n[3], double least, gpu::LayerRecord& record) {
   gpu::ClipPlane& plane = record.planes[record.plane_count++];
   plane = {n[0], n[1], n[2], -least};
   return IsSound(plane);
 }
 
-// Where `least` ≤ n · p ≤ `most`.
+// Adds the slab `least` ≤ n · p ≤ `most`.
 bool AddSlab(const double n[3], double least, double most, gpu::LayerRecord& record) {
   const double opposite[3] = {-n[0], -n[1], -n[2]};
   return AddPlane(n, least, record) && AddPlane(opposite, -most, record);
@@ -28,7 +28,7 @@ bool AddBox(const ClipBox& box, gpu::LayerRecord& record) {
   const double determinant = gpu::Determinant(box.transform);
   bool is_sound = std::isnormal(determinant);
   for (int a = 0; a < 3; ++a) {
-    // The box's coordinate a of a point p of the scene is n · p − shift.
+    // The box coordinate a of a scene point p is n · p − shift.
     double n[3], shift = 0;
     for (int c = 0; c < 3; ++c) {
       n[c] = gpu::Cofactor(box.transform, c, a) / determinant;
@@ -58,7 +58,7 @@ bool AddCylinder(const ClipCylinder& cylinder, gpu::LayerRecord& record) {
   double axis[3], beside[3] = {}, across[2][3];
   for (int a = 0; a < 3; ++a) axis[a] = cylinder.end[a] - cylinder.start[a];
   SetLength(1, axis);
-  // Along the axis of the scene that it is farthest from.
+  // Picks the scene axis that is farthest from parallel to the cylinder.
   int farthest = 0;
   for (int a = 1; a < 3; ++a) {
     if (std::fabs(axis[a]) < std::fabs(axis[farthest])) farthest = a;
@@ -72,7 +72,7 @@ bool AddCylinder(const ClipCylinder& cylinder, gpu::LayerRecord& record) {
     const double row[4] = {across[0][a], across[1][a], axis[a], cylinder.start[a]};
     std::copy_n(row, 4, m + a * 4);
   }
-  // What is not finite leaves no number of it.
+  // If a value is not finite, the determinant is not a normal number.
   const bool is_sound =
       std::isnormal(gpu::Determinant(record.cylinders[record.cylinder_count - 1].unit));
   return AddSlab(axis, Dot(axis, cylinder.start), Dot(axis, cylinder.end), record) && is_sound;

@@ -1,4 +1,4 @@
-// What a layer is cut to, as its client says it.
+// The clip of a layer as the client specifies it.
 #pragma once
 
 #include <algorithm>
@@ -8,20 +8,21 @@
 
 namespace voxeld::daemon {
 
-// Around `center` before the transform, which has an inverse; sizes are greater than 0.
+// A box around `center` before the transform. Requires: the transform has an inverse; sizes are
+// greater than 0.
 struct ClipBox {
   double center[3] = {}, size[3] = {};
   gpu::Affine transform;
   bool operator==(const ClipBox&) const = default;
 };
 
-// Round, from one point to another; the radius is greater than 0.
+// A cylinder between two points. Requires: the radius is greater than 0.
 struct ClipCylinder {
   double start[3] = {}, end[3] = {}, radius = 0;
   bool operator==(const ClipCylinder&) const = default;
 };
 
-// Of the scene: only what lies in all of them is drawn.
+// In scene coordinates. Only what lies inside all parts is drawn.
 struct Clip {
   static constexpr uint32_t kBoxPlanes = 6, kCylinderPlanes = 2;
   static constexpr uint32_t kMostBoxes = gpu::kMaxClipPlanes / kBoxPlanes;
@@ -32,7 +33,7 @@ struct Clip {
   ClipCylinder cylinders[gpu::kMaxClipCylinders];
 
   bool empty() const { return count == 0 && boxes_count == 0 && cylinders_count == 0; }
-  // That it becomes: gpu::kMaxClipPlanes at most.
+  // Returns: the number of planes for the engine; gpu::kMaxClipPlanes at most.
   uint32_t planes_in_all() const {
     return count + kBoxPlanes * boxes_count + kCylinderPlanes * cylinders_count;
   }
@@ -44,7 +45,8 @@ struct Clip {
   }
 };
 
-// As engines have it: planes, and cylinders without ends. False if a part has no inverse or does not stay finite.
+// Converts the clip to the engine's form: planes, and cylinders without ends. Returns: false if a
+// part has no inverse or does not stay finite.
 bool PutClip(const Clip& clip, gpu::LayerRecord& record);
 
 }  // namespace voxeld::daemon

@@ -1,4 +1,5 @@
-// The part of CommitApplier that tells where curves may be drawn coarser than their error.
+// The part of CommitApplier that reports curves that may be drawn more coarsely than their error
+// bound.
 #include <optional>
 #include <string>
 #include <utility>
@@ -14,7 +15,7 @@ std::optional<Issue> CommitApplier::CoarseOf(const Content& content, const gpu::
     const Object* object = draft_.FindObject(Key(instance->object));
     if (object == nullptr) return std::nullopt;
     for (const ObjectPart& part : object->data->parts) {
-      // Empty objects count, too.
+      // Empty objects count as well.
       if ((*left)-- <= 0) return std::nullopt;
       auto found = CoarseOf(part.content, gpu::Compose(map, part.transform), left);
       if (found.has_value()) return found;

@@ -10,7 +10,7 @@
 namespace voxeld::daemon {
 namespace {
 
-// Saturating, so that a long lifetime is for ever.
+// Saturates, so that a very long lifetime never ends.
 sync::TimeNs ExpiryTime(sync::TimeNs now, int64_t lifetime_ns) {
   if (lifetime_ns <= 0 || lifetime_ns >= sync::kNever - now) return sync::kNever;
   return now + lifetime_ns;
@@ -25,7 +25,7 @@ const std::string* LayerOf(const Operation& operation) {
   return nullptr;
 }
 
-// What it is that gives an owner its quota.
+// Returns: the name of the limit that applies to an owner.
 const char* MostOf(uint64_t by_operator, uint64_t limit, const char* name) {
   return by_operator < limit ? "what an operator has set for it" : name;
 }
@@ -55,7 +55,7 @@ void CommitApplier::Replay() {
   if (replayed_->next < replayed_->operations.size()) {
     return Dispatch(*replayed_->operations[replayed_->next++]);
   }
-  ++applied_;  // the FrameBegin
+  ++applied_;  // counts the FrameBegin
   Applied(replayed_->layer);
   replayed_.reset();
 }
@@ -270,7 +270,8 @@ void CommitApplier::Do(Operation& operation, Delete& del) {
   const auto guarded = [&](const Entity& entity) {
     return del.guard_sequence != 0 && entity.sequence > del.guard_sequence;
   };
-  // Those of `layer` that go. Whole layers without a guard go at once.
+  // Removes the matching entities of the layer. Whole layers without a guard are cleared in one
+  // step.
   const auto remove_from = [&](const OwnedName& key, const std::string& prefix) {
     if (prefix.empty() && del.guard_sequence == 0) return draft_.ClearLayer(key);
     std::vector<std::string> ids;
@@ -347,7 +348,7 @@ void CommitApplier::Do(Operation& operation, LayerState& state) {
   if (state.transform.has_value() && found != nullptr) {
     auto wrong = OutOfRange(*state.transform, found->bounds);
     if (wrong.has_value()) {
-      // The bounds may be wider than what is still there: look closely before refusing.
+      // The bounds may be wider than the remaining entities, so compute exact ones before refusing.
       Bounds exact;
       found->entities.ForEach([&](const std::string&, const EntityPtr& entity) {
         exact.Include(MapBounds(entity->data.transform,
@@ -411,7 +412,7 @@ void CommitApplier::Do(Operation& operation, FrameEnd& end) {
   draft_.ClearLayer(key);
 }
 
-// The core ends a commit; there is none among the operations.
+// The core handles commits; operations never contain one.
 void CommitApplier::Do(Operation&, Commit&) {}
 
 std::optional<Issue> CheckAlone(const Operation& operation, const Limits& limits) {

@@ -21,7 +21,8 @@ uint64_t GroupData::bytes() const {
   uint64_t bytes = sizeof(*this) + as_sent.size() + parts.size() * sizeof(Part);
   const GeometryData* before = nullptr;
   for (const Part& part : parts) {
-    // Those that share one follow one another, or nearly so: counted too often rather than not at all.
+    // Parts that share a geometry are mostly consecutive. A shared geometry may be counted twice
+    // but is never missed.
     if (part.geometry.get() != before) bytes += part.geometry->bytes();
     before = part.geometry.get();
   }
@@ -224,7 +225,7 @@ void Draft::PutObject(const OwnedName& key, Object object) {
     }
   }
   if (old != nullptr) {
-    // What its instances count for changes with it, and where they lie.
+    // The counts and bounds of its instances change with it.
     const uint64_t before = std::max<uint64_t>(1, old->drawables);
     const uint64_t now = std::max<uint64_t>(1, object.drawables);
     std::vector<UseKey> instances;
@@ -257,7 +258,7 @@ void Draft::RemoveObject(const OwnedName& key) {
 
 void Draft::RebaseLayer(const OwnedName& key, const LayerPtr& was, const LayerPtr* is,
                         bool edited) {
-  if (FindLayer(key) == nullptr) return;  // this draft has removed it
+  if (FindLayer(key) == nullptr) return;  // this draft has removed the layer
   if (!edited && is == nullptr) return RemoveLayer(key);
   const EntityMap none;
   std::vector<std::string> removed;
@@ -288,9 +289,9 @@ void Draft::Rebase(const SnapshotPtr& now, uint64_t owner, const std::set<std::s
     return found == nullptr ? OwnerTally() : *found;
   };
   const SnapshotPtr was = std::exchange(base_, now);
-  tally(owner);  // as it was in the old base, if this draft has not changed it
+  tally(owner);  // caches the tally of the old base unless this draft has changed it
 
-  // Take over the changes of other owners.
+  // Apply the changes of other owners.
   const OwnerTally own_was = tally_in(*was), own_is = tally_in(*now);
   for (const auto of :
        {&OwnerTally::drawables, &OwnerTally::layers, &OwnerTally::bytes, &OwnerTally::derived}) {
@@ -320,7 +321,7 @@ void Draft::Rebase(const SnapshotPtr& now, uint64_t owner, const std::set<std::s
       [&](const OwnedName& key, const LayerPtr* before, const LayerPtr* is) {
         if (key.owner != owner) return take(next_.layers, key, is);
         const uint64_t held = is == nullptr ? 0 : (*is)->entities.size();
-        next_.entities += (*before)->entities.size() - held;  // those are counted as they go
+        next_.entities += (*before)->entities.size() - held;  // RemoveEntity subtracts these
         RebaseLayer(key, *before, is, edited.contains(key.name));
       });
 }

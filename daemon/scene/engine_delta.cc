@@ -13,14 +13,14 @@ constexpr uint32_t kNoTint = 0x00FFFFFF;
 constexpr uint64_t kNoLayer = 0;  // no layer has this number
 constexpr uint32_t kRecordsPerBreath = 256;
 constexpr size_t kBytesPerBreath = size_t{1} << 20;
-constexpr size_t kKeptSlots = 4096;  // of an index that has few entries left
+constexpr size_t kKeptSlots = 4096;  // for an index with few entries left
 
 const Snapshot& EmptyScene() {
   static const Snapshot empty;
   return empty;
 }
 
-// `mask`: the layer that masks it, if that is there.
+// `mask` is the layer that masks it; null if it does not exist.
 gpu::LayerRecord RecordOf(const Layer& layer, const Layer* mask) {
   gpu::LayerRecord record;
   record.id = layer.number;
@@ -29,7 +29,7 @@ gpu::LayerRecord RecordOf(const Layer& layer, const Layer* mask) {
   record.opacity = layer.opacity;
   record.blend = layer.blend;
   record.transform = layer.transform;
-  PutClip(layer.clip, record);  // sound, or it would have been refused
+  PutClip(layer.clip, record);  // always succeeds: an invalid clip was refused earlier
   record.has_region = layer.region.has_value() ? 1 : 0;
   record.region = layer.region.value_or(gpu::Region());
   record.has_mask = layer.mask.empty() ? 0 : 1;
@@ -43,14 +43,14 @@ bool LooksSame(const Layer& a, const Layer& b) {
          a.region == b.region && a.mask == b.mask;
 }
 
-// Nothing that an engine sees: label, sequence and expiry may differ.
+// Returns: whether an engine sees no difference. Label, sequence and expiry may differ.
 bool LooksSame(const Entity& a, const Entity& b) {
   return a.number == b.number && a.data.priority == b.data.priority &&
          a.data.erase == b.data.erase && a.data.transform == b.data.transform &&
          a.data.content == b.data.content;
 }
 
-// clear() and an assignment of {} would keep the memory.
+// Releases the memory, which clear() and an assignment of {} would keep.
 template <typename Container>
 void Free(Container& container) {
   Container().swap(container);
@@ -104,7 +104,7 @@ size_t EngineScene::Plan(SnapshotPtr next) {
         }
         if (old_layer != nullptr && new_layer != nullptr &&
             old_layer->number != new_layer->number) {
-          PlanLayer(key, old_layer, nullptr);  // removed, and another made by the same name
+          PlanLayer(key, old_layer, nullptr);  // removed and recreated with the same name
           old_layer = nullptr;
         }
         PlanLayer(key, old_layer, new_layer);
@@ -120,7 +120,7 @@ size_t EngineScene::Plan(SnapshotPtr next) {
   for (const HeldGeometry& geometry : unused_) {
     const auto it = geometries_.find(geometry.key());
     if (it == geometries_.end() || it->second.uses > 0) continue;
-    // What this very delta would put and drop it leaves out.
+    // A geometry that this delta would both put and drop is omitted.
     if (!it->second.fresh) drop_geometries_.push_back(it->second.id);
     geometries_.erase(it);
   }
@@ -179,7 +179,7 @@ void EngineScene::Write(gpu::DeltaWriter& writer) {
   for (const uint64_t id : drop_drawables_) writer.Drop(gpu::Op::kDropDrawable, id);
   for (const uint64_t id : drop_geometries_) writer.Drop(gpu::Op::kDropGeometry, id);
   for (const uint64_t id : drop_layers_) writer.Drop(gpu::Op::kDropLayer, id);
-  // A plan may be large, and the next one small.
+  // A plan may be large and the next one small.
   Free(put_geometries_);
   Free(unused_);
   Free(flat_);
@@ -239,7 +239,7 @@ void EngineScene::PlanLayer(const OwnedName& key, const Layer* before, const Lay
   EntityMap::Diff(before == nullptr ? EntityMap() : before->entities, now->entities,
                   [&](const std::string& id, const EntityPtr* was, const EntityPtr* is) {
                     if (is == nullptr) {
-                      if (was != nullptr) Undraw(**was);  // one of the two is there
+                      if (was != nullptr) Undraw(**was);  // at least one of the two exists
                       return;
                     }
                     if (was != nullptr && (*was)->number != (*is)->number) Undraw(**was);
@@ -257,7 +257,8 @@ void EngineScene::Draw(const OwnedName& key, const Layer& layer, const std::stri
     Flatten(key.owner, entity.data.content, entity.data.transform, kNoTint);
   }
   std::vector<Part>& parts = drawn_[entity.number];
-  // Old geometries are let go only when the new ones are held: what stays is not sent again.
+  // Release the old geometries only after the new ones are in use, so that unchanged ones are not
+  // sent again.
   const std::vector<Part> old = std::move(parts);
   parts.clear();
   parts.reserve(flat_.size());

@@ -1,19 +1,20 @@
-// What an engine holds of the scene, and the delta that brings it to another snapshot, whichever.
+// Tracks what an engine holds of the scene, and computes the delta that brings it to any other
+// snapshot.
 //
 //   EngineScene scene;                          // an engine that holds nothing
-//   size_t size = scene.Plan(snapshot);         // what differs; 0: nothing
+//   size_t size = scene.Plan(snapshot);         // the differences; 0: none
 //   DeltaWriter writer(block.bytes());
 //   scene.Write(writer);                        // writer.size() == size
-//   block.Refer(writer.TakeReferred());         // what lies in bulk memory is not copied
+//   block.Refer(writer.TakeReferred());         // data in bulk memory is not copied
 //
-// An instance becomes one drawable for each primitive that it draws;
-// all share the primitive's geometry. Maps of nested parts are composed from the outside in:
-// ((entity ∘ part) ∘ part of the part) …
+// An instance becomes one drawable for each primitive that it draws; all share the primitive's
+// geometry. Maps of nested parts are composed from the outside in: ((entity ∘ part) ∘ part of the
+// part) …
 //
-// Some entities may be drawn by the CPU of an engine that has a GPU, or left out: `choose` says so
+// Some entities may be drawn by the CPU of an engine that has a GPU, or left out: `choose` decides
 // when they are drawn.
 //
-// Single-threaded. Plan takes it that the delta will be applied; if it was not, call Forget.
+// Single-threaded. Plan assumes that the delta will be applied; call Forget if it was not.
 #pragma once
 
 #include <cstdint>
@@ -35,33 +36,34 @@ enum class DrawnWhere : uint8_t { kEngine, kCpu, kNowhere };
 
 class EngineScene {
  public:
-  // Asked for each entity that is drawn or drawn anew.
+  // Called for each entity that is drawn or redrawn.
   using Choose = std::function<DrawnWhere(const OwnedName& layer, const std::string& id,
                                           const Entity& entity)>;
 
-  // `breathe` (may be empty) is called now and then during long work, so that its owner can do what
-  // will not wait. It must not call back. `choose` empty: everything by the engine.
+  // `breathe` (may be empty) is called regularly during long work, so that its owner can do urgent
+  // work. It must not call back. If `choose` is empty, the engine draws everything.
   explicit EngineScene(std::function<void()> breathe = nullptr, Choose choose = nullptr);
 
-  // Of what is held (since the last Plan); null: nothing.
+  // Returns: the snapshot that the engine holds (since the last Plan); null: none.
   const SnapshotPtr& held() const { return held_; }
 
-  // Works out the delta from what is held to `next`, and takes that to be held from now on. Answers
-  // its size in bytes; 0 if nothing that an engine sees differs. The cost is of what differs.
+  // Computes the delta from the held snapshot to `next`, and treats `next` as held from now on.
+  // Returns: the delta's size in bytes; 0 if an engine would see no difference. The cost depends on
+  // the differences only.
   size_t Plan(SnapshotPtr next);
-  // Writes the delta planned last, once.
+  // Writes the delta of the last Plan. Call once.
   void Write(gpu::DeltaWriter& writer);
 
-  // The engine is new, or nobody knows what it holds: the next delta begins with a reset.
+  // Declares that the engine is new or its content is unknown. The next delta begins with a reset.
   void Forget();
 
-  // What is held, for tests and figures.
+  // Counts of the held content, for tests and statistics.
   size_t geometries() const { return geometries_.size(); }
-  // Bytes of the indexes of what is held.
+  // Returns: the size in bytes of the indexes of the held content.
   uint64_t memory_bytes() const;
 
  private:
-  // A geometry that is drawn in both ways is two to the engine.
+  // The engine stores a geometry twice if it is drawn by both the GPU and the CPU.
   struct GeometryKey {
     const GeometryData* geometry = nullptr;
     bool by_cpu = false;
@@ -93,7 +95,7 @@ class EngineScene {
 
   void PlanLayer(const OwnedName& key, const Layer* before, const Layer* now);
   void PutLayer(const OwnedName& key, const Layer& layer);
-  // Of layers that have not changed themselves, puts those whose mask has come, gone, or been made anew.
+  // Puts unchanged layers whose mask was added, removed or recreated.
   void PlanMasks(const Snapshot& before);
   void PlanInstances(const Snapshot& before, const Snapshot& next);
   void Draw(const OwnedName& key, const Layer& layer, const std::string& id, const Entity& entity);
@@ -101,7 +103,7 @@ class EngineScene {
   void Flatten(uint64_t owner, const Content& content, const gpu::Affine& map, uint32_t tint);
   uint64_t Use(const HeldGeometry& geometry);
   void Release(const HeldGeometry& geometry);
-  // Shrinks indexes that have grown much larger than their contents.
+  // Shrinks indexes that have become much larger than their contents.
   void GiveBackSlots();
   void Breathe();
 
@@ -110,23 +112,23 @@ class EngineScene {
   uint32_t since_breath_ = 0;
 
   SnapshotPtr held_;
-  bool reset_ = true;  // the next delta begins with one
+  bool reset_ = true;  // the next delta begins with a reset
   uint64_t next_id_ = 1;
   absl::flat_hash_map<GeometryKey, GeometryUse> geometries_;
-  std::unordered_map<uint64_t, std::vector<Part>> drawn_;  // by number of entity
-  uint64_t parts_bytes_ = 0;                               // of the vectors in it
+  std::unordered_map<uint64_t, std::vector<Part>> drawn_;  // by entity number
+  uint64_t parts_bytes_ = 0;                               // size of the vectors in it
 
   // The plan.
   SnapshotPtr next_;
   std::vector<Flat> flat_;
-  // Entities to draw anew though they have not changed: objects that they draw have. By number.
+  // Unchanged entities to redraw because the objects that they draw have changed. By entity number.
   std::map<uint64_t, EntityPlace> redraw_;
-  absl::flat_hash_set<OwnedName> renumbered_;  // layers that came, went, or were made anew
+  absl::flat_hash_set<OwnedName> renumbered_;  // layers that were added, removed or recreated
   std::vector<HeldGeometry> put_geometries_;
-  std::vector<HeldGeometry> unused_;  // dropped to no use at some time; may be in use again
+  std::vector<HeldGeometry> unused_;  // were unused at some point; may be in use again
   std::vector<uint64_t> drop_geometries_, drop_drawables_, drop_layers_;
   std::vector<gpu::LayerRecord> put_layers_;
-  std::deque<gpu::DrawableRecord> put_drawables_;  // as DeltaPlan::steps
+  std::deque<gpu::DrawableRecord> put_drawables_;  // a deque, like DeltaPlan::steps
   bool put_reset_ = false;
 };
 

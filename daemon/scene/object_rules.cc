@@ -55,10 +55,10 @@ std::vector<std::pair<std::string, Object>> CommitApplier::Derive(const std::str
                                                                   const ObjectDataPtr& data) const {
   std::set<std::string> affected = ObjectsAbove(name);
   affected.insert(name);
-  std::map<std::string, size_t> done;  // → index into derived
+  std::map<std::string, size_t> done;  // index into `derived`
   std::vector<std::pair<std::string, Object>> derived;
 
-  // Depth is bounded: what is there has passed the limit, and there are no cycles.
+  // The recursion is bounded: existing objects respect the depth limit, and there are no cycles.
   const auto derive = [&](const auto& self, const std::string& at) -> void {
     if (done.contains(at)) return;
     Object object;
@@ -78,7 +78,7 @@ std::vector<std::pair<std::string, Object>> CommitApplier::Derive(const std::str
         const auto it = done.find(*child_name);
         const Object* child =
             it != done.end() ? &derived[it->second].second : draft_.FindObject(Key(*child_name));
-        if (child == nullptr) continue;  // refused before
+        if (child == nullptr) continue;  // refused earlier
         object.drawables = AddSaturating(object.drawables, child->drawables);
         object.derived = AddSaturating(object.derived, child->derived);
         object.depth = std::max(object.depth, child->depth + 1);
@@ -170,7 +170,7 @@ void CommitApplier::Do(Operation& operation, DefineObject& define) {
   std::vector<std::pair<std::string, Object>> derived = Derive(define.object, define.data);
   if (RefusedDerived(operation, define, derived)) return;
   for (auto& [name, object] : derived) draft_.PutObject(Key(name), std::move(object));
-  // Of instances that were there before. Each looks at one geometry at least.
+  // Checks existing instances. Each counts as at least one geometry.
   int left = kMostLookedAt;
   for (const auto& [name, object] : derived) {
     for (const UseKey& use : InstancesOf(name, static_cast<size_t>(std::max(left, 0)))) {

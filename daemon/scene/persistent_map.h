@@ -1,12 +1,12 @@
-// An ordered map whose copies are cheap and share structure: a copy costs O(1), a change after it
-// O(log n), and the difference of any two costs what differs (times log n).
+// An ordered map whose copies are cheap and share structure. A copy costs O(1), a subsequent change
+// O(log n), and computing a difference costs O(log n) per difference.
 //
-// A treap whose priorities are the keys' hashes: the set of keys alone decides its shape, so two
-// maps that were changed along different paths still have equal subtrees where their content is
-// equal, and those that share them are recognised by address. A node that nobody else holds is
-// changed in place.
+// It is a treap whose priorities are the keys' hashes. Its shape depends only on the set of keys,
+// so two maps that were changed differently still have equal subtrees where their content is equal,
+// and shared subtrees are recognised by address. A node with a single owner is changed in place.
 //
-// Threads: as a value. Distinct maps may share nodes and be used from different threads at once.
+// Thread safety is that of a value: distinct maps may share nodes and be used by different threads
+// concurrently.
 #pragma once
 
 #include <atomic>
@@ -18,14 +18,15 @@
 
 namespace voxeld::daemon {
 
-// K: ordered by <, hashed by absl::Hash. V: copyable, compared by == (for Diff only).
+// Requires: K is ordered by < and hashed by absl::Hash; V is copyable, and compared by == (for Diff
+// only).
 template <typename K, typename V>
 class PersistentMap {
  public:
   size_t size() const { return size_; }
   bool empty() const { return size_ == 0; }
 
-  // Valid until this map is next changed.
+  // Returns: a pointer that is valid until this map changes; null if the key is missing.
   const V* Find(const K& key) const {
     const Node* node = root_.get();
     while (node != nullptr) {
@@ -41,10 +42,10 @@ class PersistentMap {
   }
   bool Contains(const K& key) const { return Find(key) != nullptr; }
 
-  // Inserts, or replaces the value of an equal key.
+  // Inserts the value, or replaces the value of an equal key.
   void Put(const K& key, V value) { PutAt(root_, key, std::move(value), absl::Hash<K>()(key)); }
 
-  // False if there was none.
+  // Returns: false if the key is missing.
   bool Erase(const K& key) {
     if (!Contains(key)) return false;
     EraseAt(root_, key);
@@ -52,21 +53,21 @@ class PersistentMap {
     return true;
   }
 
-  // fn(const K&, const V&), ascending.
+  // Calls fn(const K&, const V&) in ascending order.
   template <typename Fn>
   void ForEach(Fn&& fn) const {
     Visit(root_.get(), fn);
   }
 
-  // fn(const K&, const V&) → whether to go on; ascending
-  // from the first key that is not less than `from`.
+  // Calls fn(const K&, const V&) in ascending order, from the first key that is not less than
+  // `from`, until it returns false.
   template <typename Fn>
   void ForEachFrom(const K& from, Fn&& fn) const {
     VisitFrom(root_.get(), from, fn);
   }
 
-  // fn(const K&, const V* before, const V* after) for every key whose value differs, ascending;
-  // null where a map has none.
+  // Calls fn(const K&, const V* before, const V* after) in ascending order for every key whose
+  // value differs. A pointer is null if that map lacks the key.
   template <typename Fn>
   static void Diff(const PersistentMap& before, const PersistentMap& after, Fn&& fn) {
     const auto always = [&fn](const K& key, const V* was, const V* is) {
@@ -76,8 +77,8 @@ class PersistentMap {
     DiffAt(before.root_, after.root_, nullptr, always);
   }
 
-  // The same for keys that are not less than `from`, until `fn` answers false: then the answer is
-  // false. Taking it up again at the next key costs O(log² n).
+  // Does the same for keys that are not less than `from`, until `fn` returns false. Returns: false
+  // if `fn` did. Resuming at the next key costs O(log² n).
   template <typename Fn>
   static bool DiffFrom(const PersistentMap& before, const PersistentMap& after, const K& from,
                        Fn&& fn) {
@@ -87,12 +88,12 @@ class PersistentMap {
  private:
   struct Node;
 
-  // A counted reference. The count is read with acquire before a node is changed in place, so
-  // whatever another thread read before it let go has happened.
+  // A reference that is counted. The count is read with acquire order before a node is changed in
+  // place, so reads by other threads that have released the node happen before the change.
   class Ref {
    public:
     Ref() = default;
-    explicit Ref(Node* node) : node_(node) {}  // takes over the first count
+    explicit Ref(Node* node) : node_(node) {}  // adopts the initial count
     Ref(const Ref& other) : node_(other.node_) {
       if (node_ != nullptr) node_->refs.fetch_add(1, std::memory_order_relaxed);
     }
@@ -131,13 +132,13 @@ class PersistentMap {
     std::atomic<uint32_t> refs{1};
   };
 
-  // The node of `ref`, copied first if others hold it too.
+  // Returns: the node of `ref`, copied first if it is shared.
   static Node* Own(Ref& ref) {
     if (!ref.unique()) ref = Ref(new Node(*ref.get()));
     return ref.get();
   }
 
-  // Which of two keys stands above the other: a total order, so that the shape is unique.
+  // Returns: which of two keys is the ancestor. This is a total order, so that the shape is unique.
   static bool Above(size_t priority_a, const K& a, size_t priority_b, const K& b) {
     return priority_a != priority_b ? priority_a > priority_b : a < b;
   }
@@ -152,7 +153,7 @@ class PersistentMap {
       PutAt(key < node->key ? node->left : node->right, key, std::move(value), priority);
       return;
     }
-    // Had the key been here, it would have stood at or above this place.
+    // If the key existed, it would be at or above this place.
     Node* node = new Node(key, std::move(value), priority);
     std::pair<Ref, Ref> parts = Split(std::move(at), key);
     node->left = std::move(parts.first);
@@ -171,7 +172,8 @@ class PersistentMap {
     }
   }
 
-  // Those less than `key`, and those greater; an equal one is left out.
+  // Returns: the nodes with keys less than `key`, and those with greater keys. A node with an equal
+  // key is omitted.
   static std::pair<Ref, Ref> Split(Ref at, const K& key) {
     if (!at) return {};
     if (at->key < key) {
@@ -189,7 +191,7 @@ class PersistentMap {
     return {at->left, at->right};
   }
 
-  // Every key of `a` is less than every key of `b`.
+  // Requires: every key of `a` is less than every key of `b`.
   static Ref Merge(Ref a, Ref b) {
     if (!a) return b;
     if (!b) return a;
@@ -225,12 +227,13 @@ class PersistentMap {
                                VisitAll(node->right.get(), fn));
   }
 
-  // `from` null: all. Everything right of a key that is not less than `from` is beyond it too.
+  // `from` null: all keys. Everything to the right of a key that is not less than `from` also
+  // qualifies.
   template <typename Fn>
   static bool DiffAt(const Ref& a, const Ref& b, const K* from, Fn& fn) {
     if (a.get() == b.get()) return true;
     if (!a || (b && Above(b->priority, b->key, a->priority, a->key))) {
-      // b's root is not in a: it would stand at the top.
+      // `a` does not contain b's root, or it would be at the top.
       const auto [less, greater] = Split(a, b->key);
       if (from != nullptr && b->key < *from) return DiffAt(greater, b->right, from, fn);
       return DiffAt(less, b->left, from, fn) && fn(b->key, nullptr, &b->value) &&

@@ -1,4 +1,4 @@
-// Names from clients in messages for people.
+// Formats clients' names for messages.
 #pragma once
 
 #include <string>
@@ -6,7 +6,8 @@
 
 namespace voxeld::daemon {
 
-// Quoted, with what is not printable escaped, and cut to a length fit for a message. Stays valid UTF-8.
+// Returns: the text quoted, with unprintable characters escaped, and shortened for a message. Stays
+// valid UTF-8.
 std::string Quoted(std::string_view text);
 
 }  // namespace voxeld::daemon

@@ -6,7 +6,7 @@
 namespace voxeld::daemon {
 namespace {
 
-// The least key beyond `key`.
+// Returns: the smallest key greater than `key`.
 std::string Beyond(std::string key) {
   key.push_back('\0');
   return key;
@@ -15,7 +15,7 @@ OwnedName Beyond(const OwnedName& key) { return {key.owner, Beyond(key.name)}; }
 
 bool ListsSame(const WriterPtr& a, const WriterPtr& b) {
   return a == b ||
-         (a->client_name == b->client_name && a->ended == b->ended);  // what is kept is not told
+         (a->client_name == b->client_name && a->ended == b->ended);  // watchers do not see `keep`
 }
 
 bool ListsSame(const Layer& a, const Layer& b) {
@@ -24,7 +24,7 @@ bool ListsSame(const Layer& a, const Layer& b) {
          a.region == b.region && a.mask == b.mask && ListsSame(a.writer, b.writer);
 }
 
-// What was there under the same name, if it is the same layer still.
+// Returns: the previous layer with the same name, if it is still the same layer.
 const Layer* Same(const Layer* was, const Layer& is) {
   return was != nullptr && was->number == is.number ? was : nullptr;
 }
@@ -62,7 +62,7 @@ bool SceneChanges::Next(SceneChangeVisitor& visitor) {
 }
 
 bool SceneChanges::TellObjects(SceneChangeVisitor& visitor) {
-  bool beyond = false;  // of the owner that was asked for
+  bool beyond = false;  // past the requested owner
   const bool whole = PersistentMap<OwnedName, ObjectPtr>::DiffFrom(
       before_->objects, after_->objects, from_,
       [&](const OwnedName& key, const ObjectPtr* was, const ObjectPtr* is) {
@@ -72,7 +72,8 @@ bool SceneChanges::TellObjects(SceneChangeVisitor& visitor) {
         }
         from_ = Beyond(key);
         if (is == nullptr) return visitor.OnRemovedObject(key);
-        // Also put anew when one that it refers to has changed: its own definition has not.
+        // An object is also put again when an object that it refers to changes; its definition is
+        // then the same.
         if (was != nullptr && (*was)->data == (*is)->data) return true;
         return visitor.OnObject(key, **is);
       });
@@ -100,7 +101,8 @@ bool SceneChanges::TellLayer(const OwnedName& key, const Layer* was, const Layer
   const Layer* same = Same(was, *is);
   bool room = true;
   if (was != nullptr && same == nullptr) room = visitor.OnRemovedLayer(key);
-  // Told even without room: between the two the place would be in the middle of a layer.
+  // Reported even if there is no room, because the position between the two calls would be inside a
+  // layer.
   if (same == nullptr || !ListsSame(*same, *is)) room = visitor.OnLayer(key, *is) && room;
   inside_ = key;
   entity_from_.clear();

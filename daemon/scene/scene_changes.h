@@ -1,12 +1,12 @@
-// What differs between any two snapshots, told piece by piece: for those who watch the scene.
+// Reports the differences of two snapshots in pieces, for clients that watch the scene.
 //
 //   SceneChanges changes(filter, before, after);
-//   while (!changes.Next(visitor)) …            // each call goes on where the last one stopped
+//   while (!changes.Next(visitor)) …            // each call resumes where the last one stopped
 //
-// The walk holds the two snapshots and a place in them, and nothing that grows with what differs;
-// its cost is of what differs. Objects come first, so that instances find theirs; then layer by
-// layer, in ascending order of (owner, name), each with its entities in ascending order of id.
-// Applied in the order in which they come, the changes make `before` into `after`.
+// The walk holds the two snapshots and a position in them. Its memory does not grow with the
+// differences; its cost depends on them only. Objects come first, so that instances find theirs.
+// Layers follow in ascending order of (owner, name), each with its entities in ascending order of
+// id. Applied in this order, the changes turn `before` into `after`.
 //
 // Single-threaded.
 #pragma once
@@ -19,34 +19,35 @@
 namespace voxeld::daemon {
 
 struct SceneFilter {
-  uint64_t owner = 0;    // 0: all
-  std::string layer;     // empty: all
-  bool objects = false;  // of the owner, whatever the layer
+  uint64_t owner = 0;    // 0: all owners
+  std::string layer;     // empty: all layers
+  bool objects = false;  // include the owner's objects, whatever the layer
 };
 
-// Each answers whether there is room for more; if not, Next returns, and that change has been told.
+// Each function returns whether there is room for more. If not, Next returns; that change counts as
+// reported.
 class SceneChangeVisitor {
  public:
   virtual ~SceneChangeVisitor() = default;
-  // New, or another definition.
+  // The object is new or has another definition.
   virtual bool OnObject(const OwnedName& key, const Object& object) = 0;
   virtual bool OnRemovedObject(const OwnedName& key) = 0;
-  // New, or changed in anything but its entities and counts. A layer that was removed and made
-  // again is told as removed first.
+  // The layer is new, or changed in anything but its entities and counts. A recreated layer is
+  // first reported as removed.
   virtual bool OnLayer(const OwnedName& key, const Layer& layer) = 0;
-  // With all that it held.
+  // The layer was removed with all its entities.
   virtual bool OnRemovedLayer(const OwnedName& key) = 0;
-  // New, or replaced, or moved. Its layer has been told.
+  // The entity is new, replaced or moved. Its layer has been reported before.
   virtual bool OnEntity(const OwnedName& layer, const std::string& id, const Entity& entity) = 0;
   virtual bool OnRemovedEntity(const OwnedName& layer, const std::string& id) = 0;
 };
 
 class SceneChanges {
  public:
-  // `before` null: the empty scene.
+  // `before` null means the empty scene.
   SceneChanges(SceneFilter filter, SnapshotPtr before, SnapshotPtr after);
 
-  // Tells until `visitor` has no room, or to the end: then true, and from then on.
+  // Reports changes until `visitor` has no room. Returns: true at the end, and on every later call.
   bool Next(SceneChangeVisitor& visitor);
 
  private:
@@ -60,11 +61,11 @@ class SceneChanges {
   const SceneFilter filter_;
   const SnapshotPtr before_, after_;
 
-  // The place: everything before it has been told.
+  // The position: everything before it has been reported.
   bool objects_told_ = false;
   OwnedName from_;                   // the next object or layer, or one before it
-  std::optional<OwnedName> inside_;  // the layer whose entities are being told
-  std::string entity_from_;          // the next of them, or one before it
+  std::optional<OwnedName> inside_;  // the layer whose entities are being reported
+  std::string entity_from_;          // the next entity, or one before it
 };
 
 }  // namespace voxeld::daemon

@@ -15,7 +15,7 @@ SnapshotPtr FirstSnapshot() {
   return std::make_shared<const Snapshot>(std::move(empty));
 }
 
-// How much work an operation is, in operations on one primitive.
+// Returns: the cost of an operation, in operations on one primitive.
 uint64_t WorkOf(const Operation& operation) {
   size_t parts = 0;
   if (const auto* upsert = std::get_if<Upsert>(&operation.op)) {

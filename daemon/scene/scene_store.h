@@ -1,8 +1,8 @@
-// The truth about the scene: applies commits, each making one immutable snapshot or none. Commits of different owners
-// can be under way at the same time, each in slices; a commit takes its place in the order of snapshots when it
-// is finished.
+// The authoritative scene. Applies commits; each one creates one immutable snapshot or none.
+// Commits of different owners can be applied concurrently, each in slices. A commit takes its place
+// in the order of snapshots when it is finished.
 //
-// Single-threaded but for Abandon; the snapshots that it gives away may be used anywhere.
+// Single-threaded except for Abandon. The snapshots that it returns may be used by any thread.
 #pragma once
 
 #include <algorithm>
@@ -26,10 +26,11 @@ struct CommitResult {
   bool abandoned = false;  // not applied because of Abandon
   uint64_t applied_operations = 0, refused_operations = 0;
   std::vector<Issue> issues;           // the first max_issues_per_commit
-  std::optional<Issue> first_refusal;  // though it may not be among them
-  uint64_t more_issues = 0;            // that there would have been beyond them
+  std::optional<Issue> first_refusal;  // may not be among `issues`
+  uint64_t more_issues = 0;            // number of issues beyond them
   bool hidden = false;                 // see CommitApplier::hidden
-  // The applied operations. The scene has moved their contents out, but freeing a million of them still takes 50 ms.
+  // The applied operations. Their contents have been moved to the scene, but freeing a million of
+  // them still takes 50 ms.
   std::vector<Operation> spent;
 };
 
@@ -39,35 +40,36 @@ class SceneStore {
   SceneStore(const SceneStore&) = delete;
   SceneStore& operator=(const SceneStore&) = delete;
 
-  // The newest; number 1 is the empty scene (0 is none).
+  // Returns: the newest snapshot. Number 1 is the empty scene; 0 is invalid.
   const SnapshotPtr& snapshot() const { return snapshot_; }
 
-  // What is made from now on, layers too, has greater numbers than this.
+  // Makes everything created from now on, including layers, get numbers greater than this.
   void SkipNumbers(uint64_t greatest) { next_number_ = std::max(next_number_, greatest + 1); }
 
-  // What coordinates are checked against from now on.
+  // Sets the views against which coordinates are checked from now on.
   void SetViews(std::vector<DisplayView> views) { views_ = std::move(views); }
 
-  // How much the scene may grow from now on beside what commits under way have added; without it, by any amount.
-  // `promised` of it is worked out here.
+  // Limits the growth of the scene from now on, in addition to what pending commits have added;
+  // unlimited by default. Computes `promised` itself.
   void SetMemoryRoom(const MemoryRoom& room) { room_ = room; }
 
-  // Applies `operations`, which have passed CheckAlone, as one commit.
-  // With `strict` any refusal, or `refused_before` > 0 (what was refused on arrival),
-  // refuses it whole. Call Expire(now) first.
+  // Applies `operations` as one commit. Requires: they have passed CheckAlone; Expire(now) was
+  // called before. With `strict`, any refusal rejects the whole commit, as does `refused_before` >
+  // 0 (the number of refusals on arrival).
   CommitResult Apply(const Author& author, std::vector<Operation> operations, sync::TimeNs now,
                      bool strict = false, uint64_t refused_before = 0);
 
-  // The same in slices: Begin, Continue until it returns true, Finish. A PendingCommit must not outlive the store.
-  // Destroying one that is not finished leaves the scene as it was. While an owner has a pending commit, the
-  // scene of that owner may change only in that entities expire, layers are removed or hidden, and layers get another
-  // writer.
+  // Does the same in slices: Begin, Continue until it returns true, Finish. A PendingCommit must
+  // not outlive the store. Destroying an unfinished one leaves the scene unchanged. While an owner
+  // has a pending commit, that owner's scene may change only in that entities expire, layers are
+  // removed or hidden, and layers get another writer.
   class PendingCommit;
   std::unique_ptr<PendingCommit> Begin(Author author, std::vector<Operation> operations,
                                        sync::TimeNs now, bool strict = false,
                                        uint64_t refused_before = 0);
-  // Rebases the commit onto the newest snapshot and applies up to `operations` more. A group, and the definition of an
-  // object, count as many operations as they have parts. Returns: true if there is nothing left to apply, or after Abandon.
+  // Rebases the commit onto the newest snapshot and applies up to `operations` more. A group, and
+  // the definition of an object, count as many operations as they have parts. Returns: true if
+  // nothing is left to apply, or after Abandon.
   bool Continue(PendingCommit& pending, uint64_t operations);
   // Ends a commit for which Continue has returned true.
   CommitResult Finish(std::unique_ptr<PendingCommit> pending);
@@ -75,41 +77,42 @@ class SceneStore {
   static void SetQuotas(PendingCommit& pending, bool suppressed, uint64_t max_bytes,
                         uint64_t max_entities);
 
-  // FailedPrecondition, as CheckView has it, if the scene, or what a commit under way has made of it, does not fit `view`.
+  // Errors: FailedPrecondition, as from CheckView, if the scene or a pending commit does not fit
+  // `view`.
   absl::Status CheckNewView(const DisplayView& view);
 
-  // Any thread. From now on no commit is applied, and one under way is given up between two of its
-  // operations: for a daemon that must end in time.
+  // Prevents all further commits and aborts a running one between two operations, so that the
+  // daemon can stop in time. May be called on any thread.
   void Abandon() { abandoned_ = true; }
 
-  // Removes what has outlived its lifetime by `now`; one snapshot for each moment at which
-  // something ended, in order of time. True if there is a new snapshot.
+  // Removes entities whose lifetime has ended by `now`, in one snapshot for each expiry time, in
+  // order of time. Returns: whether there is a new snapshot.
   bool Expire(sync::TimeNs now);
-  // kNever if nothing will.
+  // Returns: kNever if nothing will expire.
   sync::TimeNs next_expiry() const;
 
   struct Removed {
     uint64_t entities = 0, layers = 0;
-    std::vector<uint64_t> owners;  // whose layers were affected; ascending, each once
+    std::vector<uint64_t> owners;  // whose layers were affected; ascending, without duplicates
   };
-  // Clears every layer for which `matches` holds, and removes the layers themselves unless
-  // keep_state. A new snapshot only if that changed something.
+  // Clears every layer for which `matches` returns true, and removes these layers unless keep_state
+  // is set. Creates a snapshot only if something changes.
   Removed RemoveLayers(const std::function<bool(const OwnedName&, const Layer&)>& matches,
                        bool keep_state);
 
-  // Hides all layers of an owner, or shows them as they say of themselves. A new snapshot only if that changed
-  // something.
+  // Hides all layers of an owner, or restores their own visibility. Creates a snapshot only if
+  // something changes.
   void Suppress(uint64_t owner, bool suppressed);
-  // The layers that `session` last wrote get `writer` in the place of theirs: it has ended, or was taken up. A new
-  // snapshot only if that changed something.
+  // Replaces the writer of the layers that `session` wrote last, because the session has ended or
+  // was resumed. Creates a snapshot only if something changes.
   void HandOver(uint64_t session, const WriterPtr& writer);
 
-  // Drops the objects of an owner who has no session any more, unless layers of theirs are left.
+  // Drops the objects of an owner without sessions, unless the owner still has layers.
   void ForgetOwner(uint64_t owner);
 
  private:
   void Publish(Draft draft);
-  // Puts the commit on top of the newest snapshot.
+  // Rebases the commit onto the newest snapshot.
   void Rebase(PendingCommit& pending);
   // Returns: what all pending commits except `pending` have added.
   OwnerTally PromisedBeside(const PendingCommit& pending) const;

@@ -1,7 +1,7 @@
-// The scene at one moment, immutable: what every display draws from and every query reads.
+// The immutable scene at one moment, from which every display draws and every query reads.
 //
-// Snapshots share what they have in common, so one costs what changed since the one before, and the
-// difference of any two costs what differs.
+// Snapshots share common parts, so a snapshot costs what has changed since the previous one, and a
+// difference of two costs what differs.
 #pragma once
 
 #include <cstdint>
@@ -23,12 +23,12 @@ struct Writer {
   uint64_t session = 0;
   std::string client_name;
   bool ended = false;  // its layers are orphaned
-  bool keep = false;   // they outlive it, and the daemon
+  bool keep = false;   // its layers outlive it and the daemon
   bool operator==(const Writer&) const = default;
 };
 using WriterPtr = std::shared_ptr<const Writer>;
 
-// (owner, name): of a layer or of an object.
+// Owner and name of a layer or an object.
 struct OwnedName {
   uint64_t owner = 0;
   std::string name;
@@ -41,8 +41,8 @@ struct OwnedName {
 
 struct Entity {
   EntityData data;
-  uint64_t number = 0;    // unique in the store; stays when an entity of the same key is replaced
-  uint64_t sequence = 0;  // of its last upsert
+  uint64_t number = 0;    // unique in the store; stays when an entity with the same key is replaced
+  uint64_t sequence = 0;  // of the last upsert
   sync::TimeNs expires_ns = sync::kNever;
   uint64_t bytes = 0;
 };
@@ -50,7 +50,7 @@ using EntityPtr = std::shared_ptr<const Entity>;
 using EntityMap = PersistentMap<std::string, EntityPtr>;
 
 struct Layer {
-  uint64_t number = 0;  // of creation; the engine's id
+  uint64_t number = 0;  // assigned on creation; also the engine's id
   bool visible = true;
   bool suppressed = false;  // its owner is hidden by an operator
   uint32_t opacity = 255;
@@ -59,12 +59,12 @@ struct Layer {
   gpu::Affine transform;
   Clip clip;
   std::optional<gpu::Region> region;
-  std::string mask;  // a layer of the same owner, which need not be there; empty: none
+  std::string mask;  // a layer of the same owner, which may not exist; empty: none
   bool shown() const { return visible && !suppressed; }
   WriterPtr writer;
   EntityMap entities;
   uint64_t bytes = 0;
-  // Holds every entity, in the layer's coordinates; wider than need be after removals.
+  // Contains every entity, in the layer's coordinates; may be too wide after removals.
   Bounds bounds;
 };
 using LayerPtr = std::shared_ptr<const Layer>;
@@ -72,15 +72,15 @@ using LayerPtr = std::shared_ptr<const Layer>;
 struct Object {
   std::shared_ptr<const ObjectData> data;
   uint64_t bytes = 0;
-  // Derived from the definition and those that it refers to.
+  // Derived from the definition and the objects that it refers to.
   uint32_t depth = 1;      // 1: no instances inside
   uint64_t drawables = 0;  // primitives that one instance draws; saturates
-  uint64_t derived = 0;    // bytes that one engine derives from one instance at most; saturates
+  uint64_t derived = 0;    // maximum of bytes that one engine derives from one instance; saturates
   Bounds bounds;           // in the object's coordinates
 };
 using ObjectPtr = std::shared_ptr<const Object>;
 
-// Something that refers to an object: an entity (layer, id), or another object (its name in
+// A reference to an object: from an entity (layer, id), or from another object (its name in
 // `layer`, no id).
 struct UseKey {
   uint64_t owner = 0;
@@ -96,7 +96,7 @@ struct UseKey {
 
 struct ExpiryKey {
   sync::TimeNs time_ns = 0;
-  uint64_t entity = 0;  // its number
+  uint64_t entity = 0;  // number of the entity
   auto operator<=>(const ExpiryKey&) const = default;
   template <typename H>
   friend H AbslHashValue(H h, const ExpiryKey& k) {
@@ -110,21 +110,21 @@ struct EntityPlace {
   auto operator<=>(const EntityPlace&) const = default;
 };
 
-// Beside what engines derive, so much is held of each drawable: by the index of what an engine has, and in passing by the
-// delta that brings it there.
+// Memory for each drawable in addition to what engines derive: the index of an engine's content,
+// and temporarily the delta that updates it.
 inline constexpr uint64_t kHeldBytesPerDrawable = 800;
 
-// What counts against quotas: an owner's, or everybody's together.
+// Amounts that count against quotas, for one owner or for all together.
 struct OwnerTally {
-  uint64_t drawables = 0;  // entities, an instance counting as what it draws (at least 1)
+  uint64_t drawables = 0;  // entities; an instance counts as many as it draws (at least 1)
   uint64_t layers = 0;
   uint64_t bytes = 0;
-  uint64_t derived = 0;  // that each engine derives from them at most (MostDerivedBytes)
+  uint64_t derived = 0;  // maximum that each engine derives from them (MostDerivedBytes)
   bool operator==(const OwnerTally&) const = default;
 };
 
 struct Snapshot {
-  uint64_t number = 0;  // ascending; 0: of no store
+  uint64_t number = 0;  // ascending; 0: not from a store
   PersistentMap<OwnedName, LayerPtr> layers;
   PersistentMap<OwnedName, ObjectPtr> objects;
   PersistentMap<UseKey, bool> uses;

@@ -15,7 +15,7 @@ absl::Status CheckView(const Draft& scene, const DisplayView& view, const Limits
     const auto reach = [&](const Bounds& bounds) {
       return LargestMagnitude(MapBounds(map, bounds));
     };
-    // The layer's own bounds may be wider than what is in it.
+    // The layer's own bounds may be wider than its content.
     if (reach(layer.bounds) <= limits.max_coordinate_voxels) return;
     layer.entities.ForEach([&](const std::string& id, const EntityPtr& entity) {
       const double largest =

@@ -1,4 +1,4 @@
-// Whether a scene can be shown through another view.
+// Checks whether a scene can be shown with another view.
 #pragma once
 
 #include "absl/status/status.h"
@@ -8,8 +8,8 @@
 
 namespace voxeld::daemon {
 
-// FailedPrecondition, with the entity and where it would lie, if one of `scene` would be beyond
-// limits.max_coordinate_voxels through `view`. Costs the layers; the entities only of those layers
+// Errors: FailedPrecondition with the entity and its position if an entity of `scene` would exceed
+// limits.max_coordinate_voxels through `view`. Visits all layers, but the entities only of layers
 // that may not fit.
 absl::Status CheckView(const Draft& scene, const DisplayView& view, const Limits& limits);
 
