@@ -19,7 +19,8 @@ namespace {
 
 using Acceptor = std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor>;
 
-// TLS by gRPC's C interface, which alone asks for certificates at each handshake.
+// Implements TLS through gRPC's C interface, because only that asks for certificates at each
+// handshake.
 class TlsCredentials final : public grpc::ServerCredentials {
  public:
   explicit TlsCredentials(const access::TlsStore& store) : store_(store) {
@@ -40,7 +41,7 @@ class TlsCredentials final : public grpc::ServerCredentials {
     return grpc_server_add_http2_port(server, address.c_str(), credentials_);
   }
 
-  // gRPC's, one at a time.
+  // Called by gRPC, one call at a time.
   static grpc_ssl_certificate_config_reload_status Fetch(
       void* self_pointer, grpc_ssl_server_certificate_config** config) {
     auto* self = static_cast<TlsCredentials*>(self_pointer);
@@ -59,9 +60,10 @@ class TlsCredentials final : public grpc::ServerCredentials {
   std::atomic<uint64_t> given_ = 0;
 };
 
-// Says whose a call's connection is.
-// A connection's calls share its AuthContext: it is written by the first of them, before any of their handlers reads it, and never
-// again, since what is added stays as long as the connection, and adding moves what others may be reading.
+// Records the user of a call's connection. All calls of a connection share its AuthContext. The
+// first call writes the property before any handler reads it. It is never written again, because
+// properties stay as long as the connection, and adding one moves what other threads may be
+// reading.
 class UserTeller final : public grpc::AuthMetadataProcessor {
  public:
   static constexpr int64_t kNobody = -1;
@@ -76,7 +78,7 @@ class UserTeller final : public grpc::AuthMetadataProcessor {
     return grpc::Status::OK;
   }
 
-  // Set once, before the first connection comes.
+  // Set once, before the first connection is accepted.
   std::atomic<int64_t> user = kNobody;
 
  private:

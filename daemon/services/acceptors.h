@@ -1,10 +1,10 @@
-// How connections come to gRPC: each kind by an acceptor of its own, so that a call can be asked what
-// its connection was.
+// Hands connections to gRPC. Each kind has its own acceptor, so that a call's handler can find out
+// the kind of its connection.
 //
-//   TCP           as it is
-//   TLS           with a client certificate that is verified; by what the store has at the time
-//   unix socket   an acceptor for each user, by the kernel's word (SO_PEERCRED); gRPC has no name for
-//                 the connections themselves
+//   TCP           unchanged
+//   TLS           with a verified client certificate; uses the store's current files
+//   unix socket   one acceptor per user, according to the kernel (SO_PEERCRED), because gRPC has no
+//                 names for such connections
 #pragma once
 
 #include <memory>
@@ -21,11 +21,11 @@ namespace voxeld::daemon::services {
 
 class Acceptors {
  public:
-  // Different users of unix sockets as long as the daemon runs; the connections of further ones are
-  // closed.
+  // Maximum number of different users of unix sockets while the daemon runs; connections of further
+  // users are closed.
   static constexpr size_t kMostUsers = 64;
 
-  // `tls`: none: nobody listens for TLS. Outlives the server.
+  // `tls` null: no address uses TLS. Otherwise it must outlive the server.
   explicit Acceptors(const access::TlsStore* tls);
   ~Acceptors();
   Acceptors(const Acceptors&) = delete;
@@ -33,8 +33,8 @@ class Acceptors {
 
   void AddTo(grpc::ServerBuilder& builder);
 
-  // Hands over. On the listener's thread, after the server has started. False, and it is closed: there
-  // are too many users.
+  // Takes a connection. Call on the listener's thread after the server has started. Returns: false
+  // if there are too many users; the connection is then closed.
   bool Take(const listen::Accepted& accepted, Descriptor connection);
 
  private:

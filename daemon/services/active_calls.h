@@ -1,4 +1,4 @@
-// Calls that are open. At shutdown each is told to end.
+// Registers open calls, so that all can be ended at shutdown.
 #pragma once
 
 #include <functional>
@@ -17,11 +17,11 @@ namespace voxeld::daemon::services {
 class ActiveCall {
  public:
   virtual ~ActiveCall() = default;
-  // Ends the call with `status` once what is queued for its client has been written. May be called
-  // from any thread, and more than once.
+  // Ends the call with `status` after writing what is queued for its client. May be called from any
+  // thread and repeatedly.
   virtual void End(const absl::Status& status) = 0;
 
-  // Whose it is; set before it is among others.
+  // Set the caller before adding the call to ActiveCalls.
   void SetCaller(access::Caller caller) { caller_ = std::move(caller); }
   const access::Caller& caller() const { return caller_; }
 
@@ -32,14 +32,16 @@ class ActiveCall {
 // Thread-safe.
 class ActiveCalls {
  public:
-  // `call` is kept until Remove. After EndAll it is told to end at once.
+  // Holds `call` until Remove. After EndAll it ends the call at once.
   void Add(std::shared_ptr<ActiveCall> call);
   void Remove(const ActiveCall* call);
 
   void EndAll(const absl::Status& status);
-  // Ends those of whose callers `check` says something else than OK, with that. Answers how many.
+  // Ends each call for whose caller `check` returns an error, with that error. Returns: the number
+  // of calls.
   size_t EndRevoked(const std::function<absl::Status(const access::Caller&)>& check);
-  // Until none is left, or `deadline` of `clock`. Answers how many are.
+  // Waits until no calls are left, or until `deadline` of `clock`. Returns: the number of remaining
+  // calls.
   size_t AwaitNone(sync::Clock& clock, sync::TimeNs deadline);
 
  private:

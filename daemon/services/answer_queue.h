@@ -1,5 +1,5 @@
-// What one stream's client is to be told and has not been sent: issues, receipts, credit, pongs. What waits together
-// goes in one message.
+// The messages that one stream's client has not been sent yet: issues, receipts, credit and pongs.
+// Everything queued is combined into one message.
 //
 // Single-threaded; charges the budget for what it holds.
 #pragma once
@@ -26,34 +26,34 @@ class AnswerQueue {
   AnswerQueue(const AnswerQueue&) = delete;
   AnswerQueue& operator=(const AnswerQueue&) = delete;
 
-  // A serialised StreamResponse with nothing but Opened; it goes alone and first.
+  // `message` is a serialized StreamResponse with nothing but Opened. It is sent alone and first.
   void AddOpened(std::string message) { opened_ = std::move(message); }
-  // False: the budget is used up, much waits here already, and the answer is dropped.
+  // Returns: false, dropping the answer, if the budget is exhausted and much is queued here.
   [[nodiscard]] bool Add(Issue issue);
   [[nodiscard]] bool Add(Receipt receipt);
-  // Replaces what was there before: both only grow, or are asked for anew.
+  // Replaces the previous credit; the total only grows.
   void SetCredit(uint64_t total_bytes) { credit_ = total_bytes; }
-  // Of one Ping each; the first kMostPongs that wait.
+  // Adds the answer to a Ping; at most kMostPongs are queued.
   void AddPong(int64_t client_time_ns, sync::TimeNs received_ns);
 
   bool empty() const { return answers_.empty() && !opened_ && credit_ == 0 && pongs_.empty(); }
   size_t size() const { return answers_.size(); }  // issues and receipts
-  size_t bytes() const { return bytes_; }          // that they hold here
+  size_t bytes() const { return bytes_; }          // used by these in the queue
 
-  // The next message, serialised, of about kMessageBytes at most; the queue is not empty, and what was popped before
-  // has been written. `now` becomes its server time.
+  // Returns: the next serialized message, at most about kMessageBytes. Requires: the queue is not
+  // empty, and the last message has been written. `now` becomes its server time.
   std::string Pop(sync::TimeNs now);
-  // What was popped is on its way.
+  // The last message has been written.
   void Written() { popped_.clear(); }
-  // Nobody will be told: the outcomes among what waits or was popped and not written, in order; the
-  // rest goes.
+  // Call when nothing more will be sent. Returns: in order, the outcomes that are queued or were
+  // popped but not written; drops the rest.
   std::vector<Receipt> TakeOutcomes();
   void Clear();
 
  private:
   static constexpr size_t kMessageBytes = 64u << 10;
   static constexpr size_t kMostPongs = 16;
-  // A client that reads is told, whatever others have used up.
+  // A client that reads may always queue this much, regardless of the budget.
   static constexpr size_t kAlwaysBytes = 64u << 10;
   using Answer = std::variant<Issue, Receipt>;
   struct PongDue {

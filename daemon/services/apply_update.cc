@@ -20,7 +20,7 @@ class Update final : public SessionSink, public std::enable_shared_from_this<Upd
   Update(Core& core, UpdateDone done) : core_(core), done_(std::move(done)) {}
 
   void Start(OpenOptions open, wire::Decoded decoded, uint64_t bytes) {
-    // Until it is staged, or dropped.
+    // Charged until the operations are staged or dropped.
     const std::shared_ptr<void> arriving(nullptr, [budget = core_.budget(), bytes](void*) {
       budget->Release(Budget::Use::kArriving, bytes);
     });
@@ -55,7 +55,7 @@ class Update final : public SessionSink, public std::enable_shared_from_this<Upd
       if (const auto* accepted = std::get_if<Accepted>(&receipt.what)) {
         response_.set_snapshot(accepted->snapshot);
       } else if (const auto* refused = std::get_if<Refused>(&receipt.what)) {
-        status = absl::InvalidArgumentError(refused->message);  // which names the first
+        status = absl::InvalidArgumentError(refused->message);  // names the first refusal
       } else {
         return;
       }
@@ -79,13 +79,13 @@ class Update final : public SessionSink, public std::enable_shared_from_this<Upd
     Answer(status);
   }
 
-  // Once, and only after `answered_`: nobody else touches the response then.
+  // Call once and only after `answered_`, when no other thread uses the response.
   void Answer(const absl::Status& status) { done_(status, response_); }
 
   Core& core_;
   const UpdateDone done_;
   sync::Mutex mutex_;
-  v1::ApplyUpdateResponse response_;  // grows until `answered_`
+  v1::ApplyUpdateResponse response_;  // filled until `answered_`
   SessionId session_ VOXELD_GUARDED_BY(mutex_) = 0;
   uint64_t incarnation_ VOXELD_GUARDED_BY(mutex_) = 0;
   bool answered_ VOXELD_GUARDED_BY(mutex_) = false;

@@ -1,4 +1,5 @@
-// SceneService.ApplyUpdate apart from gRPC: a session of its own, opened, applied and closed.
+// Implements SceneService.ApplyUpdate independently of gRPC: opens a session, applies the update
+// and closes the session.
 #pragma once
 
 #include <functional>
@@ -14,11 +15,11 @@ class ApplyUpdateResponse;
 
 namespace voxeld::daemon::services {
 
-// Called once, whatever becomes of the core; from the core's thread or from within. The response
-// holds if the status is OK.
+// Called exactly once, even if the core stops, on the core's thread or before ApplyUpdate returns.
+// The response is valid if the status is OK.
 using UpdateDone = std::function<void(const absl::Status&, const v1::ApplyUpdateResponse&)>;
 
-// `slices` are an ApplyUpdateRequest, read before the call returns.
+// `slices` are the bytes of an ApplyUpdateRequest; they are read before the call returns.
 void ApplyUpdate(ServiceContext& context, const access::Caller& caller,
                  std::span<const std::string_view> slices, UpdateDone done);
 

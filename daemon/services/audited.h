@@ -1,4 +1,4 @@
-// One call that the audit log has a line of: who asked, for what, and what came of it.
+// A call with an entry in the audit log: who asked for what, and the result.
 #pragma once
 
 #include <functional>
@@ -18,23 +18,23 @@ class CallbackServerContext;
 
 namespace voxeld::daemon::services {
 
-// Copies stand for the same call; one of them is told what came of it, once.
+// Copies represent the same call. Report the result to one of them, once.
 class Audited {
  public:
-  // `without_fields`: what a request asks for in which none is set.
+  // `without_fields` describes a request in which no field is set.
   Audited(ServiceContext& context, const grpc::CallbackServerContext& call, const char* method,
           const google::protobuf::Message& request, const char* without_fields = "nothing");
 
-  // Names the caller; before that, the entry says that it was turned away.
+  // Sets the caller. Before that, the entry says that the call was rejected.
   void By(const access::Caller& caller) { who_ = caller.who; }
 
   // Returns: Unavailable if the audit log is required and cannot be written; the call is then refused.
   absl::Status MayAct() const;
 
-  // Writes the line; answers `result`.
+  // Writes the entry. Returns: `result`.
   absl::Status Done(const absl::Status& result) const;
 
-  // `reply`, with the line written first.
+  // Returns: `reply`, preceded by writing the entry.
   template <typename T>
   std::function<void(absl::StatusOr<T>)> Watching(
       std::function<void(absl::StatusOr<T>)> reply) const {

@@ -16,8 +16,8 @@ namespace {
 
 constexpr size_t kMostSockets = 16384;
 
-// What follows `key` in `json`, up to the next quote; `at` moves behind it. Our keys stand for one
-// thing each, and no text of a client's is among them.
+// Returns: the text after `key` in `json`, up to the next quote, and advances `at` past it. The
+// keys are unambiguous, because the JSON contains no text from clients.
 std::string_view TextAfter(std::string_view json, std::string_view key, size_t* at) {
   const size_t found = json.find(key, *at);
   if (found == std::string_view::npos) return {};
@@ -100,7 +100,7 @@ void CallMeter::Run() {
 void CallMeter::Look() {
   bool listed = false;
   for (const listen::Guard::Busy& busy : guard_.TakeBusy()) {
-    // A number that was another connection's of the same name has nothing to say any more.
+    // Discards the number of an earlier connection with the same name, and retries.
     for (;;) {
       const auto known = sockets_.find(busy.peer);
       const std::string json =
@@ -113,14 +113,14 @@ void CallMeter::Look() {
         break;
       }
       if (known != sockets_.end()) sockets_.erase(known);
-      if (std::exchange(listed, true)) break;  // no call of it has begun, or it has gone meanwhile
+      if (std::exchange(listed, true)) break;  // no call of it has begun, or it has closed
       ListSockets();
     }
   }
 }
 
 void CallMeter::ListSockets() {
-  if (sockets_.size() > kMostSockets) {  // most of them have gone
+  if (sockets_.size() > kMostSockets) {  // most of them have closed
     sockets_.clear();
     next_socket_ = 0;
   }

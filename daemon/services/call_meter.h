@@ -1,7 +1,6 @@
-// Says what comes of connections' bytes, for the guard: the calls that clients give up, those that
-// begin, and their messages. Calls that are reset before
-// their request is whole never come to a service, nor to an interceptor, yet each costs as much as any
-// other; gRPC's own figures of a connection (channelz) have them all.
+// Tells the guard what connections' bytes result in: cancelled calls, new calls and messages. Calls
+// that are reset before their request is complete reach neither services nor interceptors, yet cost
+// as much as others. Only gRPC's statistics of a connection (channelz) include all of them.
 #pragma once
 
 #include <cstdint>
@@ -16,25 +15,25 @@
 
 namespace voxeld::daemon::services {
 
-// Of one connection, since it was accepted.
+// Totals of one connection since it was accepted.
 struct CallTotals {
   uint64_t started = 0, succeeded = 0, failed = 0, messages = 0;
 
-  // Those that ended without an answer, and those that must have: more than `at_once` are not ended,
-  // which is what the connection may have.
+  // Returns: the number of calls that ended without an answer. Calls beyond `at_once` without a
+  // result must have ended, because the connection may have only that many.
   uint64_t Cancelled(uint64_t at_once) const;
   uint64_t Open() const;
-  // From channelz' JSON of a socket. What is not there is 0.
+  // Parses channelz' JSON of a socket. Missing values are 0.
   static CallTotals FromJson(std::string_view json);
 };
 
-// On a thread of its own, as long as it lives; looks only at connections that are busy, and sleeps while
-// none is.
+// Runs on its own thread. Checks only connections that are busy, and sleeps if there are none.
 class CallMeter {
  public:
   static constexpr sync::TimeNs kInterval = 20 * sync::kMillisecond;
 
-  // `guard` and the clock outlive the meter. `at_once`: calls that a connection may have.
+  // `guard` and the clock must outlive the meter. `at_once` is the limit on concurrent calls of a
+  // connection.
   CallMeter(listen::Guard& guard, uint64_t at_once, sync::Clock& clock);
   ~CallMeter();
   CallMeter(const CallMeter&) = delete;
@@ -43,13 +42,13 @@ class CallMeter {
  private:
   void Run();
   void Look();
-  // Those that came since it was last called.
+  // Adds the sockets that were created since the last call.
   void ListSockets();
 
   listen::Guard& guard_;
   const uint64_t at_once_;
   sync::Clock& clock_;
-  // Channelz' numbers by the peer's name, and the least that is not among them; the thread's own.
+  // Channelz' numbers by peer name, and the smallest unknown number. Used by the thread only.
   std::map<std::string, int64_t> sockets_;
   int64_t next_socket_ = 0;
   sync::Mutex mutex_;

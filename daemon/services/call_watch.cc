@@ -17,7 +17,7 @@ using grpc::experimental::InterceptionHookPoints;
 using grpc::experimental::InterceptorBatchMethods;
 using grpc::experimental::ServerRpcInfo;
 
-// Of the daemon's own services.
+// Package of the daemon's own services.
 constexpr std::string_view kOwnPackage = "/voxeld.";
 
 bool Understood(grpc::StatusCode code) {
@@ -33,8 +33,8 @@ bool Understood(grpc::StatusCode code) {
   }
 }
 
-// One call. gRPC runs its hooks from several threads: those of a stream's reads and writes may be at
-// the same time, each of them one after another.
+// Watches one call. gRPC runs its hooks on several threads: the hooks of reads may run concurrently
+// with those of writes, but each kind is sequential.
 class CallWatch final : public grpc::experimental::Interceptor {
  public:
   CallWatch(listen::Guard& guard, ServerRpcInfo* info)
@@ -69,8 +69,8 @@ class CallWatch final : public grpc::experimental::Interceptor {
   listen::Guard& guard_;
   const bool authorises_;
   const std::string peer_;
-  std::atomic<bool> heard_ = false;  // by reads
-  bool answered_ = false;            // by writes
+  std::atomic<bool> heard_ = false;  // used by reads
+  bool answered_ = false;            // used by writes
 };
 
 class Factory final : public grpc::experimental::ServerInterceptorFactoryInterface {

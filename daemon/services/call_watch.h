@@ -1,4 +1,4 @@
-// Tells the guard of connections what their calls come to.
+// Reports the progress of calls to the connection guard.
 #pragma once
 
 #include <memory>
@@ -13,11 +13,11 @@ class Guard;
 
 namespace voxeld::daemon::services {
 
-// For every call of every service, also those to come: its first message counts as one; its first
-// answer authorises the connection if the service is the daemon's own. An answer is a message, or a
-// status that says that the request was understood: OK, NOT_FOUND, ALREADY_EXISTS, ABORTED,
-// FAILED_PRECONDITION. What anybody may ask (health, reflection) authorises nobody.
-// `guard` outlives the server.
+// Watches every call of every service, including future ones. The first message of a call counts as
+// one; its first answer authorises the connection if the service is the daemon's own. An answer is
+// a message, or a status which shows that the request was understood: OK, NOT_FOUND,
+// ALREADY_EXISTS, ABORTED, FAILED_PRECONDITION. Services without access control (health,
+// reflection) authorise nobody. `guard` must outlive the server.
 std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeCallWatch(
     listen::Guard& guard);
 

@@ -39,7 +39,7 @@ absl::StatusOr<access::Credentials> CredentialsOf(const grpc::CallbackServerCont
   }
   const std::shared_ptr<const grpc::AuthContext> peer = call.auth_context();
   if (peer == nullptr) return credentials;
-  if (peer->IsPeerAuthenticated()) {  // by TLS alone
+  if (peer->IsPeerAuthenticated()) {  // true for TLS only
     credentials.certificate = Property(*peer, GRPC_X509_CN_PROPERTY_NAME);
     if (!credentials.certificate.has_value()) {
       credentials.certificate = Property(*peer, GRPC_X509_SAN_PROPERTY_NAME);

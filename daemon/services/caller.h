@@ -1,4 +1,4 @@
-// Who makes a call, and whether they may.
+// Identifies the caller of a call and checks its scopes.
 #pragma once
 
 #include <string>
@@ -14,17 +14,17 @@ class CallbackServerContext;
 
 namespace voxeld::daemon::services {
 
-// The property of a connection's AuthContext that has its user's number, where it is a unix socket's.
+// Property of an AuthContext with the user id of a unix socket's peer.
 inline constexpr char kUserProperty[] = "voxeld_user";
 
-// A call's caller, if it may do what `scope` names. Else Unauthenticated (nobody in particular; a token
-// would help), PermissionDenied (somebody who may not) or Unavailable, counted and, as often as the
-// log's gate allows, logged. Every method of every service of the daemon begins with it.
+// Returns: the caller if it has `scope`. Every method of the daemon's services calls this first.
+// Errors: Unauthenticated (no identity; a token would help), PermissionDenied (the identity lacks
+// the scope) or Unavailable. Errors are counted, and logged as often as the log gate allows.
 absl::StatusOr<access::Caller> Authorise(ServiceContext& context,
                                          const grpc::CallbackServerContext& call,
                                          access::Scope scope, const char* method);
 
-// Where the call came from, as listen::PeerName has it.
+// Returns: the call's peer in the form of listen::PeerName.
 std::string PeerOf(const grpc::CallbackServerContext& call);
 
 }  // namespace voxeld::daemon::services

@@ -1,4 +1,4 @@
-// DisplayService: every method one line over what it does.
+// Implements the methods of DisplayService; each one delegates.
 #include <grpcpp/support/server_callback.h>
 
 #include <memory>
@@ -94,7 +94,7 @@ class DisplayService final : public v1::DisplayService::CallbackService {
     return reactor;
   }
 
-  // Whether the caller may look.
+  // Checks whether the caller has the scope view.
   absl::Status May(CallbackServerContext* call, const char* method) {
     return Authorise(context_, *call, Scope::kView, method).status();
   }

@@ -1,4 +1,4 @@
-// The long calls of DisplayService: WatchStats, WatchVolume and CaptureVolume.
+// The streaming calls of DisplayService: WatchStats, WatchVolume and CaptureVolume.
 #include <grpcpp/alarm.h>
 #include <grpcpp/support/server_callback.h>
 
@@ -19,8 +19,8 @@
 namespace voxeld::daemon::services {
 namespace {
 
-// A call that sends one message after another. Owns itself until gRPC is done with it;
-// the core may hold it longer.
+// A call that sends one message at a time. Owns itself until gRPC has finished with it; the core
+// may hold it longer.
 template <typename Message>
 class Sender : public grpc::ServerWriteReactor<Message>,
                public ActiveCall,
@@ -62,7 +62,7 @@ class Sender : public grpc::ServerWriteReactor<Message>,
  protected:
   virtual void OnSent() = 0;
   virtual void OnAlarm() {}
-  virtual void OnEnded() {}  // the last of all; Begin was called
+  virtual void OnEnded() {}  // called last, and only if Begin was called
 
   void Send(Message message) {
     sync::MutexLock lock(mutex_);
@@ -143,7 +143,7 @@ class StatsWatch final : public Sender<v1::Stats> {
   bool once_ = false;
 };
 
-// At least one.
+// Returns: at least one.
 int32_t SlicesOfAChunk(const display::FrameLayout& layout) {
   constexpr size_t kChunkBytes = 1u << 20;
   const size_t each = static_cast<size_t>(layout.width) * static_cast<size_t>(layout.height) * 3;
@@ -158,8 +158,8 @@ v1::VolumeChunk Chunk(const display::DecodedVolume& volume, int32_t first, int32
   return chunk;
 }
 
-// What a client has taken is told to the feed by its reading: the next volume is asked for when the last message of
-// the one before has gone out.
+// Watches volumes. The client's reading paces the feed: the next volume is requested when the last
+// message of the previous one has been sent.
 class VolumeWatch final : public Sender<v1::VolumeChunk> {
  public:
   using Sender::Sender;
@@ -173,7 +173,7 @@ class VolumeWatch final : public Sender<v1::VolumeChunk> {
         request.name(), [self = Self()](absl::StatusOr<DisplayDescription> display) {
           if (!display.ok()) return self->End(display.status());
           self->display_ = *std::move(display);
-          // Not held by the feed, which is held by it.
+          // Weak, because this object holds the feed.
           std::weak_ptr<VolumeWatch> weak = self;
           const auto feed = VolumeFeed::Open(self->context_.core, self->context_.clock,
                                              self->display_.info.name, [weak] {
@@ -194,7 +194,7 @@ class VolumeWatch final : public Sender<v1::VolumeChunk> {
     return std::static_pointer_cast<VolumeWatch>(shared_from_this());
   }
 
-  // From the display's thread: decoding and copying are for gRPC's.
+  // Called on the display's thread; leaves decoding and copying to a gRPC thread.
   void WakeUp() {
     sync::MutexLock lock(feeding_);
     if (over_) return;
@@ -213,7 +213,7 @@ class VolumeWatch final : public Sender<v1::VolumeChunk> {
     if (feed == nullptr) return;
     absl::StatusOr<std::optional<VolumeFeed::Change>> change = feed->Take();
     if (!change.ok()) return End(change.status());
-    if (!change->has_value()) return;  // WakeUp comes
+    if (!change->has_value()) return;  // WakeUp will be called
     change_ = **std::move(change);
     next_ = 0;
     v1::VolumeChunk chunk;
@@ -241,15 +241,15 @@ class VolumeWatch final : public Sender<v1::VolumeChunk> {
     feed_ = nullptr;
   }
 
-  // Set before the feed is there, then touched by one reaction after another.
+  // Set before the feed exists, then used by one reaction at a time.
   WatchSlots::Slot slot_;
   DisplayDescription display_;
   VolumeFeed::Change change_;
-  size_t next_ = 0;  // of change_.slices
+  size_t next_ = 0;  // index into change_.slices
 
   sync::Mutex feeding_;
   std::shared_ptr<VolumeFeed> feed_ VOXELD_GUARDED_BY(feeding_);
-  bool ready_ VOXELD_GUARDED_BY(feeding_) = false;  // before the feed was there
+  bool ready_ VOXELD_GUARDED_BY(feeding_) = false;  // a change arrived before the feed existed
   bool over_ VOXELD_GUARDED_BY(feeding_) = false;
 };
 
@@ -306,7 +306,8 @@ class Capture final : public Sender<v1::VolumeChunk> {
     if (over) core_.CancelCapture(display_.info.name, id);
   }
 
-  // A client that is gone must not keep the display at work, nor the place of another.
+  // Cancels the capture: a client that has gone must neither keep the display busy nor occupy a
+  // slot.
   void OnEnded() override {
     std::optional<CaptureId> asked;
     {
@@ -321,7 +322,7 @@ class Capture final : public Sender<v1::VolumeChunk> {
     const int32_t left = volume_.layout.slices - next_slice_;
     if (left == 0) return End(absl::OkStatus());
     const int32_t count = std::min(left, SlicesOfAChunk(volume_.layout));
-    const int32_t first = std::exchange(next_slice_, next_slice_ + count);  // before it can be sent
+    const int32_t first = std::exchange(next_slice_, next_slice_ + count);  // update before sending
     Send(Chunk(volume_, first, count));
   }
 
@@ -331,7 +332,7 @@ class Capture final : public Sender<v1::VolumeChunk> {
   std::optional<CaptureId> asked_ VOXELD_GUARDED_BY(asking_);
   bool over_ VOXELD_GUARDED_BY(asking_) = false;
 
-  // Set before the first message goes out, then touched by one reaction after another.
+  // Set before the first message is sent, then used by one reaction at a time.
   DisplayDescription display_;
   display::DecodedVolume volume_;
   int32_t next_slice_ = 0;

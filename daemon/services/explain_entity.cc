@@ -38,7 +38,7 @@ v1::Visibility ToWire(Visibility visibility) {
   return v1::VISIBILITY_UNSPECIFIED;
 }
 
-// Why nothing of the scene is to be seen there; empty: it is.
+// Returns: why the display shows nothing of the scene; empty: it does.
 std::string DarkBecause(const DisplayDescription& display) {
   if (display.blank) return "is blanked";
   if (display.pattern != TestPattern::kNone) return "shows a test pattern";

@@ -1,4 +1,4 @@
-// SceneService.ExplainEntity apart from gRPC.
+// Implements SceneService.ExplainEntity independently of gRPC.
 #pragma once
 
 #include <functional>
@@ -13,11 +13,11 @@ class ExplainEntityResponse;
 
 namespace voxeld::daemon::services {
 
-// Called once, or never if the server ends first; from the core's thread, the explainer's, or from within. The response
-// holds if the status is OK.
+// Called once, or never if the server is destroyed first; on the core's or the explainer's thread,
+// or before ExplainEntity returns. The response is valid if the status is OK.
 using ExplainDone = std::function<void(const absl::Status&, const v1::ExplainEntityResponse&)>;
 
-// ResourceExhausted if as many wait as may.
+// Errors: ResourceExhausted if the queue is full.
 void ExplainEntity(ServiceContext& context, const v1::ExplainEntityRequest& request,
                    ExplainDone done);
 

@@ -11,14 +11,15 @@
 namespace voxeld::daemon::services {
 namespace {
 
-// The one place that gRPC gives.
+// The single log sink that gRPC supports.
 struct Place {
   sync::Mutex mutex;
   listen::LogGate* gate VOXELD_GUARDED_BY(mutex) = nullptr;
 };
 
 Place& ThePlace() {
-  static Place* const place = new Place;  // gRPC's threads outlive everything
+  // Never destroyed, because gRPC's threads may outlive static objects.
+  static Place* const place = new Place;
   return *place;
 }
 

@@ -1,12 +1,14 @@
-// gRPC writes lines of its own to stderr, as many as strangers like: a failed handshake is one.
+// Redirects gRPC's own lines on stderr, whose number strangers control: each failed handshake is
+// one.
 #pragma once
 
 #include "daemon/listen/log_gate.h"
 
 namespace voxeld::daemon::services {
 
-// While it lives gRPC's errors are lines of the daemon's log ("grpc", at debug), as often as the gate
-// allows; without one they are nobody's. gRPC has one such place for the whole process: the newest has it.
+// While an object exists, gRPC's errors go to the daemon's log ("grpc", at debug), as often as the
+// gate allows; without one they are dropped. gRPC has one sink per process: the newest object is
+// used.
 class GrpcLog {
  public:
   explicit GrpcLog(listen::LogGate& gate);

@@ -40,7 +40,7 @@ void HealthWatch::OnDisplay(const std::string& display, display::DisplayState st
   const sync::MutexLock lock(mutex_);
   if (lost) {
     lost_.insert(display);
-  } else if (state != display::DisplayState::kAttaching) {  // it is looked for again, not found
+  } else if (state != display::DisplayState::kAttaching) {  // still searching: no change
     lost_.erase(display);
   }
   Changed();

@@ -1,4 +1,4 @@
-// What health answers for: that every display is there, and is drawn for. It tells the log too.
+// Determines the health status: whether every display is connected and drawn. Also logs changes.
 #pragma once
 
 #include <functional>
@@ -17,14 +17,15 @@ class HealthWatch {
  public:
   explicit HealthWatch(Logger& log) : log_(log) {}
 
-  // Called at once, and with every change: false while a display is lost, or its last volume is held since nothing is
-  // drawn. It must not call back. Null: nobody is to be told any more; returns when no call is in progress.
+  // Calls `tell` at once and on every change: with false while a display is lost, or while its last
+  // volume is held because nothing is drawn. It must not call back. Null removes it; this returns
+  // when no call is in progress.
   void Tell(std::function<void(bool serving)> tell);
 
   void OnEngine(const EngineEvent& event);
   void OnDisplay(const std::string& display, display::DisplayState state,
                  const std::string& reason);
-  // Transfers to its device failed. For the log alone: the display is there.
+  // Transfers to the display's device failed. Only logged, because the display is still connected.
   void OnTransfers(const std::string& display, uint64_t failed);
 
  private:

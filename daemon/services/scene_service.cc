@@ -1,4 +1,4 @@
-// SceneService: every method one line over what it does.
+// Implements the methods of SceneService; each one delegates.
 #include <grpcpp/support/byte_buffer.h>
 #include <grpcpp/support/server_callback.h>
 #include <grpcpp/support/slice.h>
@@ -33,7 +33,7 @@ using grpc::ServerUnaryReactor;
 
 constexpr uint32_t kPageSize = 1000;
 
-// Reactors of calls that are refused: they finish at once.
+// Reactors for calls that are rejected; they finish at once.
 class RefusedStream final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
  public:
   explicit RefusedStream(const absl::Status& status) { Finish(ToGrpc(status)); }
@@ -54,7 +54,7 @@ class RefusedWrites final : public grpc::ServerWriteReactor<Response> {
   void OnDone() override { delete this; }
 };
 
-// The core's answer into `response`, which gRPC keeps until the call is finished.
+// Stores the core's answer in `response`, which gRPC keeps until the call has finished.
 template <typename T, typename Response>
 Core::Reply<T> Answer(std::shared_ptr<UnaryCall> call, Response* response) {
   return [call = std::move(call), response](const absl::StatusOr<T>& result) {
@@ -268,7 +268,7 @@ class SceneService final : public SceneBase {
     audited.By(caller);
     if (absl::Status may = audited.MayAct(); !may.ok()) return Refuse(call, audited.Done(may));
     ServerUnaryReactor* reactor = call->DefaultReactor();
-    // Without control one's own alone.
+    // Without the scope control a caller can clear only its own layers.
     context_.core.ClearLayer(
         request.owner(), request.layer(), request.keep_state(),
         caller.scopes.Has(Scope::kControl) ? std::optional<std::string>() : caller.principal,

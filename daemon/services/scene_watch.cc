@@ -1,6 +1,6 @@
-// SceneService.WatchScene: each message is made when gRPC has taken the last one, so that a client
-// that does not read holds one message and two snapshots, and nothing waits for it. After
-// watch_write_limit_ns it holds the message alone.
+// Implements SceneService.WatchScene. The next message is created when gRPC has taken the last one.
+// A client that does not read therefore holds one message and two snapshots, and delays nobody;
+// after watch_write_limit_ns it holds only the message.
 #include <grpcpp/alarm.h>
 #include <grpcpp/support/byte_buffer.h>
 #include <grpcpp/support/server_callback.h>
@@ -20,8 +20,8 @@
 namespace voxeld::daemon::services {
 namespace {
 
-// Owns itself until gRPC is done with it. Its turns (a start, a written message, an alarm) come one
-// after another, in gRPC's threads; End and Wake may come at any time.
+// Owns itself until gRPC has finished with it. Its turns (a start, a written message, an alarm) run
+// one at a time on gRPC's threads; End and Wake may be called at any time.
 class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
                              public ActiveCall,
                              public std::enable_shared_from_this<SceneWatchCall> {
@@ -116,7 +116,8 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
     if (stall_alarm_ == nullptr) LookForStallAt(stall_at_);
   }
 
-  // One alarm for many messages: it looks when the one that was written first would be late.
+  // One alarm serves many messages: it fires when the first message would be late, and is then set
+  // for the current one.
   void LookForStallAt(sync::TimeNs at) VOXELD_REQUIRES(mutex_) {
     const sync::TimeNs wait = std::max<sync::TimeNs>(0, at - context_.clock.Now());
     stall_alarm_ = std::make_unique<grpc::Alarm>();
@@ -127,9 +128,10 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
         });
   }
 
-  // What gRPC does not take stays, so that its client learns why when it reads on.
+  // Ends the watch if the current message is late. The message stays with gRPC, so that the client
+  // learns the reason when it resumes reading.
   void LookForStall() {
-    SnapshotPtr told, target;  // go without the lock
+    SnapshotPtr told, target;  // destroyed without the lock
     sync::MutexLock lock(mutex_);
     if (end_.has_value()) return;
     if (!writing_) return stall_alarm_.reset();
@@ -138,10 +140,12 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
         "the client took no message for ", context_.limits.watch_write_limit_ns / 1'000'000,
         " ms, which is watch_write_limit_ns: the scene is no longer held for it; read on while "
         "watching, or watch anew"));
-    // Others may watch, whenever its client reads on; but for clients without number that never do.
+    // Frees the slot for other watches until the client resumes reading. The second set of slots
+    // limits clients that never do.
     absl::StatusOr<WatchSlots::Slot> stalled = context_.stalled_watches.Take(caller().who);
     if (stalled.ok()) slot_ = *std::move(stalled);
-    messages_.LetGo(&told, &target);  // nobody has the turn while a message is written, nor after
+    // No turn runs while a message is being written, nor afterwards.
+    messages_.LetGo(&told, &target);
   }
 
   void AwaitNewer() {
@@ -150,13 +154,13 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
     });
     {
       sync::MutexLock lock(mutex_);
-      waiting_ = std::max(waiting_, id);  // the next turn may have waited already
+      waiting_ = std::max(waiting_, id);  // the next turn may already be waiting
       if (!end_.has_value()) return;
     }
     scene_.Cancel(id);
   }
 
-  // The next turn, in a thread of gRPC's.
+  // Runs the next turn on a gRPC thread.
   void Wake() {
     sync::MutexLock lock(mutex_);
     if (end_.has_value()) return;
@@ -167,16 +171,16 @@ class SceneWatchCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   }
 
   ServiceContext& context_;
-  SceneWatch& scene_;  // the core's
+  SceneWatch& scene_;  // owned by the core
   std::shared_ptr<SceneWatchCall> self_;
-  wire::WatchMessages messages_;  // of whoever has the turn
+  wire::WatchMessages messages_;  // used by the running turn
 
   sync::Mutex mutex_;
   WatchSlots::Slot slot_ VOXELD_GUARDED_BY(mutex_);
   grpc::ByteBuffer outgoing_ VOXELD_GUARDED_BY(mutex_);
   uint64_t charged_ VOXELD_GUARDED_BY(mutex_) = 0;  // for `outgoing_`
   bool writing_ VOXELD_GUARDED_BY(mutex_) = false;
-  sync::TimeNs stall_at_ VOXELD_GUARDED_BY(mutex_) = 0;  // of `outgoing_`
+  sync::TimeNs stall_at_ VOXELD_GUARDED_BY(mutex_) = 0;  // for `outgoing_`
   std::optional<absl::Status> end_ VOXELD_GUARDED_BY(mutex_);
   SnapshotWaitId waiting_ VOXELD_GUARDED_BY(mutex_) = 0;
   std::unique_ptr<grpc::Alarm> alarm_ VOXELD_GUARDED_BY(mutex_);

@@ -28,14 +28,14 @@ namespace {
 
 constexpr const char* kServices[] = {"voxeld.v1.SceneService", "voxeld.v1.DisplayService"};
 
-// Bytes that a stream may have on the way before they are asked for: HTTP/2's own window is no
-// back-pressure, and with the bandwidth probe it grows to megabytes that wait unseen.
+// Bytes that a stream may have in flight before they are requested. HTTP/2's own window is no
+// back-pressure: with the bandwidth probe it grows to megabytes that wait unseen.
 constexpr int kLookaheadBytes = 256 << 10;
 
 constexpr sync::TimeNs kLastCallsLimit = 200 * sync::kMillisecond;
 
-// gRPC's threads stay until the process ends. Else the last server to go joins them, and one that
-// polls for a connection whose client read slowly returns only after up to ten seconds.
+// Keeps gRPC's threads until the process exits. Otherwise the last server joins them, and a thread
+// that polls for a connection with a slow reader returns only after up to ten seconds.
 void KeepGrpcUp() {
   static const bool up = (grpc_init(), true);
   (void)up;
@@ -49,7 +49,7 @@ listen::ConnectionLimits LimitsOf(listen::ConnectionLimits limits, Core& core) {
 
 int Milliseconds(sync::TimeNs time) { return static_cast<int>(time / sync::kMillisecond); }
 
-// gRPC's word for never is its greatest.
+// gRPC represents "never" as the maximum value.
 int MillisecondsOrNever(sync::TimeNs time) {
   return time == 0 ? std::numeric_limits<int>::max() : Milliseconds(time);
 }
@@ -107,7 +107,7 @@ class Server::Impl {
         sockets.push_back(std::move(socket));
       }
     }
-    if (options_.local.has_value()) {  // there before the first stream that is told of it
+    if (options_.local.has_value()) {  // before the first stream announces it
       local::LocalSocketOptions local = *options_.local;
       local.budget = context_.core.budget();
       auto socket = local::LocalSocket::Start(context_.clock, std::move(local));
@@ -150,7 +150,7 @@ class Server::Impl {
     builder.SetResourceQuota(quota);
     for (const auto& [name, value] : {
              std::pair(GRPC_ARG_HTTP2_BDP_PROBE, 0),
-             {GRPC_ARG_ENABLE_CHANNELZ, 1},  // what call_meter.h reads
+             {GRPC_ARG_ENABLE_CHANNELZ, 1},  // needed by call_meter.h
              {GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, kLookaheadBytes},
              {GRPC_ARG_KEEPALIVE_TIME_MS, Milliseconds(options_.keepalive_interval_ns)},
              {GRPC_ARG_KEEPALIVE_TIMEOUT_MS, Milliseconds(options_.keepalive_timeout_ns)},
@@ -230,11 +230,10 @@ class Server::Impl {
       options_.log->Warn("calls are cut off, their clients do not read or the core is busy",
                          {{"streams", absl::StrCat(calls)}, {"calls", absl::StrCat(short_calls)}});
     }
-    // gRPC waits until every call has finished, and the core may be busy for longer than that.
+    // gRPC waits until every call has finished, but the core may be busy for longer.
     context_.short_calls.EndAll(
         absl::UnavailableError("shutting down; whether the call was carried out is not known"));
-    // What is left are clients whose threads do not look at their connections:
-    // gRPC would wait for those to the end.
+    // The remaining clients do not read their connections. gRPC would wait for them forever.
     const sync::TimeNs rest =
         std::clamp<sync::TimeNs>(deadline - context_.clock.Now(), 0, kLastCallsLimit);
     server_->Shutdown(
@@ -243,7 +242,7 @@ class Server::Impl {
     server_.reset();
     meter_.reset();
     listener_.reset();
-    probe_.reset();  // what it may still have asked was ended with the server
+    probe_.reset();  // its pending requests ended with the server
   }
 
   const std::vector<Address>& addresses() const { return addresses_; }

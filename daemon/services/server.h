@@ -1,5 +1,5 @@
-// The gRPC server: both services, health and reflection, on any number of addresses, behind a
-// listener of our own (daemon/listen).
+// The gRPC server: both services, health and reflection, on any number of addresses, behind the
+// daemon's own listener (daemon/listen).
 #pragma once
 
 #include <cstdint>
@@ -28,64 +28,65 @@ struct ServerOptions {
   std::vector<Address> listen;  // at least one
   std::string version;
   StreamLimits streams;
-  // Of messages that come in, until they are whole (gRPC's resource quota).
+  // Limit on incomplete incoming messages (gRPC's resource quota).
   uint64_t max_arriving_bytes = uint64_t{1} << 30;
   listen::ConnectionLimits connections;
-  // Where the listener counts; none: nobody asks.
+  // The listener's counters; null: not counted.
   std::shared_ptr<listen::Counters> counters;
   uint32_t max_calls_per_connection = 100;
   uint32_t max_metadata_bytes = 8u << 10;
   sync::TimeNs handshake_limit_ns = 2 * sync::kSecond;
   sync::TimeNs ping_interval_min_ns = 5 * sync::kSecond;
   uint32_t max_ping_strikes = 2;
-  // 0: never.
+  // 0: unlimited.
   sync::TimeNs connection_idle_limit_ns = 0, connection_age_limit_ns = 0;
   sync::TimeNs connection_age_grace_ns = 60 * sync::kSecond;
   uint32_t max_scene_watches = 64;
   uint32_t max_stats_watches = 64;
   uint32_t max_volume_watches = 16;
-  // An idle connection is probed this often, and closed when no answer comes in time.
+  // An idle connection is probed this often, and closed if no answer arrives in time.
   sync::TimeNs keepalive_interval_ns = 20 * sync::kSecond;
   sync::TimeNs keepalive_timeout_ns = 10 * sync::kSecond;
-  // Where producers on this machine hand over memory, charged to the core's budget; nothing: nowhere.
+  // Local socket, where producers on this machine hand over memory that is charged to the core's
+  // budget; nothing: disabled.
   std::optional<local::LocalSocketOptions> local;
-  // All three outlive the server. No access: everybody may do everything. No tls: no address may ask
-  // for it.
+  // All three must outlive the server. `access` null: everybody has all scopes. `tls` null: no
+  // address may use TLS.
   const access::Access* access = nullptr;
   const access::TlsStore* tls = nullptr;
   access::Audit* audit = nullptr;
-  assets::AssetStore* assets = nullptr;  // outlives the server; none: none are kept
-  Logger* log = nullptr;                 // outlives the server; may be none
+  assets::AssetStore* assets = nullptr;  // must outlive the server; null: uploads are rejected
+  Logger* log = nullptr;                 // must outlive the server; may be null
 };
 
-// Thread-safe. The core must run, outlive the server, and be stopped after it.
+// Thread-safe. The core must be running, outlive the server, and be stopped after it.
 class Server {
  public:
-  // Listens and serves, or says which address could not be had: AlreadyExists if somebody listens
-  // there. Unix sockets get the mode 0660.
-  // `inherited`: sockets that listen already; an address of `listen` that one of them has is not asked
-  // for again.
+  // Listens and serves. Unix sockets get mode 0660. `inherited` are sockets that already listen; an
+  // address of `listen` that one of them has is not opened again. Errors: the address that failed,
+  // with AlreadyExists if another server listens there.
   static absl::StatusOr<std::unique_ptr<Server>> Start(
       Core& core, sync::Clock& clock, ServerOptions options,
       std::vector<listen::ListeningSocket> inherited = {});
-  ~Server();  // shuts down, if that has not been done
+  ~Server();  // shuts down unless Shutdown was called
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  // Where it listens, with the ports that were chosen.
+  // Returns: the addresses with the chosen ports.
   const std::vector<Address>& addresses() const;
 
-  // What health answers, for every service, until Shutdown: also while the server cannot be reached,
-  // by its own probe's word, it is NOT_SERVING.
+  // Sets the health status of every service until Shutdown. While the server's own probe finds it
+  // unreachable, the status is NOT_SERVING in any case.
   void SetServing(bool serving);
 
-  // Ends the long calls of whoever may not make them any more (Access::Recheck). Answers how many.
+  // Ends the streaming calls of callers that have lost their scopes (Access::Recheck). Returns: the
+  // number of calls.
   size_t EndRevoked();
 
-  // Health answers NOT_SERVING, nothing new is accepted, every long call ends with
-  // `Unavailable: shutting down` after what is queued for it. Returns when all calls have ended,
-  // after at most `limit`: then those left are cancelled, and short ones are Unavailable, whatever
-  // the core is busy with. What it answers later is dropped.
+  // Sets health to NOT_SERVING, accepts nothing new, and ends every streaming call with
+  // `Unavailable: shutting down` after what is queued for it. Returns when all calls have ended, at
+  // most after `limit`: the remaining calls are then cancelled, and short ones end with Unavailable
+  // even if the core is busy. Later answers of the core are dropped.
   void Shutdown(sync::TimeNs limit);
 
  private:

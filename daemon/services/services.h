@@ -1,5 +1,4 @@
-// The services and their long calls, for the server that binds them.
-// No gRPC header is needed to know them.
+// Declares the services and their streaming calls for the server, without gRPC headers.
 #pragma once
 
 #include <memory>
@@ -35,8 +34,8 @@ namespace voxeld::daemon::services {
 std::unique_ptr<grpc::Service> MakeSceneService(ServiceContext& context);
 std::unique_ptr<grpc::Service> MakeDisplayService(ServiceContext& context);
 
-// Reactors that own themselves until gRPC is done with them.
-// Requests are read before the call returns.
+// The reactors own themselves until gRPC has finished with them. Requests are read before the call
+// returns.
 grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* NewStream(ServiceContext& context,
                                                                        access::Caller caller);
 grpc::ServerWriteReactor<grpc::ByteBuffer>* NewSceneWatch(ServiceContext& context,
@@ -50,12 +49,13 @@ grpc::ServerWriteReactor<v1::VolumeChunk>* NewCapture(ServiceContext& context,
 grpc::ServerWriteReactor<v1::VolumeChunk>* NewVolumeWatch(ServiceContext& context,
                                                           access::Caller caller,
                                                           const v1::WatchVolumeRequest& request);
-// `response` is gRPC's, which keeps it until the call has ended. There are assets (CheckAssets).
+// gRPC owns `response` and keeps it until the call has ended. Requires: CheckAssets has returned
+// OK.
 grpc::ServerReadReactor<v1::UploadAssetRequest>* NewUpload(ServiceContext& context,
                                                            access::Caller caller,
                                                            v1::UploadAssetResponse* response);
 
-// FailedPrecondition: this server keeps none.
+// Errors: FailedPrecondition if this server stores no assets.
 absl::Status CheckAssets(const ServiceContext& context);
 absl::Status ListAssets(ServiceContext& context, const v1::ListAssetsRequest& request,
                         v1::ListAssetsResponse* response);

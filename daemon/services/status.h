@@ -1,4 +1,4 @@
-// The one place where a Status becomes gRPC's. The codes are the same numbers on both sides.
+// The only place that converts a Status to gRPC's. Both use the same code numbers.
 #pragma once
 
 #include "absl/status/status.h"
@@ -9,7 +9,7 @@ class Status;
 
 namespace voxeld::daemon::services {
 
-// The message is cut to what fits the trailing metadata.
+// Truncates the message so that it fits into the trailing metadata.
 grpc::Status ToGrpc(const absl::Status& status);
 
 }  // namespace voxeld::daemon::services

@@ -1,4 +1,4 @@
-// SceneService.Stream on gRPC: a port for StreamSession, and nothing else.
+// Implements SceneService.Stream for gRPC as a port for StreamSession.
 #include <grpcpp/alarm.h>
 #include <grpcpp/support/byte_buffer.h>
 #include <grpcpp/support/server_callback.h>
@@ -20,7 +20,7 @@ namespace {
 
 class Received final : public ReceivedMessage {
  public:
-  // False if it cannot be decompressed. `bytes` is left empty.
+  // Returns: false if the message cannot be decompressed. `bytes` is left empty.
   bool Take(grpc::ByteBuffer& bytes) {
     slices_.resize(1);
     const bool single = bytes.TrySingleSlice(&slices_[0]).ok();

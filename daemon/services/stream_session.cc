@@ -12,7 +12,7 @@
 namespace voxeld::daemon::services {
 namespace {
 
-// gRPC's alarms are due to the millisecond.
+// gRPC's alarms have a resolution of one millisecond.
 constexpr sync::TimeNs kAlarmSlack = 10 * sync::kMillisecond;
 
 }  // namespace
@@ -25,7 +25,7 @@ void StreamSession::Start() {
 }
 
 void StreamSession::SetAlarm(sync::TimeNs StreamLimits::*limit) {
-  if (port_ == nullptr) return;  // and the context may be gone
+  if (port_ == nullptr) return;  // the context may have been destroyed
   const sync::TimeNs delay = context_.limits.*limit;
   alarm_ns_ = context_.clock.Now() + delay;
   port_->SetAlarm(delay);
@@ -33,7 +33,7 @@ void StreamSession::SetAlarm(sync::TimeNs StreamLimits::*limit) {
 
 void StreamSession::Read() {
   if (port_ == nullptr || reading_ || reads_done_ || FarAhead() || full_ > 0 || HalfFull()) return;
-  // Nothing is read beyond the Open before that is dealt with.
+  // Nothing beyond the Open is read before the Open has been handled.
   if (state_ != State::kOpen && (state_ != State::kNew || taking_)) return;
   reading_ = true;
   port_->Read();
@@ -181,7 +181,7 @@ void StreamSession::OnOpened(const absl::StatusOr<SessionInfo>& info) {
     sync::MutexLock lock(mutex_);
     session_ = info->session;
     incarnation_ = info->incarnation;
-    abandoned = state_ != State::kOpening;  // ended meanwhile
+    abandoned = state_ != State::kOpening;  // ended in the meantime
     if (!abandoned) {
       v1::StreamResponse response;
       wire::Encode(*info, response.mutable_opened());
@@ -281,7 +281,7 @@ void StreamSession::OnAlarm() {
   bool close = false;
   {
     sync::MutexLock lock(mutex_);
-    // Without a port the context may be gone. Or it is of one that has been replaced meanwhile.
+    // Without a port the context may have been destroyed. The alarm may also be a replaced one.
     if (port_ == nullptr) return;
     if (context_.clock.Now() < alarm_ns_ - kAlarmSlack) return;
     if (state_ == State::kNew) {
@@ -292,7 +292,7 @@ void StreamSession::OnAlarm() {
       close = Close(absl::OkStatus());
     } else if (state_ == State::kClosing || state_ == State::kFlushing) {
       Finish();
-      close = true;  // again: what its client did not take is given back
+      close = true;  // again, to return outcomes that the client did not take
     }
   }
   if (close) CloseSession();
@@ -304,9 +304,9 @@ void StreamSession::OnCancel() {
     cancelled_ = true;
     (void)Close(absl::CancelledError("the client is gone"));
   }
-  CloseSession();  // also when that was done before: nobody is there to be told any more
+  CloseSession();  // also if called before: nothing more can be sent
   sync::MutexLock lock(mutex_);
-  if (state_ == State::kClosing) state_ = State::kFlushing;  // nobody is there to wait with
+  if (state_ == State::kClosing) state_ = State::kFlushing;  // do not wait for the core
   FinishIfFlushed();
 }
 
@@ -323,8 +323,7 @@ bool StreamSession::Close(const absl::Status& status) {
   if (ending_) return false;
   ending_ = true;
   end_ = status;
-  // Without a session (also while one is being opened: OnOpened gives it back)
-  // nothing is waited for.
+  // Without a session nothing is waited for, also while one is being opened: OnOpened closes it.
   const bool session = session_ != 0;
   state_ = session ? State::kClosing : State::kFlushing;
   SetAlarm(&StreamLimits::drain_limit_ns);
@@ -337,7 +336,7 @@ void StreamSession::CloseSession() {
   uint64_t incarnation = 0;
   bool gone = false;
   std::vector<Receipt> undelivered;
-  local::LocalSession local;  // ends without the lock
+  local::LocalSession local;  // destroyed without the lock
   {
     sync::MutexLock lock(mutex_);
     std::swap(local, local_);
@@ -345,7 +344,7 @@ void StreamSession::CloseSession() {
     incarnation = incarnation_;
     gone = cancelled_ || state_ == State::kFinished;
     if (gone) undelivered = answers_.TakeOutcomes();
-    // Without a port the context may be gone.
+    // Without a port the context may have been destroyed.
     if (!std::exchange(logged_end_, true) && session != 0 && port_ != nullptr &&
         context_.log != nullptr) {
       context_.log->Info("session closed", {{"session", std::to_string(session)},
@@ -397,7 +396,7 @@ void StreamSession::Tell(const Answer& answer) {
     session = session_;
     if constexpr (std::is_same_v<Answer, Receipt>) {
       if (IsOwed(answer)) {
-        // One of a former stream's was never counted here.
+        // Outcomes of an earlier stream were never counted here.
         inherited = answer.incarnation != incarnation_;
         if (!inherited && outcomes_owed_ > 0) --outcomes_owed_;
       } else if (!std::holds_alternative<Scheduled>(answer.what)) {

@@ -1,23 +1,25 @@
-// One SceneService.Stream, apart from gRPC:
-// what is read, what is owed, what is queued, how it ends.
+// One SceneService.Stream, independently of gRPC: what is read, pending and queued, and how it
+// ends.
 //
-//   first message         Open, of kOpenBytes at most and within open_limit_ns, answered by Opened
+//   first message         must be Open, at most kOpenBytes and within open_limit_ns; answered by
+//                         Opened
 //   Ping                  answered at once
-//   every other           decoded and handed to the session's intake, one after another; meanwhile the next
-//                         are read, kAheadBytes or kAheadMessages of them, if that has room and the client
-//                         reads its answers
-//   half-close            waits (drain_limit_ns at most) until every commit has its answer and its
+//   other messages        decoded and passed to the session's intake in order. Meanwhile up to
+//                         kAheadBytes or kAheadMessages of further messages are read, if the intake
+//                         has room and the client reads its answers
+//   half-close            waits (at most drain_limit_ns) until every commit has its answer and its
 //                         outcomes, closes the session, writes what is queued, ends with OK
-//   End, bad bytes        closes the session, writes what is queued (drain_limit_ns at most), ends
+//   End, invalid bytes    closes the session, writes what is queued (at most drain_limit_ns), ends
 //                         with the status
-//   client gone           closes the session, gives back the outcomes that wait, and ends at once
-//   client does not read  nothing more is read or applied once the queue is half full; should it get
-//                         full all the same, closes the session and ends with RESOURCE_EXHAUSTED
-//   taken up by another   ends with ABORTED; likewise when an operator evicts its owner
+//   client gone           closes the session, returns queued outcomes to the core, ends at once
+//   client does not read  stops reading and applying when the queue is half full. If it still
+//                         becomes full, closes the session and ends with RESOURCE_EXHAUSTED
+//   resumed elsewhere     ends with ABORTED, as when an operator evicts its owner
 //
-// Thread-safe. Lock order: the intake's, then the session's; so the intake is not called with the session's lock
-// held. The port's events come one after another for reads and for writes, as gRPC has it; that for the next read
-// may come on another thread while this one's message is still being decoded.
+// Thread-safe. Lock order: the intake's, then the session's; therefore the intake is not called
+// with the session's lock held. The port's read events are sequential, and so are its write events,
+// as in gRPC. A read event may arrive on another thread while the previous message is still being
+// decoded.
 #pragma once
 
 #include <cstdint>
@@ -39,27 +41,27 @@
 
 namespace voxeld::daemon::services {
 
-// One message, as long as this lives.
+// One received message. Its slices are valid while the object exists.
 class ReceivedMessage {
  public:
   virtual ~ReceivedMessage() = default;
   virtual std::span<const std::string_view> slices() const = 0;
 };
 
-// The transport of one stream. No call answers from within itself. Called with the session's lock
-// held, and never after OnPortDone.
+// The transport of one stream. Its functions never call back before they return. They are called
+// with the session's lock held, and never after OnPortDone.
 class StreamPort {
  public:
   virtual ~StreamPort() = default;
   virtual void Read() = 0;  // then OnMessage or OnReadsDone; one at a time
   virtual void Write(const std::string& message) = 0;   // then OnWritten; one at a time
   virtual void Finish(const absl::Status& status) = 0;  // once, and last
-  virtual void SetAlarm(sync::TimeNs delay) = 0;  // then OnAlarm; replaces one that was set before
-  virtual void Post() = 0;  // then OnTurn, soon, on a thread of its own; one at a time
+  virtual void SetAlarm(sync::TimeNs delay) = 0;        // then OnAlarm; replaces the previous alarm
+  virtual void Post() = 0;  // then OnTurn, soon, on another thread; one at a time
 };
 
-// What is read of a stream while something else of it is decoded: enough that neither waits for the
-// other, of small messages and of large ones.
+// Limits on reading ahead while a message is decoded: enough, for small and for large messages,
+// that reading and decoding do not wait for each other.
 inline constexpr uint64_t kOpenBytes = 48 << 10;
 inline constexpr size_t kAheadMessages = 64;
 inline constexpr uint64_t kAheadBytes = 256 << 10;
@@ -68,22 +70,22 @@ class StreamSession final : public SessionSink,
                             public ActiveCall,
                             public std::enable_shared_from_this<StreamSession> {
  public:
-  // `context` outlives the session; `port` lives until OnPortDone.
+  // `context` must outlive the session; `port` must live until OnPortDone.
   StreamSession(ServiceContext& context, StreamPort* port)
       : context_(context), core_(context.core), port_(port), answers_(core_.budget()) {}
 
   void Start();
 
-  // ---- from the port
+  // ---- called by the port
   void OnMessage(std::unique_ptr<const ReceivedMessage> message);
-  void OnReadsDone();  // half-closed, or broken: then OnCancel comes too
+  void OnReadsDone();  // half-closed, or broken: OnCancel follows then
   void OnWritten(bool ok);
   void OnCancel();
   void OnAlarm();
   void OnTurn();
   void OnPortDone();
 
-  // ---- from the core
+  // ---- called by the core
   void OnIssue(const Issue& issue) override;
   void OnReceipt(const Receipt& receipt) override;
   void OnCredit(uint64_t total_bytes) override;
@@ -91,21 +93,21 @@ class StreamSession final : public SessionSink,
   void OnEnded(const absl::Status& why) override { End(why); }
   bool Crowded() const override;
 
-  // ---- at shutdown
+  // ---- called at shutdown
   void End(const absl::Status& status) override;
 
  private:
   enum class State : uint8_t {
     kNew,      // no Open yet
-    kOpening,  // the core has been asked for a session
+    kOpening,  // the core is creating a session
     kOpen,
-    kDraining,  // half-closed, something is still owed
+    kDraining,  // half-closed, with answers or outcomes pending
     kClosing,   // the core closes the session
-    kFlushing,  // closed; what is queued goes out
+    kFlushing,  // closed; queued messages are being sent
     kFinished,  // Finish was called
   };
 
-  // When and how large the message was.
+  // Time and size of a message.
   struct Arrival {
     uint64_t bytes = 0;
     sync::TimeNs received_ns = 0, decoded_ns = 0;
@@ -115,9 +117,10 @@ class StreamSession final : public SessionSink,
     Arrival arrival;
   };
 
-  // Decodes what has arrived, in order, until nothing is left or it must pause. On one thread at a time.
+  // Decodes the received messages in order, until none is left or it must pause. Runs on one thread
+  // at a time.
   void TakeArrived();
-  // Whether what has arrived waits: for room in the intake, or for the client to read its answers.
+  // Returns: whether decoding waits for room in the intake, or for the client to read its answers.
   bool MustPause() const VOXELD_REQUIRES(mutex_);
   void Resume() VOXELD_REQUIRES(mutex_);
   void TakeMessage(std::span<const std::string_view> slices, Arrival arrival);
@@ -128,7 +131,7 @@ class StreamSession final : public SessionSink,
   bool FarAhead() const VOXELD_REQUIRES(mutex_);
   bool HalfFull() const VOXELD_REQUIRES(mutex_);
   void SetAlarm(sync::TimeNs StreamLimits::*limit) VOXELD_REQUIRES(mutex_);
-  // Whether there is anybody to be told.
+  // Returns: whether messages can still be sent to the client.
   bool Listening() const VOXELD_REQUIRES(mutex_);
   void WriteNext() VOXELD_REQUIRES(mutex_);
   template <typename Answer>
@@ -143,7 +146,7 @@ class StreamSession final : public SessionSink,
   void FinishIfFlushed() VOXELD_REQUIRES(mutex_);
   void Finish() VOXELD_REQUIRES(mutex_);
 
-  ServiceContext& context_;  // there as long as the port is
+  ServiceContext& context_;  // valid as long as the port
   Core& core_;
   mutable sync::Mutex mutex_;
   StreamPort* port_ VOXELD_GUARDED_BY(mutex_);
@@ -155,19 +158,21 @@ class StreamSession final : public SessionSink,
   local::LocalSession local_ VOXELD_GUARDED_BY(mutex_);  // from Opened until CloseSession
   bool no_outcomes_ VOXELD_GUARDED_BY(mutex_) = false;
   bool reading_ VOXELD_GUARDED_BY(mutex_) = false;         // a read is pending
-  std::deque<Arrived> arrived_ VOXELD_GUARDED_BY(mutex_);  // read, not decoded
+  std::deque<Arrived> arrived_ VOXELD_GUARDED_BY(mutex_);  // read, but not decoded
   uint64_t arrived_bytes_ VOXELD_GUARDED_BY(mutex_) = 0;
-  bool taking_ VOXELD_GUARDED_BY(mutex_) =
-      false;                                 // a thread is in TakeArrived, or has been asked for
-  int turns_ VOXELD_GUARDED_BY(mutex_) = 0;  // in OnTurn: the port is not finished meanwhile
-  // How often the intake was filled and has not had room since; negative while it had sooner than it is known here
-  // that it was filled.
+  // A thread runs TakeArrived, or has been requested to.
+  bool taking_ VOXELD_GUARDED_BY(mutex_) = false;
+  // Running OnTurn calls; the port is not finished meanwhile.
+  int turns_ VOXELD_GUARDED_BY(mutex_) = 0;
+  // How often the intake became full minus how often it had room again. Negative if the news of
+  // room arrives before the news that it was full.
   int full_ VOXELD_GUARDED_BY(mutex_) = 0;
   bool reads_done_ VOXELD_GUARDED_BY(mutex_) = false;
   bool cancelled_ VOXELD_GUARDED_BY(mutex_) = false;
   uint64_t unanswered_ VOXELD_GUARDED_BY(mutex_) = 0;  // commits without Accepted or Refused
   uint64_t outcomes_owed_ VOXELD_GUARDED_BY(mutex_) = 0;
-  // Outcomes of former streams that were queued here, and what they held: not what the client left unread.
+  // Outcomes of earlier streams that were queued here, and their size: not due to this client's
+  // reading.
   size_t inherited_ VOXELD_GUARDED_BY(mutex_) = 0;
   size_t inherited_bytes_ VOXELD_GUARDED_BY(mutex_) = 0;
   uint64_t sequence_ VOXELD_GUARDED_BY(mutex_) = 0;  // of the last request

@@ -19,7 +19,8 @@ void UnaryCall::Answer(const absl::Status& status, const std::function<void()>& 
     ended_ = true;
     if (fill) fill();
   }
-  // In this order: the server is there until the reactor has finished, `calls_` until it is.
+  // The order matters: the server exists until the reactor has finished, and `calls_` as long as
+  // the server.
   calls_.Remove(this);
   reactor_->Finish(ToGrpc(status));
 }

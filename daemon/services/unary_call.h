@@ -1,5 +1,5 @@
-// A short call: one request, one answer from the core. At shutdown it may be ended without, so that
-// a core that is busy for long holds up nobody.
+// A short call: one request and one answer from the core. At shutdown it may end without that
+// answer, so that a busy core delays nobody.
 #pragma once
 
 #include <functional>
@@ -15,23 +15,22 @@ class ServerUnaryReactor;
 
 namespace voxeld::daemon::services {
 
-// Thread-safe. Whoever has yet to answer may hold it for as long as they like, also when the
-// server is gone.
+// Thread-safe. A pending answer may hold it for any time, even after the server has been destroyed.
 class UnaryCall final : public ActiveCall, public std::enable_shared_from_this<UnaryCall> {
  public:
-  // The call that `reactor` stands for, among `calls`, which it leaves when it ends.
+  // Creates the call of `reactor` and adds it to `calls`, from which it is removed when it ends.
   static std::shared_ptr<UnaryCall> Begin(ActiveCalls& calls, grpc::ServerUnaryReactor* reactor);
 
   UnaryCall(ActiveCalls& calls, grpc::ServerUnaryReactor* reactor)
       : calls_(calls), reactor_(reactor) {}
 
-  // Ends the call with `status`, unless it has ended. `fill` writes the response: it runs inside,
-  // and only if the response is still there to be written.
+  // Ends the call with `status`, unless it has already ended. `fill` writes the response: it runs
+  // before this returns, and only if the response still exists.
   void Answer(const absl::Status& status, const std::function<void()>& fill);
   void End(const absl::Status& status) override { Answer(status, nullptr); }
 
  private:
-  // Both are gone once the call has ended.
+  // Both are invalid after the call has ended.
   ActiveCalls& calls_;
   grpc::ServerUnaryReactor* const reactor_;
   sync::Mutex mutex_;

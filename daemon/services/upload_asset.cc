@@ -1,5 +1,5 @@
-// SceneService.UploadAsset: pieces are written in the assets' own thread, one after another; the next is
-// read when the last has been written, so that no call holds more than one.
+// Implements SceneService.UploadAsset. Pieces are written on the assets' thread in order. The next
+// piece is read when the last one has been written, so that each call holds only one.
 #include <grpcpp/alarm.h>
 #include <grpcpp/support/server_callback.h>
 
@@ -18,7 +18,7 @@ namespace voxeld::daemon::services {
 namespace {
 
 constexpr size_t kDigestBytes = wire::AssetSource::kDigestBytes;
-constexpr uint64_t kBesideData = 256;  // of a message, at the most
+constexpr uint64_t kBesideData = 256;  // maximum size of a message without its data
 
 absl::Status CheckDigest(const std::string& digest) {
   if (digest.size() == kDigestBytes) return absl::OkStatus();
@@ -26,8 +26,8 @@ absl::Status CheckDigest(const std::string& digest) {
                                                  kDigestBytes, " of the content's SHA-256"));
 }
 
-// Owns itself until gRPC is done with it. Reads come one after another; End may come at any time,
-// and what it says goes out from the assets' thread.
+// Owns itself until gRPC has finished with it. Reads are sequential. End may be called at any time;
+// the assets' thread sends its status.
 class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
                          public ActiveCall,
                          public std::enable_shared_from_this<UploadCall> {
@@ -38,7 +38,7 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
   void Start() {
     self_ = shared_from_this();
     const bool too_many = ++context_.uploads > ServiceContext::kMostUploads;
-    context_.calls.Add(self_);  // ends it at once where the server does
+    context_.calls.Add(self_);  // ends it at once during a shutdown
     if (too_many) {
       return End(absl::ResourceExhaustedError(
           absl::StrCat(ServiceContext::kMostUploads,
@@ -70,8 +70,8 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
     }
     context_.assets->Heard(upload_);
     context_.asset_calls->Post([self = shared_from_this(), ok, bytes](bool) {
-      const bool more = self->Take(ok);  // false where the server is gone: calls have ended before
-      v1::UploadAssetRequest().Swap(&self->request_);  // lets go of its memory
+      const bool more = self->Take(ok);  // false during a shutdown: calls have ended before
+      v1::UploadAssetRequest().Swap(&self->request_);  // frees its memory
       self->budget_->Release(Budget::Use::kArriving, bytes);
       if (more) self->Read();
     });
@@ -87,7 +87,7 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
     }
     alarm.reset();
     context_.calls.Remove(this);
-    const auto self = std::move(self_);  // may be the last of it
+    const auto self = std::move(self_);  // may be the last reference
   }
 
  private:
@@ -116,13 +116,13 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
                        " ms, which is upload_silence_limit_ns; what came before stays for a while: "
                        "ask ListAssets where to go on")));
     }
-    std::unique_ptr<grpc::Alarm> fired;  // goes without the lock
+    std::unique_ptr<grpc::Alarm> fired;  // destroyed without the lock
     sync::MutexLock lock(mutex_);
     fired = std::move(alarm_);
     LookForSilenceAt(due);
   }
 
-  // In the assets' thread. True: the next piece may come.
+  // Call on the assets' thread. Returns: true if the next piece may be read.
   bool Take(bool ok) {
     {
       sync::MutexLock lock(mutex_);
@@ -144,8 +144,8 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
     return false;
   }
 
-  // In the assets' thread, once. Whoever has been told of the end finds the content and the call's
-  // place free for another.
+  // Call on the assets' thread, once. When the client learns of the end, the content and the call's
+  // place are already free for others.
   void LetGoAndFinish(const grpc::Status& status) {
     context_.assets->Abandon(upload_);
     --context_.uploads;
@@ -182,15 +182,15 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadAssetRequest>,
 
   ServiceContext& context_;
   const std::shared_ptr<Budget> budget_;
-  v1::UploadAssetResponse* const response_;  // while the call has not ended
-  v1::UploadAssetRequest request_;           // gRPC's while it reads, else the assets' thread's
+  v1::UploadAssetResponse* const response_;  // valid while the call has not ended
+  v1::UploadAssetRequest request_;  // used by gRPC while it reads, else by the assets' thread
   std::atomic<sync::TimeNs> heard_ = context_.clock.Now();
 
-  // The assets' thread's; all may ask for the upload's number.
+  // Used by the assets' thread; any thread may read upload_.
   std::string digest_;
   uint64_t size_ = 0;
   std::atomic<assets::AssetStore::UploadId> upload_ = 0;
-  bool here_ = false;  // all of it, already
+  bool here_ = false;  // the asset was already complete
 
   sync::Mutex mutex_;
   bool ended_ VOXELD_GUARDED_BY(mutex_) = false;

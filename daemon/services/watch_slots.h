@@ -1,4 +1,4 @@
-// Places for watches, which callers hold for as long as they like.
+// A limited number of slots for watches, which may last for any time.
 #pragma once
 
 #include <cstdint>
@@ -13,10 +13,10 @@
 
 namespace voxeld::daemon::services {
 
-// Thread-safe. Outlives its slots.
+// Thread-safe. Must outlive its slots.
 class WatchSlots {
  public:
-  // One place, until it is released or destroyed. Not thread-safe.
+  // One slot, held until it is released or destroyed. Not thread-safe.
   class Slot {
    public:
     Slot() = default;
@@ -41,13 +41,14 @@ class WatchSlots {
     std::string who_;
   };
 
-  // `what` is watched, and the setting `limit` allows `most` at once.
+  // `what` describes what is watched. The setting `limit` allows `most` watches at once.
   WatchSlots(std::string_view what, std::string_view limit, uint32_t most)
       : what_(what), limit_(limit), most_(most) {}
   WatchSlots(const WatchSlots&) = delete;
   WatchSlots& operator=(const WatchSlots&) = delete;
 
-  // ResourceExhausted if all are taken, or if `who` (Caller::who) has three quarters of them, rounded up.
+  // Errors: ResourceExhausted if all slots are taken, or if `who` (Caller::who) holds three
+  // quarters of them, rounded up.
   absl::StatusOr<Slot> Take(const std::string& who) {
     sync::MutexLock lock(mutex_);
     const uint32_t share = (most_ * 3 + 3) / 4;
