@@ -18,7 +18,7 @@ namespace {
 constexpr int kNice = 10;
 constexpr uint64_t kIndexBytes = uint64_t{256} << 20;
 
-// Of a display whose pixels are the voxels.
+// Returns: the target of a display whose pixels are the voxels.
 gpu::Target TargetOf(const display::VoxelGrid& grid, const gpu::Affine& view) {
   display::PlanarStack stack;
   stack.width_px = grid.nx, stack.height_px = grid.ny;
@@ -53,7 +53,7 @@ SnapshotPtr Without(const SnapshotPtr& scene, const std::vector<OwnedName>& hidd
 
 }  // namespace
 
-// The scene of one display.
+// The reference drawing of one display's scene.
 class Comparer::Reference {
  public:
   Reference() {
@@ -65,7 +65,7 @@ class Comparer::Reference {
     if (engine.ok()) engine_ = *std::move(engine);
   }
 
-  // An error is the end of it.
+  // Draws the scene. After an error the object is unusable.
   absl::Status Draw(const display::VoxelGrid& grid, const gpu::Affine& view, SnapshotPtr scene) {
     if (!status_.ok()) return status_;
     const auto take = [this](const absl::Status& status) { status_.Update(status); };
@@ -84,7 +84,7 @@ class Comparer::Reference {
     return status_;
   }
 
-  // Where the display has its pixels, found with the first comparison.
+  // Returns: the places of the display's pixels, computed on the first call.
   PixelPlaces& PlacesOf(const display::Geometry& geometry) {
     if (places_ == nullptr) places_ = std::make_unique<PixelPlaces>(geometry);
     return *places_;
@@ -110,7 +110,7 @@ class Comparer::Reference {
 
 namespace {
 
-// Of the budget's answers, while it is there.
+// A charge against the budget for answers, released by the destructor.
 class Charge {
  public:
   Charge(Budget* budget, uint64_t bytes) : budget_(budget), bytes_(bytes) {
@@ -134,7 +134,7 @@ class Charge {
 
 constexpr uint64_t kBytesPerPoint = 9;
 
-// Lit pixels until there are too many.
+// Collects lit pixels until there are too many.
 absl::StatusOr<Points> LitOf(const display::DecodedVolume& volume, const display::VoxelGrid& grid,
                              PixelPlaces& places) {
   constexpr int32_t kAtOnce = 16;
@@ -187,7 +187,7 @@ void Comparer::Post(Task task) {
 }
 
 void Comparer::Run() {
-  // On Linux this is the thread's alone. Displays come first.
+  // On Linux this affects the current thread only. Displays have priority.
   setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNice);
   References references;
   sync::TimeNs rests_until = 0;

@@ -1,5 +1,6 @@
-// Draws scenes as they were sent, voxel by voxel, and holds what displays show against them. Beside the displays' own engines:
-// on the CPU, on one thread of little priority, one after the other, half of the time at the most.
+// Draws scenes exactly as sent, voxel by voxel, and compares what displays show with them. Runs
+// beside the displays' own engines: on the CPU, on one low-priority thread, one task at a time, at
+// most half of the time.
 #pragma once
 
 #include <atomic>
@@ -28,23 +29,25 @@ class Comparer {
     std::shared_ptr<const display::DisplayInfo> info;  // of the display
     ShownScene shown;
     std::vector<OwnedName> hidden;  // layers that are not drawn
-    // On the comparer's thread, once; Cancelled when the comparer ends first. It must only post.
+    // Called once on the comparer's thread; with Cancelled if the comparer is destroyed first. It
+    // must only post.
     std::function<void(absl::StatusOr<Comparison>)> done;
   };
 
-  // A display that is not asked for as long as that has its scene let go.
+  // The scene of a display is dropped if it is not compared for this long.
   static constexpr sync::TimeNs kLinger = 5 * sync::kSecond;
-  // Tasks that wait, and after one a rest as long as it took, at the most.
+  // Maximum number of queued tasks. After a task the thread rests for at most as long as the task
+  // took.
   static constexpr size_t kMostTasks = 8;
   static constexpr sync::TimeNs kMostRest = 2 * sync::kSecond;
 
-  // `budget`: charged with what a comparison holds; outlives it. May be none.
+  // `budget` is charged for what a comparison holds; it must outlive the comparer and may be null.
   Comparer(sync::Clock& clock, std::shared_ptr<Budget> budget);
-  ~Comparer();  // a comparison under way ends soon
+  ~Comparer();  // aborts a running comparison
   Comparer(const Comparer&) = delete;
   Comparer& operator=(const Comparer&) = delete;
 
-  // ResourceExhausted, at once, to one more than kMostTasks.
+  // Queues the task; beyond kMostTasks it gets ResourceExhausted at once.
   void Post(Task task);
 
  private:
@@ -61,7 +64,7 @@ class Comparer {
   sync::CondVar wake_;
   std::deque<Task> tasks_ VOXELD_GUARDED_BY(mutex_);
   std::atomic<bool> ends_ = false;
-  std::thread thread_;  // begun with the first task
+  std::thread thread_;  // started by the first task
 };
 
 }  // namespace voxeld::daemon::viewer

@@ -14,7 +14,7 @@ namespace {
 using Color = std::array<int, 3>;
 
 constexpr int kFull = 255;
-constexpr int64_t kSlab = 1 << 21;  // voxels read at once, about
+constexpr int64_t kSlab = 1 << 21;  // voxels read at once, approximately
 constexpr Color kMissing = {64, 128, 255}, kExcess = {255, 128, 32};
 
 int Greatest(const Color& c) { return std::max({c[0], c[1], c[2]}); }
@@ -31,7 +31,7 @@ Color LightOf(const display::Tone& tone, uint32_t rgb) {
   return {light(0, rgb >> 16), light(1, rgb >> 8 & 0xFF), light(2, rgb & 0xFF)};
 }
 
-// How far a channel is from one level to the next, of 255, in what an eye sees of a volume.
+// Returns: the distance of two levels of a channel, of 255, as an eye perceives it in a volume.
 Color LevelOf(const display::FrameLayout& layout) {
   const bool planes = layout.format == display::PixelFormat::kPlanes24;
   const int pictures = layout.sub_frames * (planes ? display::kProjectorParts : 1);
@@ -51,11 +51,11 @@ class Planes {
     slab_ = static_cast<int32_t>(std::clamp<int64_t>(kSlab / plane_, 1, grid.nz));
   }
 
-  // Makes those within reach of z there, for ascending z.
+  // Reads the planes within reach of z. Requires: z ascends.
   absl::Status MoveTo(int32_t z) {
     while (end_ < std::min(z + reach_ + 1, grid_.nz)) {
       const int32_t to = std::min(end_ + slab_, grid_.nz);
-      const int32_t keep = std::clamp(z - reach_, begin_, end_);  // what is still looked at
+      const int32_t keep = std::clamp(z - reach_, begin_, end_);  // planes that are still needed
       std::vector<uint32_t> next(static_cast<size_t>((to - keep) * plane_));
       if (end_ > keep) {
         std::copy(voxels_.begin() + (keep - begin_) * plane_, voxels_.end(), next.begin());
@@ -84,7 +84,7 @@ class Planes {
   std::vector<uint32_t> voxels_;
 };
 
-// Points in a box, thinned out evenly where they are too many.
+// Points in a box, thinned out evenly if there are too many.
 class Thinned {
  public:
   Thinned(const PlaceBox& box, Points& points) : box_(box), points_(points) {}
@@ -139,7 +139,7 @@ class Comparing {
     for (; held < pixels.size() && pixels[held].z == kNowhere; ++held) Stray(pixels[held].point);
     size_t marked = held;
     for (int32_t z = -2 * reach_.z; z < grid_.nz + reach_.z; ++z) {
-      // Pixels are marked ahead of the voxels that look for them.
+      // Marks pixels ahead of the voxels that look for them.
       const size_t first = marked;
       while (marked < pixels.size() && pixels[marked].z <= z + reach_.z) ++marked;
       near_.Add(std::span(pixels).subspan(first, marked - first));
@@ -163,7 +163,7 @@ class Comparing {
     return low + q * (high - low) / kPlaceSteps;
   }
 
-  // Around the pixels' places and all voxels' centres.
+  // Computes the box around the pixels' places and all voxels' centres.
   void FindBox() {
     const display::Vec3 &o = grid_.origin_mm, &p = grid_.pitch_mm;
     const auto join = [](double low, double high, double origin, double pitch, int32_t n) {
@@ -221,11 +221,11 @@ class Comparing {
   }
 
   struct Nearest {
-    int by = kFull + 1;  // more than there can be: no voxel is lit
+    int by = kFull + 1;  // above the maximum: no voxel is lit
     Color wanted = {};
   };
 
-  // Of the voxels within that reach.
+  // Returns: the most similar lit voxel within `reach`.
   Nearest Look(const PixelCell& pixel, const Color& shown, const Reach& reach) const {
     Nearest nearest;
     const int32_t x0 = std::max(0, pixel.x - reach.x);
@@ -238,7 +238,7 @@ class Comparing {
       for (int32_t y = y0; y <= y1; ++y) {
         const uint32_t* row = planes_.Row(z, y);
         for (int32_t x = x0; x <= x1; ++x) {
-          if (row[x] == 0) continue;  // a lit pixel is not held against the dark
+          if (row[x] == 0) continue;  // a lit pixel is not compared with dark voxels
           const Color light = Wanted(row[x], shown);
           const int by = Greatest(Apart(shown, light));
           if (by < nearest.by) nearest = {by, light};
@@ -256,7 +256,7 @@ class Comparing {
 
   void Hold(const PixelCell& pixel) {
     const Color shown = ColorOf(pixel.point);
-    // Most are right where they are.
+    // Most pixels match the voxel at their own place.
     Nearest nearest = Look(pixel, shown, {0, 0, 0});
     if (!IsRight(shown, nearest)) nearest = Look(pixel, shown, reach_);
     if (nearest.by > kFull) {

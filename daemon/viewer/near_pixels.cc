@@ -12,7 +12,7 @@ namespace {
 
 using display::Vec3;
 
-// From the pixel to half of the way to the next, mm along each axis, at the most.
+// Returns: at most half the distance from a pixel to the next, in mm along each axis.
 Vec3 HalfOf(const display::PlanarStack& stack) {
   double gap = stack.thickness_mm;
   const size_t each = stack.positions_mm.size() / static_cast<size_t>(stack.strokes);
@@ -36,7 +36,7 @@ Vec3 HalfOf(const display::Rotor& rotor) {
 }
 
 Vec3 HalfOf(const display::Helix& helix) {
-  // In a slice's turn the blade under a pixel rises by so much.
+  // The blade rises by this much at a pixel during one slice.
   const double rise = helix.height_mm / (helix.span_turns * helix.slices_per_turn);
   return {helix.pitch_u_mm / 2, helix.pitch_v_mm / 2, rise / 2};
 }
@@ -49,7 +49,7 @@ Vec3 HalfOf(const display::Lattice& lattice) {
 
 Reach ReachOf(const display::Geometry& geometry, display::Sampling sampling) {
   const Vec3 half = std::visit([](const auto& shape) { return HalfOf(shape); }, geometry.shape);
-  // The pixel may lie anywhere in its cell.
+  // The pixel may be anywhere in its cell.
   const double share = sampling == display::Sampling::kWeighted ? 2 : 1;
   const auto cells = [&](double mm, double pitch, int32_t n) {
     constexpr double kSlack = 1e-6;
@@ -70,14 +70,14 @@ NearPixels::NearPixels(const display::VoxelGrid& grid, const Reach& reach)
 
 std::vector<uint8_t> NearPixels::Reached(std::span<const PixelCell> pixels) const {
   if (pixels.empty()) return {};
-  // With a rim as wide as the reach.
+  // The plane has a border as wide as the reach.
   const size_t wide = nx_ + 2 * reach_x_, high = ny_ + 2 * reach_y_;
   std::vector<uint8_t> lit(wide * high);
   for (const PixelCell& pixel : pixels) {
     lit[(static_cast<size_t>(pixel.y + static_cast<int32_t>(reach_y_))) * wide +
         static_cast<size_t>(pixel.x + static_cast<int32_t>(reach_x_))] = 1;
   }
-  // Along x, then along y: how many are lit in a window that moves on.
+  // Counts lit cells in a sliding window, along x and then along y.
   std::vector<uint8_t> rows(nx_ * high);
   for (size_t y = 0; y < high; ++y) {
     const uint8_t* from = &lit[y * wide];

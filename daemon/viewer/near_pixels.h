@@ -1,4 +1,4 @@
-// Which cells of a grid are near lit pixels, plane after plane.
+// Determines which cells of a grid are near lit pixels, plane by plane.
 #pragma once
 
 #include <cstddef>
@@ -12,29 +12,30 @@
 
 namespace voxeld::daemon::viewer {
 
-// How many cells along each axis "near" is.
+// Distance in cells along each axis that counts as near.
 struct Reach {
   int32_t x = 1, y = 1, z = 1;
   bool operator==(const Reach&) const = default;
 };
 
-// From a pixel's light half of the way to the next, where pixels are farthest apart, or all of it where what lies between
-// is shown by both (depth anti-aliasing); one cell at least.
+// Returns: half of the greatest distance between neighbouring pixels, or all of it if both pixels
+// show what lies between them (depth anti-aliasing); at least one cell.
 Reach ReachOf(const display::Geometry& geometry, display::Sampling sampling);
 
-// A pixel's light by its cell, which may lie outside the grid.
+// The cell of a pixel's light, which may be outside the grid.
 struct PixelCell {
-  int16_t x = 0, y = 0, z = 0;  // grids have 16384 cells along an axis at the most
+  int16_t x = 0, y = 0, z = 0;  // grids have at most 16384 cells along an axis
   uint32_t point = 0;
 };
 
-// Planes are added in their order, those within reach before the grid's first included, and the oldest dropped; near is
-// what is within reach of a pixel of the planes that are there. Not thread-safe.
+// A sliding window of planes. Add planes in order, beginning with those within reach before the
+// grid's first; the oldest are dropped. A cell is near if it is within reach of a pixel in the
+// window. Not thread-safe.
 class NearPixels {
  public:
   NearPixels(const display::VoxelGrid& grid, const Reach& reach);
 
-  // Cells of pixels lie within reach of the grid.
+  // Requires: the cells of `pixels` are within reach of the grid.
   void Add(std::span<const PixelCell> pixels);
   void Drop();
   bool At(int32_t x, int32_t y) const {
@@ -45,9 +46,9 @@ class NearPixels {
   std::vector<uint8_t> Reached(std::span<const PixelCell> pixels) const;
 
   const size_t nx_, ny_, reach_x_, reach_y_;
-  std::deque<std::vector<uint8_t>>
-      planes_;                    // 1: within reach of a pixel of the plane; empty: there is none
-  std::vector<uint16_t> counts_;  // of the planes that are there
+  // For each plane, 1 marks a cell within reach of one of its pixels; empty: none.
+  std::deque<std::vector<uint8_t>> planes_;
+  std::vector<uint16_t> counts_;  // of the planes in the window
 };
 
 }  // namespace voxeld::daemon::viewer

@@ -5,7 +5,7 @@
 #include <array>
 
 #ifdef VOXELD_PAGE
-// The files lie in the program as they are: VOXELD_PAGE is their folder.
+// The files are embedded unchanged; VOXELD_PAGE is their folder.
 #define VOXELD_EMBED(name, file)                               \
   asm(".pushsection .rodata\n"                                 \
       ".global voxeld_page_" #name                             \

@@ -1,4 +1,4 @@
-// The page's files, as they were bundled when the daemon was built.
+// The page's files, bundled when the daemon was built.
 #pragma once
 
 #include <span>
@@ -9,13 +9,13 @@ namespace voxeld::daemon::viewer {
 
 struct PageFile {
   std::string_view path, content_type;
-  std::string_view gzipped;  // its contents, as gzip (RFC 1952)
+  std::string_view gzipped;  // contents as gzip (RFC 1952)
 };
 
-// None: the daemon was built without the page.
+// Returns: nothing if the daemon was built without the page.
 std::span<const PageFile> PageFiles();
 
-// The contents as they were before. The bytes are gzip.
+// Returns: the decompressed contents. Requires: valid gzip.
 std::string Unpack(std::string_view gzipped);
 
 }  // namespace voxeld::daemon::viewer

@@ -24,7 +24,7 @@ std::optional<uint16_t> Number(const Json& json) {
   return json.get<uint16_t>();
 }
 
-// The messages that have a watch's id and nothing else.
+// Reads messages that contain only a watch's id.
 template <typename T>
 absl::StatusOr<Message> ReadId(const char* name, const Json& json) {
   const std::optional<uint16_t> id = Number(json);
@@ -40,7 +40,7 @@ absl::StatusOr<Message> ReadWatch(const Json& message) {
   return Watch{*id, message["watch"].get<std::string>()};
 }
 
-// Nothing if it is no such list.
+// Returns: nothing if the list is malformed.
 std::optional<std::vector<OwnedName>> ReadLayers(const Json& json) {
   std::vector<OwnedName> layers;
   if (!json.is_array() || json.size() > kMostHidden) return std::nullopt;

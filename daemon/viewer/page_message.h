@@ -1,4 +1,4 @@
-// What a page sends over its WebSocket (docs/protocols/viewer.md §1), read and checked.
+// Parses and checks the messages of a page's WebSocket (docs/protocols/viewer.md §1).
 #pragma once
 
 #include <cstddef>
@@ -39,7 +39,7 @@ struct Stats {};
 struct Layers {};
 struct Update {
   v1::UpdateDisplayRequest request;
-  DisplayUpdate update;  // of it
+  DisplayUpdate update;  // of the display
 };
 struct Clear {
   v1::ClearLayerRequest request;
@@ -51,8 +51,9 @@ using Message =
 
 inline constexpr size_t kMostHidden = 256;  // layers
 
-// InvalidArgument: it is none, with words for the page. PermissionDenied: it changes something, and the page has no `control`;
-// what it says is not read then. Of several in one the first of the order above counts.
+// Errors: InvalidArgument with a message for the page if it is malformed; PermissionDenied, without
+// parsing further, if it would change something and the page lacks `control`. If a message contains
+// several kinds, the first in the order above counts.
 absl::StatusOr<Message> Read(const std::string& text, bool control);
 
 }  // namespace voxeld::daemon::viewer::page

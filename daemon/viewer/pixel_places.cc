@@ -17,7 +17,7 @@ using display::Vec3;
 
 constexpr double kSteps = kPlaceSteps;
 constexpr int64_t kMostLookedAt = 4'000'000;
-constexpr double kWidened = 0.02;  // of the extent, where only a sample was looked at
+constexpr double kWidened = 0.02;  // of the extent, if only a sample was examined
 
 bool IsStraight(const display::Geometry& geometry) {
   return !display::IsFlat(geometry) && !std::holds_alternative<display::Lattice>(geometry.shape);
@@ -28,7 +28,7 @@ double Distance(const Vec3& a, const Vec3& b) {
                    (a.z - b.z) * (a.z - b.z));
 }
 
-// The next byte that is not 0, from `at` on; `end` if there is none.
+// Returns: the index of the next byte that is not 0, from `at` on; `end` if all are 0.
 size_t NextLit(std::span<const uint8_t> bytes, size_t at) {
   while (at + 8 <= bytes.size()) {
     uint64_t eight;
@@ -41,7 +41,7 @@ size_t NextLit(std::span<const uint8_t> bytes, size_t at) {
 }
 
 uint16_t Step(float value) {
-  constexpr float kHalf = 0.5f;  // to the nearest: places are not negative
+  constexpr float kHalf = 0.5f;  // rounds to nearest: places are not negative
   return static_cast<uint16_t>(std::clamp(value, 0.0f, static_cast<float>(kSteps)) + kHalf);
 }
 
@@ -86,7 +86,7 @@ void PixelPlaces::FindBox() {
       if (step > 0) pitch = std::min(pitch, step);
     }
   }
-  if (!(low.x <= high.x)) low = high = {};  // a lattice without a light
+  if (!(low.x <= high.x)) low = high = {};  // a lattice without lights
   if (stride > 1) {
     const double more = kWidened * Distance(low, high);
     low = {low.x - more, low.y - more, low.z - more};
@@ -94,7 +94,7 @@ void PixelPlaces::FindBox() {
   }
   const display::Vec3& cell = geometry_.grid.pitch_mm;
   pitch_mm_ = std::isfinite(pitch) ? pitch : std::min({cell.x, cell.y, cell.z});
-  // A flat display has an extent, too.
+  // A flat display needs an extent, too.
   const double least = pitch_mm_ / 2;
   for (auto [from, to] :
        {std::pair(&low.x, &high.x), std::pair(&low.y, &high.y), std::pair(&low.z, &high.z)}) {

@@ -1,5 +1,5 @@
-// Where the light of a display's pixels is, for those who draw it: each lit pixel of a slice as a point in a box of
-// kPlaceSteps steps an axis.
+// Locates the light of a display's pixels for drawing: each lit pixel of a slice becomes a point in
+// a box with kPlaceSteps steps along each axis.
 #pragma once
 
 #include <cstddef>
@@ -14,37 +14,40 @@ namespace voxeld::daemon::viewer {
 
 inline constexpr uint16_t kPlaceSteps = 65534;
 
-// Place q of an axis is low_mm + q / kPlaceSteps · (high_mm − low_mm).
+// Place q along an axis is low_mm + q / kPlaceSteps · (high_mm − low_mm).
 struct PlaceBox {
   display::Vec3 low_mm, high_mm;
 };
 
-// Arrays of one length; of `rgb` three times that.
+// Arrays of equal length; `rgb` is three times as long.
 struct Points {
   std::vector<uint16_t> x, y, z;
   std::vector<uint8_t> rgb;
   size_t size() const { return x.size(); }
 };
 
-// Places come from display::PixelPosition, so corrections are in them. Where a slice's columns are straight a column is
-// looked up once; elsewhere pixels are, and kept while they fit kKeptBytes. Not thread-safe.
+// Uses display::PixelPosition, which includes corrections. Where a slice's columns are straight,
+// each column is looked up once. Elsewhere each pixel is looked up, and cached up to kKeptBytes.
+// Not thread-safe.
 class PixelPlaces {
  public:
   static constexpr size_t kKeptBytes = size_t{64} << 20;
 
-  // `geometry` is valid.
+  // Requires: `geometry` is valid.
   explicit PixelPlaces(display::Geometry geometry);
 
-  // Around the centres of all pixels; of geometries with more than a few million of them that are not straight, around
-  // a sample, widened: what lies outside is put on its face.
+  // Returns: a box around the centres of all pixels. If a geometry has more than a few million
+  // pixels and is not straight, the box is that of a sample, widened, and points outside are moved
+  // to its faces.
   const PlaceBox& box() const { return box_; }
-  // The least distance between neighbouring pixels of a slice, mm; > 0.
+  // Returns: the smallest distance between neighbouring pixels of a slice, in mm; > 0.
   double pitch_mm() const { return pitch_mm_; }
 
-  // Appends the pixels of `slice` that are not black, row by row. `rgb`: height · width · 3 bytes, row-major. A pixel
-  // without a light is passed over. Answers how many came.
+  // Appends the pixels of `slice` that are not black, row by row. `rgb` has height · width · 3
+  // bytes, row-major. Skips pixels without a light. Returns: the number of appended pixels.
   size_t Append(int32_t slice, std::span<const uint8_t> rgb, Points* out);
-  // Where pixels are, lit or not, in black: about kSample at the most, evenly chosen through slices and rows.
+  // Returns: places of pixels, lit or not, in black: at most about kSample, evenly distributed over
+  // slices and rows.
   static constexpr size_t kSample = 100'000;
   const Points& Sample();
 
@@ -56,9 +59,9 @@ class PixelPlaces {
   struct Place {
     uint16_t x, y, z;
   };
-  static constexpr Place kNone = {kPlaceSteps + 1, 0, 0};  // there is no light
+  static constexpr Place kNone = {kPlaceSteps + 1, 0, 0};  // no light
 
-  // Pixel v of a straight column lies at base + v · step, in steps of the box.
+  // Pixel v of a straight column is at base + v · step, in steps of the box.
   struct Column {
     float base[3], step[3];
   };
@@ -75,10 +78,10 @@ class PixelPlaces {
   int32_t slices_ = 0, width_ = 0, height_ = 0;
   PlaceBox box_;
   double pitch_mm_ = 1;
-  std::vector<std::vector<Column>> columns_;  // by slice; empty: not yet
+  std::vector<std::vector<Column>> columns_;  // by slice; empty: not computed yet
   std::vector<std::vector<Place>> places_;
   std::vector<Place> unkept_;
-  Points sample_;  // empty: not yet
+  Points sample_;  // empty: not computed yet
   size_t kept_bytes_ = 0;
 };
 

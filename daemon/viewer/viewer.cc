@@ -26,8 +26,9 @@ namespace {
 constexpr std::string_view kSocketPath = "/volumes";
 constexpr std::string_view kControlPath = "/control";
 constexpr std::string_view kPlayPath = "/play";
-constexpr char kCookie[] = "voxeld_control_";  // and what is the daemon's own: cookies know no port
-// Its own files and its own socket, and nothing from anywhere else.
+// Plus a part specific to the daemon, because cookies ignore ports.
+constexpr char kCookie[] = "voxeld_control_";
+// Allows only its own files and its own socket.
 constexpr char kContentPolicy[] =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
     "connect-src 'self'; worker-src 'self'; base-uri 'none'; form-action 'none'; "
@@ -67,7 +68,7 @@ bool IsNumber(const std::string& host) {
          inet_pton(AF_INET6, host.c_str(), address) == 1;
 }
 
-// In a time that does not tell where they differ.
+// Compares in constant time.
 bool SameSecret(std::string_view a, std::string_view b) {
   if (a.size() != b.size() || a.empty()) return false;
   unsigned differs = 0;
@@ -91,7 +92,8 @@ class Viewer::Impl {
         session_(session.substr(kNameDigits)),
         cookie_(absl::StrCat(kCookie, session.substr(0, kNameDigits), "=")) {}
 
-  // A name that was made to resolve to here is no name of this machine; a number cannot be made to.
+  // Rejects foreign host names, which could be made to resolve to this machine; numbers cannot be
+  // spoofed in this way.
   bool KnownHost(std::string_view header) const {
     const std::optional<std::string> host = HostName(header);
     const std::vector<std::string>& more = shared_->options.hosts;
@@ -101,7 +103,7 @@ class Viewer::Impl {
                     }));
   }
 
-  // Nothing: it may look.
+  // Returns: nothing if the request may view.
   absl::Status Check(const http::Request& request) const {
     if (!KnownHost(request.host)) {
       return absl::PermissionDeniedError(absl::StrCat(
@@ -166,7 +168,8 @@ class Viewer::Impl {
     };
   }
 
-  // What other pages have a browser send is refused by its origin, which browsers always give here.
+  // Requests that other pages cause a browser to send are rejected by their origin, which browsers
+  // always send here.
   std::optional<http::Reception> Receive(const http::Request& request) const {
     if (request.path != kPlayPath) return std::nullopt;
     http::Reception refused;
@@ -186,7 +189,7 @@ class Viewer::Impl {
 
  private:
   http::Response TakeControl(const http::Request& request) {
-    if (request.head) {  // sent by programs that preview links, which must not use up the address
+    if (request.head) {  // from link previews, which must not use up the address
       http::Response wrong = Plain(405, "the address for control requires GET");
       wrong.headers = {{"Allow", "GET"}};
       return wrong;
@@ -227,7 +230,7 @@ class Viewer::Impl {
 
   const std::shared_ptr<ViewerPlay> play_;
   const std::shared_ptr<ViewerShared> shared_;
-  std::string key_;  // empty: none, or used up
+  std::string key_;  // empty: none, or already used
   const std::string session_, cookie_;
 };
 

@@ -1,10 +1,11 @@
-// The viewer: a page that shows what the displays show, in a browser, and the WebSocket behind it
+// The viewer: a web page that shows what the displays show, and the WebSocket behind it
 // (docs/protocols/viewer.md).
 //
-// Who may: anybody who can connect may look, if the request names this machine as its host (a page of another
-// origin cannot: neither by its own name nor by one that it made resolve to here). Control is for the browser that
-// opened the address with the key, which is made when the daemon starts and serves once; it gets a cookie that no
-// script can read.
+// Anybody who can connect may view, if the request names this machine as its host. A page of
+// another origin cannot do that, neither with its own name nor with a name that it made resolve to
+// this machine. Control is granted to the browser that opens the address with the key. The key is
+// created when the daemon starts and works once; the browser gets a cookie that scripts cannot
+// read.
 #pragma once
 
 #include <memory>
@@ -24,33 +25,36 @@ namespace voxeld::daemon::viewer {
 struct ViewerOptions {
   std::string version;
   std::vector<std::string> hosts;  // further names that requests may give as the host
-  bool control = true;             // there is an address with a key
-  access::Audit* audit = nullptr;  // of what is controlled; none: nobody asks. Outlives the viewer
-  ViewerPlayOptions play;          // of files that pages with control send
+  bool control = true;             // provide an address with a key
+  access::Audit* audit = nullptr;  // for control actions; null: no audit. Outlives the viewer
+  ViewerPlayOptions play;          // for files that pages with control upload
 };
 
-// Its functions run on the http server's thread.
+// All functions run on the HTTP server's thread.
 class Viewer {
  public:
-  // Unavailable if the system has no random bytes to give. Core and clock outlive the viewer.
+  // Errors: Unavailable if the system has no random bytes. `core` and `clock` must outlive the
+  // viewer.
   static absl::StatusOr<std::unique_ptr<Viewer>> Make(Core& core, sync::Clock& clock,
                                                       ViewerOptions options);
   ~Viewer();
   Viewer(const Viewer&) = delete;
   Viewer& operator=(const Viewer&) = delete;
 
-  // Whether the page is there: a build without npm has none, and says so in its place.
+  // Returns: whether the build includes the page. A build without npm does not, and serves a notice
+  // instead.
   static bool HasPage();
 
-  // Those that the server is started with; paths that are not the viewer's go to `others`. Not to be called once the
-  // viewer is gone.
+  // The functions for starting the HTTP server. Paths that are not the viewer's go to `others`.
+  // They must not be called after the viewer has been destroyed.
   http::Handler Handler(http::Handler others);
   http::Upgrade Upgrade();
   http::Receive Receive();
 
-  // "http://127.0.0.1:8088/"; empty for a unix socket.
+  // Returns: an address such as "http://127.0.0.1:8088/"; empty for a unix socket.
   static std::string PageAddress(const Address& http);
-  // The same with the key; empty: there is no control. To be told to people at a terminal alone, never to a log.
+  // Returns: the same address with the key; empty: no control. Show it only to people at a
+  // terminal, never in a log.
   std::string ControlAddress(const Address& http) const;
 
  private:

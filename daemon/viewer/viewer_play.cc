@@ -18,7 +18,8 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr size_t kLongestQueryName = 1024;
-// Pieces of work that wait for a disk; each upload adds two at the most. Beyond, nothing more is taken.
+// Limit on tasks that wait for a disk; each upload adds at most two. Beyond it uploads are
+// rejected.
 constexpr size_t kMostWaiting = 16;
 
 http::Response Said(unsigned status, absl::string_view text) {
@@ -31,7 +32,7 @@ http::Reception Refuse(unsigned status, absl::string_view why) {
   return reception;
 }
 
-// Nothing: it is no such text.
+// Returns: nothing if the text is not valid percent-encoding.
 std::optional<std::string> PercentDecoded(std::string_view text) {
   std::string out;
   for (size_t i = 0; i < text.size(); ++i) {
@@ -49,15 +50,15 @@ std::optional<std::string> PercentDecoded(std::string_view text) {
   return out;
 }
 
-// Who has the file while it comes: the upload, and the worker's pieces of work.
+// The file during an upload, shared by the upload and the worker's tasks.
 struct Held {
-  std::optional<play::PlayFile> file;  // the worker's
-  std::atomic<bool> given_up = false;  // nobody waits for it any more
+  std::optional<play::PlayFile> file;  // used by the worker
+  std::atomic<bool> given_up = false;  // the upload was aborted
 };
 
 }  // namespace
 
-// Who is told, and of what. Thread-safe.
+// The pages to notify. Thread-safe.
 class ViewerPlay::Pages {
  public:
   explicit Pages(const ViewerPlayOptions& options)
@@ -74,7 +75,7 @@ class ViewerPlay::Pages {
   }
 
   void Tell() {
-    // Told in the lock, so that the newest is told last.
+    // Notify under the lock, so that the newest state is sent last.
     const sync::MutexLock lock(mutex_);
     const std::string message = Message();
     std::erase_if(pages_, [&message](const std::weak_ptr<http::WebSocketPeer>& page) {
@@ -106,7 +107,8 @@ class ViewerPlay::Pages {
   std::vector<std::weak_ptr<http::WebSocketPeer>> pages_ VOXELD_GUARDED_BY(mutex_);
 };
 
-// Writes on the worker, and keeps the others out while it lives. What the worker has not come to by then it gives up.
+// Receives an upload and writes it on the worker; while it exists other uploads are rejected. Its
+// destructor cancels tasks that have not started.
 class ViewerPlay::Upload final : public http::BodyReceiver {
  public:
   Upload(std::shared_ptr<ViewerPlay> play, std::string name)
@@ -117,7 +119,8 @@ class ViewerPlay::Upload final : public http::BodyReceiver {
     play_->taking_ = false;
     if (held_ == nullptr) return;
     held_->given_up = true;
-    // The disk is the worker's matter, also when the file goes. Without a thread there is no file.
+    // The worker also removes the file, because that may block. If it has no thread, there is no
+    // file.
     (void)play_->worker_.Post([held = std::move(held_)] { held->file.reset(); });
   }
 
@@ -148,7 +151,7 @@ class ViewerPlay::Upload final : public http::BodyReceiver {
         return done(Said(503, may.message()));
       }
     }
-    // Every piece has been taken, so there is a file, and a thread.
+    // Every piece has been written, so the file and the thread exist.
     (void)play_->worker_.Post([held = held_, play = play_.get(), done] {
       if (held->given_up) return;
       play->Record("Play", absl::StrCat("name=\"", absl::CHexEscape(held->file->name()),
@@ -162,7 +165,7 @@ class ViewerPlay::Upload final : public http::BodyReceiver {
  private:
   const std::shared_ptr<ViewerPlay> play_;
   const std::string name_;
-  std::shared_ptr<Held> held_;  // none before the first piece
+  std::shared_ptr<Held> held_;  // null before the first piece
 };
 
 ViewerPlay::ViewerPlay(ViewerPlayOptions options, access::Audit* audit)

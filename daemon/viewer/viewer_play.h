@@ -1,4 +1,5 @@
-// Files that pages with control have played: taken as they are sent, and told of (docs/protocols/viewer.md, 6).
+// Receives files that pages with control upload, plays them and reports the state
+// (docs/protocols/viewer.md, 6).
 #pragma once
 
 #include <cstdint>
@@ -16,14 +17,14 @@
 namespace voxeld::daemon::viewer {
 
 struct ViewerPlayOptions {
-  play::Player* player = nullptr;  // none: nothing is played; outlives all else
-  std::string why_not;             // where there is none
+  play::Player* player = nullptr;  // null: nothing can be played; outlives everything else
+  std::string why_not;             // the reason if `player` is null
   uint64_t max_bytes = uint64_t{256} << 20;
-  play::PlayFile::Write write;  // of files; tests' own
+  play::PlayFile::Write write;  // for files; tests replace it
 };
 
-// On the http server's thread. Nothing that other threads call (the worker, the player) has a share in it, so that it goes on
-// neither of these, whoever is the last to let it go: its end waits for the worker.
+// Used on the HTTP server's thread. Callbacks on other threads (the worker, the player) hold no
+// reference, so that the destructor, which waits for the worker, never runs there.
 class ViewerPlay {
  public:
   static std::shared_ptr<ViewerPlay> Make(ViewerPlayOptions options, access::Audit* audit);
@@ -31,9 +32,9 @@ class ViewerPlay {
   ViewerPlay(const ViewerPlay&) = delete;
   ViewerPlay& operator=(const ViewerPlay&) = delete;
 
-  // Of a page that may control. `query`: "name=…", percent-encoded.
+  // Receives a file from a page with control. `query`: "name=…", percent-encoded.
   http::Reception Receive(std::string_view query);
-  // From now on it is told what plays, at once for the first time.
+  // Sends the state to the page now and on every change.
   void Join(const std::shared_ptr<http::WebSocketPeer>& page);
   void Stop();
 
@@ -47,10 +48,10 @@ class ViewerPlay {
 
   const ViewerPlayOptions options_;
   access::Audit* const audit_;
-  const std::shared_ptr<Pages> pages_;  // the player has it, too
+  const std::shared_ptr<Pages> pages_;  // shared with the player
   std::weak_ptr<ViewerPlay> self_;
   bool taking_ = false;  // one file at a time
-  play::Worker worker_;  // writes; the first to go
+  play::Worker worker_;  // writes files; destroyed first
 };
 
 }  // namespace voxeld::daemon::viewer

@@ -32,7 +32,8 @@ std::string ToJson(const google::protobuf::Message& message) {
   return text;
 }
 
-// What a page needs of it: not where every light of a lattice is.
+// Returns: what a page needs to know about the display, without the positions of a lattice's
+// lights.
 std::string DisplayJson(const DisplayDescription& display) {
   v1::DisplayDescription message;
   wire::Encode(display, &message);
@@ -82,13 +83,13 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
   }
 
  private:
-  // What one of is under way at a time: a second that comes meanwhile is passed over.
+  // Kinds of requests of which one runs at a time. A second one is ignored meanwhile.
   enum class Asked : uint8_t { kHello, kStats, kLayers, kCompare };
   bool Begin(Asked what) { return !std::exchange(asked_[static_cast<size_t>(what)], true); }
   void End(Asked what) { asked_[static_cast<size_t>(what)] = false; }
 
   struct Watched {
-    uint64_t serial = 0;  // ids may be used again
+    uint64_t serial = 0;  // distinguishes watches that reuse an id
     std::shared_ptr<const display::DisplayInfo> info;
     std::shared_ptr<PixelPlaces> places;
     std::shared_ptr<VolumeFeed> feed;
@@ -96,7 +97,8 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
 
   void Complain(const std::string& why) { peer_->Send(Text({{"error", why}}), false); }
 
-  // `what` on the http server's thread, if the socket is still there, with what `reply` is given.
+  // Returns: a callback that runs `what` with its argument on the HTTP server's thread, if the
+  // socket still exists.
   template <typename T>
   Core::Reply<T> Then(std::function<void(ViewerSocket&, absl::StatusOr<T>)> what) {
     return
@@ -175,7 +177,8 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     return found != watches_.end() && found->second.serial == serial;
   }
 
-  // The next change, if there is one. The page is ready for it: it has shown the last one, or nothing has come since it did.
+  // Sends the next change, if there is one. Requires: the page is ready for it: it has shown the
+  // last change, or none has arrived since it did.
   void Pump(uint16_t id) {
     const Watched& watch = watches_.at(id);
     if (watch.feed == nullptr) return;
@@ -186,7 +189,7 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
   }
 
   void On(const page::Shown& shown) {
-    if (watches_.contains(shown.id)) Pump(shown.id);  // it may have ended meanwhile
+    if (watches_.contains(shown.id)) Pump(shown.id);  // it may have ended
   }
 
   void On(const page::Unwatch& unwatch) { Drop(unwatch.id); }
@@ -238,7 +241,7 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
     shared_->comparer->Post({info->name, info, *std::move(shown), hidden, std::move(reply)});
   }
 
-  // Each that asks has an answer.
+  // Every request gets an answer.
   void Compared(uint16_t id, uint64_t volume, const absl::StatusOr<Comparison>& comparison) {
     if (!comparison.ok()) {
       const std::string why(comparison.status().message());
@@ -276,7 +279,8 @@ class ViewerSocket : public std::enable_shared_from_this<ViewerSocket> {
         }));
   }
 
-  // `reply`, with the audit log's line written first, whether or not the socket is still there.
+  // Returns: `reply`, preceded by the entry in the audit log, which is written even if the socket
+  // no longer exists.
   template <typename Request, typename T>
   Core::Reply<T> Audited(const char* method, const Request& request, Core::Reply<T> reply) {
     return [audit = shared_->options.audit, method, request,
@@ -340,7 +344,7 @@ class Service final : public http::WebSocketService {
   void OnText(std::string message) override { socket_->OnText(message); }
 
  private:
-  const std::shared_ptr<ViewerSocket> socket_;  // what others hold of it is weak
+  const std::shared_ptr<ViewerSocket> socket_;  // others hold weak references only
 };
 
 }  // namespace

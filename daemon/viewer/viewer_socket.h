@@ -1,4 +1,5 @@
-// One browser's WebSocket: what it watches, what it asks for, and what it may change (docs/protocols/viewer.md).
+// One browser's WebSocket: its watches, its requests and its control actions
+// (docs/protocols/viewer.md).
 #pragma once
 
 #include <map>
@@ -15,19 +16,19 @@
 
 namespace voxeld::daemon::viewer {
 
-// What the sockets of one viewer share; on the http server's thread.
+// State shared by the sockets of a viewer, used on the HTTP server's thread.
 struct ViewerShared {
   Core& core;
   sync::Clock& clock;
   const ViewerOptions options;
   const std::shared_ptr<ViewerPlay> play;
-  // Of displays that somebody has watched: finding places takes a while.
+  // Cached for each display that was watched, because computing places takes time.
   std::map<std::string, std::shared_ptr<PixelPlaces>> places;
   size_t watches = 0;  // of all sockets
   std::unique_ptr<Comparer> comparer = std::make_unique<Comparer>(clock, core.budget());
 };
 
-// `control`: it may change displays and layers.
+// `control`: the page may change displays and layers.
 std::unique_ptr<http::WebSocketService> NewViewerSocket(std::shared_ptr<ViewerShared> shared,
                                                         std::shared_ptr<http::WebSocketPeer> peer,
                                                         bool control);

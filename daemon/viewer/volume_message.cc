@@ -24,7 +24,7 @@ void Put(std::string& out, const std::vector<T>& values) {
   out.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
 }
 
-// Slice numbers and how many points each has, in turns.
+// `slices` alternates slice numbers and numbers of points.
 std::string Message(Header header, const std::vector<uint32_t>& slices, const Points& points) {
   header.slices = static_cast<uint32_t>(slices.size() / 2);
   header.points = static_cast<uint32_t>(points.size());
@@ -47,7 +47,7 @@ std::vector<uint32_t> AppendLit(const display::DecodedVolume& volume,
   std::vector<uint32_t> slices;
   const auto each = static_cast<size_t>(places.width()) * static_cast<size_t>(places.height()) * 3;
   for (size_t i = 0; i < wanted.size();) {
-    // A run of slices that follow one another is unpacked at once, some megabytes at the most.
+    // Unpacks a run of consecutive slices at once, up to a few megabytes.
     const int32_t first = wanted[i];
     const size_t most = std::max<size_t>(1, (size_t{4} << 20) / each);
     size_t count = 1;

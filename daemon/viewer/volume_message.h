@@ -1,4 +1,4 @@
-// A change of a volume as bytes for the page (docs/protocols/viewer.md §3).
+// Encodes changes of a volume for the page (docs/protocols/viewer.md §3).
 #pragma once
 
 #include <cstdint>
@@ -10,18 +10,19 @@
 
 namespace voxeld::daemon::viewer {
 
-// What the first byte of a binary message says.
+// The first byte of a binary message.
 enum class MessageKind : uint8_t { kVolume = 1, kDark = 2, kSent = 3, kDifference = 4 };
 
-// The slices of `change` with all their lit pixels, for the watch of that number. `change` is of the display that
-// `places` is of.
+// Returns: the slices of `change` with all their lit pixels, for the watch `watch`. Requires:
+// `change` and `places` belong to the same display.
 std::string VolumeMessage(uint16_t watch, const VolumeFeed::Change& change, PixelPlaces& places);
-// Where pixels are, lit or not (PixelPlaces::Sample).
+// Returns: places of pixels, lit or not (PixelPlaces::Sample).
 std::string DarkMessage(uint16_t watch, PixelPlaces& places);
-// Points that are of no slice in particular.
+// Returns: a message with points that belong to no particular slice.
 std::string PointsMessage(MessageKind kind, uint16_t watch, uint64_t volume, const Points& points);
 
-// Appends the lit pixels of `wanted` slices; answers slice numbers and how many each has, in turns.
+// Appends the lit pixels of the `wanted` slices. Returns: alternating slice numbers and numbers of
+// pixels.
 std::vector<uint32_t> AppendLit(const display::DecodedVolume& volume,
                                 const std::vector<int32_t>& wanted, PixelPlaces& places,
                                 Points* points);
