@@ -6,7 +6,7 @@
 namespace voxeld::daemon::wire {
 namespace {
 
-// Writes centre and bounds: `half` is how far the shape reaches from its centre along each axis.
+// Writes centre and bounds. `half` is the extent of the shape from its centre along each axis.
 void SetExtent(const v1::Vec3& center, const double (&half)[3], GeometryData* out) {
   const double middle[3] = {center.x(), center.y(), center.z()};
   for (int axis = 0; axis < 3; ++axis) {
@@ -16,7 +16,8 @@ void SetExtent(const v1::Vec3& center, const double (&half)[3], GeometryData* ou
   }
 }
 
-// Whether the record without a program says all of it; else it is one of the general shapes.
+// Returns: whether the record without a program represents the shape completely; otherwise a
+// general shape is used.
 template <typename Message>
 bool IsPlain(const Message& in, const ShapeContext& context) {
   return in.shell().value() == 0 && context.scale == nullptr && in.fill() != v1::FILL_LINES &&
@@ -33,7 +34,7 @@ MaybeFault ToLook(const FieldPath& path, const Message& in, const ShapeContext& 
                  context.context, &out->record);
 }
 
-// The look, and the shape itself.
+// Converts the style and the shape itself.
 template <typename Message, typename General>
 MaybeFault ToGeneral(const FieldPath& path, const Message& in, const ShapeContext& context,
                      General* general, GeometryData* out) {

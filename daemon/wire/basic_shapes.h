@@ -1,5 +1,5 @@
-// Boxes, spheres and cylinders: records without a program. With lines or dots, a shell, or a colour scale they are
-// parallelepipeds, ellipsoids and cones.
+// Converts boxes, spheres and cylinders to records without a program. With lines or dots, a shell,
+// or a colour scale they become parallelepipeds, ellipsoids and cones.
 #pragma once
 
 #include "daemon/wire/shapes.h"
@@ -12,7 +12,7 @@ class Sphere;
 
 namespace voxeld::daemon::wire {
 
-// Each fills record, arrays and bounds of `out`, all but one colour.
+// Each function fills record, arrays and bounds of `out`, but not the uniform colour.
 MaybeFault ToBox(const FieldPath& path, const v1::Box& in, const ShapeContext& context,
                  GeometryData* out);
 MaybeFault ToSphere(const FieldPath& path, const v1::Sphere& in, const ShapeContext& context,

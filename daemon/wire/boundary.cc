@@ -14,7 +14,7 @@ namespace {
 using gpu::implicit::ProgramSource;
 using gpu::implicit::Vector;
 
-// The vertices, projected along the axis.
+// Returns: the vertices projected along the axis.
 std::vector<Vector> Flattened(const v1::Boundary& in, int axis) {
   std::vector<Vector> points;
   for (int i = 0; i + 2 < in.points_size(); i += 3) {
@@ -36,10 +36,10 @@ double ExtentOf(const std::vector<Vector>& points) {
   return extent;
 }
 
-// Smooth closed curves as lines; `ends` become those of the lines.
+// Converts smooth closed curves to lines. `ends` are replaced by the ends of the lines.
 MaybeFault ToLines(const FieldPath& path, const std::vector<Vector>& vertices, gpu::SplineForm form,
                    const Limits& limits, std::vector<uint32_t>* ends, std::vector<float>* points) {
-  const double error = kBoundaryError * ExtentOf(vertices);  // of no extent: nothing bends
+  const double error = kBoundaryError * ExtentOf(vertices);  // 0 without extent: no bends
   uint32_t begin = 0;
   for (uint32_t& end : *ends) {
     gpu::Spline spline{

@@ -1,5 +1,4 @@
-// Checks that every part of the decoder shares. Each answers with nothing,
-// or with the fault that it found.
+// Checks that all parts of the decoder share. Each returns nothing, or the fault that it found.
 #pragma once
 
 #include <cstdint>
@@ -20,10 +19,10 @@ class Vec3;
 
 namespace voxeld::daemon::wire {
 
-// Two directions are parallel if the sine of the angle between them is smaller.
+// Two directions are parallel if the sine of their angle is below this.
 inline constexpr double kLeastSine = 1e-6;
 
-// Why one operation, entity or part cannot be taken.
+// Why an operation, entity or part is refused.
 struct Fault {
   std::string field;
   Reason reason = Reason::kUnspecified;
@@ -32,47 +31,47 @@ struct Fault {
 
 using MaybeFault = std::optional<Fault>;
 
-// A number as it is printed in messages: the shortest form that reads back as the same value.
+// Returns: a number for messages, in the shortest form that reads back as the same value.
 std::string Show(double value);
 std::string Show(float value);
 
-// The size of a payload, in its elements too where it has whole ones: "24 bytes, 6 samples".
+// Returns: the size of a payload, also in elements if it has whole ones: "24 bytes, 6 samples".
 std::string ShowBytes(uint64_t bytes, uint64_t element_bytes, std::string_view element);
 
-// Text from a client, quoted, with what is not printable escaped,
-// cut to a length fit for a message.
+// Returns: text from a client, quoted, with unprintable characters escaped, and shortened for a
+// message.
 std::string Quote(std::string_view text);
 
-// Names of layers, entities, objects: 1 to `max_bytes` bytes.
-// (That text is UTF-8 is checked by the parser.)
+// Checks a name of a layer, entity or object: 1 to `max_bytes` bytes. (The parser checks that it is
+// UTF-8.)
 MaybeFault CheckName(const FieldPath& path, std::string_view name, uint32_t max_bytes);
 
-// Text for people: at most `max_bytes` bytes.
+// Checks text for people: at most `max_bytes` bytes.
 MaybeFault CheckLabel(const FieldPath& path, std::string_view text, size_t max_bytes);
 
 MaybeFault CheckFinite(const FieldPath& path, double value);
 
-// Finite as a double and as the float that the engine computes with.
+// Checks that the value is finite, both as a double and as the float that the engine uses.
 MaybeFault CheckFloat(const FieldPath& path, double value);
 
-// As CheckFloat, and greater than zero as a float.
+// Does CheckFloat, and checks that the value is greater than zero as a float.
 MaybeFault CheckPositive(const FieldPath& path, double value);
 
 MaybeFault CheckVec3(const FieldPath& path, const v1::Vec3& vec);  // CheckFloat of each
 MaybeFault CheckSize(const FieldPath& path, const v1::Vec3& vec);  // CheckPositive of each
 
-// CheckVec3 of both corners, and min < max in every component.
+// Does CheckVec3 for both corners, and checks that min < max in every component.
 MaybeFault CheckBox(const FieldPath& path, const v1::Box3& box);
 
-// "has the unknown value 7; use one of FIRST, SECOND".
+// Returns: a fault such as "has the unknown value 7; use one of FIRST, SECOND".
 Fault UnknownEnum(const FieldPath& path, int value, const char* known);
 
-// "is not implemented in this version of the server: <reason>".
+// Returns: the fault "is not implemented in this version of the server: <reason>".
 Fault Unimplemented(const FieldPath& path, const char* what);
 
-// 0 values: identity. Otherwise 12 finite ones whose linear part is not singular:
-// the rows, each divided by its greatest element, must have a determinant above 1e-12,
-// and their own must be a normal number.
+// Reads an affine map. No values mean identity. Otherwise it requires 12 finite values whose linear
+// part is not singular: after division of each row by its greatest element the determinant must be
+// above 1e-12, and the determinant of the rows themselves must be a normal number.
 MaybeFault ToAffine(const FieldPath& path, const v1::Affine& in, gpu::Affine* out);
 
 }  // namespace voxeld::daemon::wire

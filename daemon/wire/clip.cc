@@ -59,7 +59,7 @@ MaybeFault ToCylinder(const FieldPath& path, const v1::Clip::Cylinder& in, ClipC
 }  // namespace
 
 MaybeFault ToClip(const FieldPath& path, const v1::Clip& in, const Limits& limits, Clip* out) {
-  // Never more than there is room for, whatever the limits say.
+  // Never exceeds the engine's capacity, whatever the limits.
   const uint64_t most = std::min(limits.max_clip_planes, gpu::kMaxClipPlanes);
   const uint64_t most_cylinders = std::min(limits.max_clip_cylinders, gpu::kMaxClipCylinders);
   const uint64_t boxes = static_cast<uint64_t>(in.boxes_size()),

@@ -1,4 +1,4 @@
-// What a layer is cut to (voxeld.v1.Clip).
+// Reads the clip of a layer (voxeld.v1.Clip).
 #pragma once
 
 #include "daemon/wire/check.h"

@@ -29,13 +29,13 @@ MaybeFault ToEnds(const FieldPath& path, const v1::ColorScale& in) {
   return {};
 }
 
-// (p · along) / |along|².
+// Computes the vector for (p · along) / |along|².
 MaybeFault ToAlong(const FieldPath& path, const v1::ColorScale& in, Vector* out) {
   const FieldPath at(path, "along");
   Vector along;
   if (auto fault = ToVector(at, in.along(), &along)) return fault;
   const double square = gpu::implicit::Dot(along, along);
-  if (!(square > 0)) {  // of three floats it is finite
+  if (!(square > 0)) {  // the square of three floats is finite as a double
     return Fault{at.ToString(), Reason::kInvalidValue, "has no direction; give one that is not 0"};
   }
   *out = 1 / square * along;
@@ -123,7 +123,7 @@ MaybeFault ToVertexColors(const FieldPath& path, const v1::ColorScale& in,
             colored->writable_indices().begin());
   for (size_t i = 0; i < count; ++i) {
     const double level = (numbers[i] - low) / (high - low);
-    // Where there is no range, or it is beyond all numbers, all have the first colour.
+    // If the range is empty or above all numbers, every vertex gets the first colour.
     colored->writable_colors()[i] =
         table[level > 0 ? static_cast<size_t>(std::lround(std::min(level, 1.0) * 255)) : 0];
   }

@@ -1,4 +1,4 @@
-// Colours by numbers (voxeld.v1.ColorScale).
+// Maps numbers to colours (voxeld.v1.ColorScale).
 #pragma once
 
 #include <array>
@@ -18,24 +18,25 @@ namespace voxeld::daemon::wire {
 
 using ScaleTable = std::array<uint32_t, 256>;  // 0x00RRGGBB
 
-// The colours of a scale, from the low end to the high one.
+// Reads the colours of a scale, from the low end to the high end.
 MaybeFault ToScaleTable(const FieldPath& path, const v1::ColorScale& in, ScaleTable* out);
 
-// Gives the vertices of `out`, which have none, the colours that `path`, a scale of the primitive's, says.
+// Assigns the colours of the scale at `path` to the vertices of `out`. Requires: the vertices have
+// no colours.
 MaybeFault ToVertexColors(const FieldPath& path, const v1::ColorScale& in,
                           const DecodeContext& context, GeometryData* out);
 
-// What numbers a scale has along a direction: p · along, from low to high.
+// The numbers of a scale along a direction: p · along, from low to high.
 struct ScaleEnds {
-  gpu::implicit::Vector along;  // divided by the square of its length
+  gpu::implicit::Vector along;  // divided by the squared length
   double low = 0, high = 1;
 };
-// Of a shape without vertices in `min` to `max`.
+// Reads the ends of a scale for a shape without vertices, which lies within `min` and `max`.
 MaybeFault ToScaleEnds(const FieldPath& path, const v1::ColorScale& in, const double min[3],
                        const double max[3], ScaleEnds* out);
 
-// The level of a place, 0 to 1 from one end to the other, as a node, and the table of it. `min` and `max` are what
-// the shape lies in.
+// Creates a node for the level of a place, from 0 at one end to 1 at the other, and the table of
+// colours. The shape lies within `min` and `max`.
 MaybeFault ToLevel(const FieldPath& path, const v1::ColorScale& in, const double min[3],
                    const double max[3], gpu::implicit::Graph& graph,
                    gpu::implicit::Graph::Node* level, ScaleTable* table);

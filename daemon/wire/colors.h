@@ -1,4 +1,4 @@
-// Colours as the wire has them: rows of them, by names or one by one.
+// Reads rows of colours, by the name of a map or as a list.
 #pragma once
 
 #include <google/protobuf/repeated_field.h>
@@ -11,7 +11,8 @@
 
 namespace voxeld::daemon::wire {
 
-// One of the two, fields `colormap` and `colors` of `path`: a map, which is found then, or colours, each 0xRRGGBB.
+// Reads either the field `colormap` or the field `colors` (each 0xRRGGBB) of `path`. A map is
+// looked up and stored in the output.
 MaybeFault ToColorRow(const FieldPath& path, const std::string& colormap,
                       const google::protobuf::RepeatedField<uint32_t>& colors,
                       std::optional<ColorTable>* map);

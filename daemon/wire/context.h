@@ -1,4 +1,4 @@
-// What every part of the decoder is given.
+// Inputs that all parts of the decoder share.
 #pragma once
 
 #include <vector>
@@ -17,17 +17,18 @@ namespace voxeld::daemon::wire {
 
 struct DecodeContext {
   const Limits& limits;
-  gpu::BulkPool* pool = nullptr;  // where large arrays go; null: ordinary memory
-  // What the bytes fields of Vertices name; null: they hold it themselves.
+  gpu::BulkPool* pool = nullptr;  // memory for large arrays; null: the heap
+  // Payloads to which bytes fields of Vertices refer; null: the fields contain the bytes.
   const PayloadTable* payloads = nullptr;
-  NamedRanges* ranges = nullptr;  // in place of payloads; null: they are refused
+  NamedRanges* ranges = nullptr;  // ranges that replace payloads; null: refused
   text::Fonts* fonts = nullptr;   // null: text is refused
-  // Of the request under way, what those primitives take that have become something else; null: nobody counts.
+  // Sums the memory of the request's converted primitives; null: not counted.
   uint64_t* decoded_bytes = nullptr;
-  // What is taken otherwise than it was meant: an Issue each, of operations that are carried out; null: nobody hears.
+  // Collects an Issue for each operation that is applied differently than requested; null: not
+  // collected.
   std::vector<Fault>* notes = nullptr;
 
-  // Most parts ask for no more.
+  // Most parts need only the limits.
   operator const Limits&() const { return limits; }  // NOLINT(google-explicit-constructor)
 };
 

@@ -1,5 +1,5 @@
-// Words of the core and of the displays as words of the wire, and back. The way back is for clients
-// and for requests: it checks.
+// Converts values of the core and the displays to the protocol and back. The reverse direction, for
+// clients and for requests, validates.
 #pragma once
 
 #include "absl/status/statusor.h"
@@ -29,8 +29,8 @@ void ToWire(const gpu::Region& in, v1::Box3* out);
 void ToWire(const display::FrameLayout& in, v1::FrameLayout* out);
 void ToWire(const ViewOptions& in, v1::View* out);
 
-// InvalidArgument for values that are no word of theirs. Whether a geometry holds together is not
-// checked here (display/geometry does).
+// Errors: InvalidArgument for unknown values. Does not check whether a geometry is consistent
+// (display/geometry does).
 absl::StatusOr<Reason> FromWire(v1::Reason reason);
 absl::StatusOr<gpu::BlendMode> FromWire(v1::BlendMode blend);
 absl::StatusOr<display::Evidence> FromWire(v1::Evidence evidence);

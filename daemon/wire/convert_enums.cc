@@ -1,4 +1,4 @@
-// One table for each pair of enums, read in both directions.
+// One table for each pair of enums, used in both directions.
 #include <array>
 #include <string>
 #include <utility>
@@ -91,7 +91,8 @@ constexpr EnumTable<display::DecodedVolume::Source, v1::VolumeHeader::Source, 2>
     {display::DecodedVolume::Source::kReportedByDevice, v1::VolumeHeader::REPORTED_BY_DEVICE},
 }};
 
-// Every value of ours stands in its table; what does not is the wire's "unspecified".
+// Requires: the table contains every value of `Ours`. Values that it lacks become the protocol's
+// "unspecified".
 template <typename Ours, typename Theirs, size_t n>
 Theirs Forth(const EnumTable<Ours, Theirs, n>& table, Ours value) {
   for (const auto& [ours, theirs] : table) {

@@ -24,7 +24,7 @@ constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kMostTurns = 1024;
 constexpr uint32_t kPatchPoints = 16;
 
-// Two directions across an axis; `message` has the field `toward`, which may be absent.
+// Computes two directions across an axis. `message` has the field `toward`, which may be absent.
 template <typename Message>
 MaybeFault ToFrame(const FieldPath& path, const Message& in, const char* axis_name,
                    const Vector& axis, Vector* u, Vector* v) {
@@ -41,7 +41,7 @@ MaybeFault ToFrame(const FieldPath& path, const Message& in, const char* axis_na
                absl::StrCat("lies along ", axis_name, "; give a direction across it")};
 }
 
-// Sampling and thickness, of whatever has them.
+// Reads sampling and thickness of any message that has them.
 template <typename Message>
 MaybeFault ToLine(const FieldPath& path, const Message& in, const Limits& limits,
                   gpu::GeometryRecord* out) {
@@ -60,7 +60,7 @@ MaybeFault ToSweep(const FieldPath& path, const Message& in, double* start, doub
                absl::StrCat("is ", Show(in.sweep()), "; give -2π to 2π")};
 }
 
-// `points`, 3 · vertex_count, and bounds of them, which hold the curves as well.
+// Sets `points` and their bounds, which contain the curves as well.
 MaybeFault SetPoints(const FieldPath& path, std::span<const Vector> points,
                      std::span<const uint32_t> colors, gpu::BulkPool* pool, GeometryData* out) {
   out->record.vertex_count = static_cast<uint32_t>(points.size());
@@ -101,7 +101,8 @@ MaybeFault CheckVertexCount(const FieldPath& path, uint64_t count, const Limits&
                             limits.max_vertices_per_entity)};
 }
 
-// Which points of a patch are those of its surface, of the curves along its edges, or of its corners.
+// Returns: the points of a patch that define its surface, the curves along its edges, or its
+// corners.
 std::span<const uint8_t> ControlPointsOf(v1::Fill fill) {
   static constexpr uint8_t kAll[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
   static constexpr uint8_t kEdges[] = {0, 1, 2, 3, 12, 13, 14, 15, 0, 4, 8, 12, 3, 7, 11, 15};
@@ -164,7 +165,7 @@ MaybeFault ToSpline(const FieldPath& path, const v1::Curve& in, const DecodeCont
   if (auto fault = CheckVertexCount(at, count * 4, context)) return fault;
   gpu::Spans spans;
   spline.Make(spans);
-  const gpu::GeometryArrays read = out->arrays;  // colours of what was sent
+  const gpu::GeometryArrays read = out->arrays;  // colours as sent
   std::vector<uint32_t> colors;
   if (!read.colors().empty()) {
     spline.ForEachJoint([&](size_t from, size_t to) {

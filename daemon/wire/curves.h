@@ -1,5 +1,5 @@
-// Lines that bend, surfaces made of Bézier patches, and shapes as lines or dots: the wire's fields into
-// control points.
+// Converts curved lines, surfaces of Bézier patches, and shapes drawn as lines or dots to control
+// points.
 #pragma once
 
 #include "daemon/wire/check.h"
@@ -16,7 +16,7 @@ class Helix;
 
 namespace voxeld::daemon::wire {
 
-// Each fills record, arrays and bounds of `out`, all but the colour.
+// Each function fills record, arrays and bounds of `out`, but not the colour.
 MaybeFault ToArc(const FieldPath& path, const v1::Arc& in, const DecodeContext& context,
                  GeometryData* out);
 MaybeFault ToEllipse(const FieldPath& path, const v1::Ellipse& in, const DecodeContext& context,
@@ -24,8 +24,8 @@ MaybeFault ToEllipse(const FieldPath& path, const v1::Ellipse& in, const DecodeC
 MaybeFault ToHelix(const FieldPath& path, const v1::Helix& in, const DecodeContext& context,
                    GeometryData* out);
 
-// Of what has vertices, first these are read as they were sent; then, when they have their colours, they become
-// control points.
+// Reads the vertices as they were sent. A later step converts them to control points, after their
+// colours are known.
 MaybeFault ReadCurve(const FieldPath& path, const v1::Curve& in, const DecodeContext& context,
                      GeometryData* out);
 MaybeFault ToSpline(const FieldPath& path, const v1::Curve& in, const DecodeContext& context,
@@ -35,13 +35,14 @@ MaybeFault ReadBezierSurface(const FieldPath& path, const v1::BezierSurface& in,
 MaybeFault ToPatches(const FieldPath& path, const v1::BezierSurface& in,
                      const DecodeContext& context, GeometryData* out);
 
-// Cubic Béziers, cut as the record says.
+// Stores cubic Béziers, which are cut as the record specifies.
 MaybeFault SetSpans(const FieldPath& path, const gpu::Spans& spans, const DecodeContext& context,
                     GeometryData* out);
-// A shape's lines, or its dots.
+// Converts a shape to lines or dots.
 MaybeFault ToWireFrame(const FieldPath& path, const gpu::WireFrame& frame, bool dots,
                        const DecodeContext& context, GeometryData* out);
-// A mesh that has been read: the lines between its vertices, each once, or as dots those that triangles have.
+// Converts a mesh that has been read: to the lines between its vertices, each once, or to dots at
+// the vertices that triangles use.
 MaybeFault ToMeshFrame(const FieldPath& path, bool dots, const DecodeContext& context,
                        GeometryData* out);
 

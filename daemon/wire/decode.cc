@@ -27,9 +27,10 @@ namespace voxeld::daemon::wire {
 namespace {
 
 constexpr size_t kClientNameBytes = 128;
-constexpr uint64_t kAbsurd = 4;             // times what is allowed
+constexpr uint64_t kAbsurd = 4;             // factor over the limit
 constexpr uint64_t kLeastElementBytes = 2;  // its tag and its length
-// Up to here payloads are not worth looking for; and what a message of so many bytes is unfolded to, as a rule.
+// Messages up to this size do not benefit from separating payloads, and this is roughly what they
+// take when parsed.
 constexpr uint64_t kSmallBytes = 2048;
 constexpr size_t kArenaBytes = 4096;
 
@@ -139,7 +140,7 @@ struct ElementRow {
   uint64_t limit;
 };
 
-// Of an ApplyUpdateRequest; those of a StreamRequest leave out the first.
+// Paths in an ApplyUpdateRequest; those in a StreamRequest omit the first field.
 constexpr int kUpsertsPath[] = {v1::ApplyUpdateRequest::kOperationsFieldNumber,
                                 v1::StreamRequest::kBatchFieldNumber,
                                 v1::Batch::kUpsertsFieldNumber};
@@ -154,10 +155,10 @@ constexpr std::array<int, 4> ClipPath(int field) {
 constexpr std::array<int, 4> kPlanesPath = ClipPath(v1::Clip::kPlanesFieldNumber);
 constexpr std::array<int, 4> kBoxesPath = ClipPath(v1::Clip::kBoxesFieldNumber);
 constexpr std::array<int, 4> kCylindersPath = ClipPath(v1::Clip::kCylindersFieldNumber);
-constexpr uint64_t kMostPlanes = 1024;  // far beyond max_clip_planes, in one message
+constexpr uint64_t kMostPlanes = 1024;  // in one message; far beyond max_clip_planes
 
-// Before anything is parsed. A little too many elements are an Issue, later; so many that to unfold
-// them would be a burden end the stream, or refuse the update.
+// Checks the numbers of elements before parsing. Slightly too many elements result in an Issue
+// later. Far too many, which would be expensive to parse, end the stream or refuse the update.
 absl::Status CheckElements(std::span<const std::string_view> slices, uint64_t size,
                            std::span<const ElementRow> rows) {
   for (const ElementRow& row : rows) {
@@ -177,7 +178,8 @@ absl::Status CheckUpdateElements(std::span<const std::string_view> slices, uint6
     return TooManyOperations(count, limits);
   }
   const uint64_t planes = std::max<uint64_t>(limits.max_operations_per_commit, kMostPlanes);
-  // Together they may be as many as are allowed of entities, or of one object's parts.
+  // All operations together may contain as many entities as are allowed, or the parts of one
+  // object.
   const ElementRow rows[] = {
       {"operations[].batch.upserts", kUpsertsPath, limits.max_operations_per_commit},
       {"operations[].define_object.definition.parts", kPartsPath,
@@ -198,12 +200,12 @@ absl::Status CheckSize(std::span<const std::string_view> slices, const Limits& l
                    limits.max_message_bytes, ": send more messages that are smaller"));
 }
 
-// A message, parsed; its payloads stay in the slices where that is worth while.
+// A parsed message. Its payloads stay in the slices if that saves work.
 template <typename Message>
 class Parsed {
  public:
   absl::Status Parse(std::span<const std::string_view> slices, uint64_t size, Root root) {
-    // The status says it all; a client must not fill logs.
+    // The status contains everything; a client must not fill logs.
     const google::protobuf::LogSilencer silence;
     bare_ = size > kSmallBytes && MakeSkeleton(slices, root, &skeleton_);
     SliceStream stream(slices);
@@ -227,11 +229,11 @@ class Parsed {
     return options;
   }
 
-  alignas(std::max_align_t) char block_[kArenaBytes];  // not initialised
+  alignas(std::max_align_t) char block_[kArenaBytes];  // uninitialised
   google::protobuf::Arena arena_{In(block_)};
   Message* const message_ = google::protobuf::Arena::CreateMessage<Message>(&arena_);
   Skeleton skeleton_;
-  bool bare_ = false;  // payloads are left out
+  bool bare_ = false;  // payloads are separate
 };
 
 Decoded Failed(absl::Status status) {
@@ -240,7 +242,7 @@ Decoded Failed(absl::Status status) {
   return failed;
 }
 
-// Numbers the request and takes its operation. An Open has been dealt with.
+// Numbers the request and decodes its operation. Requires: it is not an Open.
 void Take(const FieldPath& path, const v1::StreamRequest& request, const DecodeContext& context,
           uint64_t previous_sequence, Decoded* out) {
   out->sequence = request.sequence() != 0 ? request.sequence() : previous_sequence + 1;
@@ -259,7 +261,7 @@ void Take(const FieldPath& path, const v1::StreamRequest& request, const DecodeC
   DecodeOperation(path, request, out->sequence, context, {&out->operations, &out->refused});
 }
 
-// `sources` are what the context's ranges are of.
+// `sources` supply the context's ranges.
 Decoded Decode(const v1::StreamRequest& request, DecodeContext context, uint64_t previous_sequence,
                const Sources& sources) {
   Decoded out;
@@ -305,8 +307,8 @@ Decoded Decode(const v1::ApplyUpdateRequest& request, DecodeContext context,
         "open.resume_token is set; an update is a session of its own, which takes up no other: "
         "give owner_token to join an owner"));
   }
-  open->no_outcomes = true;  // the answer has no place for them
-  open->resumable = false;   // nor for tokens
+  open->no_outcomes = true;  // the response cannot contain them
+  open->resumable = false;   // nor tokens
   for (int i = 0; i < request.operations_size(); ++i) {
     const v1::StreamRequest& operation = request.operations(i);
     const FieldPath path("operations", i);

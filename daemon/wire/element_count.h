@@ -1,5 +1,6 @@
-// How many elements a message holds, before it is parsed: parsing makes an object of each, and two
-// bytes are enough for one, so a message of allowed size could ask for a hundred times its size.
+// Counts the elements of a message before it is parsed. Parsing creates an object for each, and an
+// element can have as little as two bytes, so a message of valid size could require a hundred times
+// its size.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +9,8 @@
 
 namespace voxeld::daemon::wire {
 
-// Occurrences of the last field of `path` within submessages of the fields before it. What is
-// malformed ends the counting: the parser will refuse it.
+// Returns: the number of occurrences of the last field of `path` in submessages of the preceding
+// fields. Stops counting at malformed data, which the parser will reject.
 uint64_t CountElements(std::span<const std::string_view> slices, std::span<const int> path);
 
 }  // namespace voxeld::daemon::wire

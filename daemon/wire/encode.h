@@ -1,4 +1,4 @@
-// What the core says as messages of the wire. Reentrant.
+// Encodes the core's results as messages of the protocol. Reentrant.
 #pragma once
 
 #include <vector>
@@ -24,7 +24,7 @@ class VolumeHeader;
 
 namespace voxeld::daemon::wire {
 
-// All but the server's own words: version, time, limits.
+// Encodes everything except the server's own fields: version, time, limits.
 void Encode(const SessionInfo& in, v1::Opened* out);
 void Encode(const OwnerInfo& in, v1::OwnerInfo* out);
 void Encode(const std::vector<OwnerInfo>& in, v1::ListOwnersResponse* out);
@@ -39,7 +39,7 @@ void Encode(const Cleared& in, v1::ClearLayerResponse* out);
 void Encode(const Stats& in, v1::Stats* out);
 void Encode(const DisplayDescription& in, v1::DisplayDescription* out);
 
-// The header of a captured volume; its slices follow as they are.
+// Encodes the header of a captured volume; its slices follow unchanged.
 void Encode(const DisplayDescription& display, const display::DecodedVolume& volume,
             v1::VolumeHeader* out);
 

@@ -16,11 +16,11 @@ namespace {
 static_assert(std::endian::native == std::endian::little,
               "payloads are little-endian and written by memcpy");
 
-// The fields beside arrays and names, with their tags and lengths.
+// Size of the fields other than arrays and names, with their tags and lengths.
 constexpr uint64_t kFixedBytes = 128;
 constexpr uint64_t kTransformBytes = 104;
 
-// The arrays, however they are kept.
+// Access to the arrays, regardless of how they are stored.
 std::span<const float> PositionsOf(const GeometryData& in) { return in.arrays.positions(); }
 std::span<const uint32_t> IndicesOf(const GeometryData& in) { return in.arrays.indices(); }
 std::span<const uint32_t> ColorsOf(const GeometryData& in) { return in.arrays.colors(); }
@@ -158,7 +158,7 @@ void GeometryToWire(const GeometryData& in, v1::Primitive* out) {
       cylinder->set_rule(RuleToWire(record.rule));
       return;
     }
-    case gpu::PrimitiveKind::kImplicit:  // these are kept as they were sent
+    case gpu::PrimitiveKind::kImplicit:  // stored as they were sent
     case gpu::PrimitiveKind::kCurves:
     case gpu::PrimitiveKind::kPatches:
     case gpu::PrimitiveKind::kSamples:

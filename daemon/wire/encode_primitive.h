@@ -1,4 +1,4 @@
-// Content that the core keeps as primitives of the wire: the way back of ToContent. Reentrant.
+// Converts the core's content to primitives of the protocol: the inverse of ToContent. Reentrant.
 #pragma once
 
 #include <cstdint>
@@ -13,13 +13,15 @@ class Vertices;
 
 namespace voxeld::daemon::wire {
 
-// What ToContent makes of `out` is equal to `in`. Arrays have their plainest types: F32, U32, RGB8.
+// ToContent converts `out` to content that is equal to `in`. Arrays have the simplest types: F32,
+// U32, RGB8.
 void Encode(const Content& in, v1::Primitive* out);
-// Counts and arrays alone.
+// Encodes counts and arrays only.
 void VerticesToWire(const GeometryData& in, v1::Vertices* out);
 void Encode(const ObjectData& in, v1::Object* out);
 
-// At least as many bytes as the encoded form has, and not many more: to be asked before it is made.
+// Returns: an upper bound of the encoded size that is not much larger. Computes it without
+// encoding.
 uint64_t EncodedBytes(const Content& in);
 uint64_t EncodedBytes(const ObjectData& in);
 

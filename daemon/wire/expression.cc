@@ -25,14 +25,14 @@ Fault FromParser(const FieldPath& path, const absl::Status& status) {
                        limit ? ", the most of max_expression_depth or max_expression_nodes" : "")};
 }
 
-// How many numbers an operation takes.
+// Returns: the number of operands of an operation.
 size_t TakenBy(Tree::Op op) {
   if (op <= Tree::VOXEL) return 0;
   if (op < Tree::ADD) return 1;
   return op >= Tree::SMOOTH_MIN ? 3 : 2;
 }
 
-// Of what takes one or more.
+// Creates a node for an operation with one or more operands.
 Node Make(Tree::Op op, std::span<const Node> a, Graph& g) {
   switch (op) {
     case Tree::NEGATE:
@@ -92,7 +92,7 @@ Node Make(Tree::Op op, std::span<const Node> a, Graph& g) {
   }
 }
 
-// Takes a tree's values and names as its operations ask for them.
+// Consumes a tree's values and names as its operations need them.
 class TreeReader {
  public:
   TreeReader(const FieldPath& path, const Tree& tree, const ExpressionContext& context)

@@ -1,4 +1,4 @@
-// Expressions (voxeld.v1.Expression) into nodes of a graph.
+// Converts expressions (voxeld.v1.Expression) to nodes of a graph.
 #pragma once
 
 #include <string>
@@ -13,7 +13,7 @@ class Expression;
 
 namespace voxeld::daemon::wire {
 
-// What stands between spaces: the first `most` and one more, if there are more.
+// Returns: the names between spaces, at most `most` plus one that shows that there are more.
 std::vector<std::string> SplitNames(const std::string& names, size_t most);
 
 struct ExpressionContext {
@@ -22,10 +22,10 @@ struct ExpressionContext {
   gpu::implicit::Graph& graph;
 };
 
-// A surface, with what its text says of bounds; a tree has none.
+// Reads a surface, with the bounds that its text states; a tree states none.
 MaybeFault ToShape(const FieldPath& path, const v1::Expression& in,
                    const ExpressionContext& context, gpu::implicit::ParsedShape* out);
-// What is true where it is ≤ 0: as text a condition.
+// Reads a condition, which is true where the node is ≤ 0; as text it is a comparison.
 MaybeFault ToCondition(const FieldPath& path, const v1::Expression& in,
                        const ExpressionContext& context, gpu::implicit::Graph::Node* out);
 MaybeFault ToValue(const FieldPath& path, const v1::Expression& in,

@@ -1,6 +1,6 @@
-// Where in a request something stands: "batch.upserts[137].entity.priority". Nodes live on the
-// stack of the decoder that walks the message and point to their parents, so a path costs nothing
-// until it is printed.
+// The path of a field in a request: "batch.upserts[137].entity.priority". Nodes are on the stack of
+// the decoder that walks the message, and point to their parents, so a path costs nothing until it
+// is printed.
 #pragma once
 
 #include <cstdint>

@@ -33,11 +33,11 @@ using gpu::implicit::Vector;
 
 using Table = std::array<uint32_t, SampleHead::kTableEntries>;
 
-// A grid that has been checked.
+// A validated grid.
 struct ReadGrid {
   SampleHead head = {};
   uint64_t samples = 0;
-  gpu::Affine map;  // samples' coordinates → the primitive's
+  gpu::Affine map;  // maps samples' coordinates to the primitive's
   const std::string* bytes = nullptr;
 
   float Number(uint64_t i) const {
@@ -204,7 +204,7 @@ MaybeFault ToTable(const FieldPath& path, const v1::Transfer& in, SampleHead* he
   }
   int stop = 0;
   for (size_t i = 0; i < out->size(); ++i) {
-    // The first and the last are the ends', which go on before and after.
+    // The first and last entries are exactly the ends, which also apply beyond them.
     const double value =
         low + static_cast<double>(i) / (SampleHead::kTableEntries - 1) * (high - low);
     while (stop + 2 < in.values_size() && in.values(stop + 1) <= value) ++stop;
@@ -222,7 +222,7 @@ MaybeFault ToTable(const FieldPath& path, const v1::Transfer& in, SampleHead* he
   return {};
 }
 
-// Least and greatest of the numbers, if there are any.
+// Finds the least and greatest number, if there are any.
 void FindRange(const ReadGrid& grid, float* least, float* greatest) {
   bool any = false;
   for (uint64_t i = 0; i < grid.samples; ++i) {
@@ -234,20 +234,20 @@ void FindRange(const ReadGrid& grid, float* least, float* greatest) {
   }
 }
 
-// What is above the middle, in one colour.
+// Draws the samples above the middle of the range in one colour.
 void SetHalf(const ReadGrid& grid, uint32_t color, SampleHead* head, Table* out) {
   float least = 0, greatest = 0;
   FindRange(grid, &least, &greatest);
   head->low = least;
   head->scale = static_cast<float>(SampleHead::kTableEntries / (double{greatest} - double{least}));
-  // All alike, or as good as that: nothing is above their middle.
+  // If all numbers are practically equal, none is above the middle.
   if (!std::isfinite(head->scale)) head->scale = 0;
   for (size_t i = 0; i < out->size(); ++i) {
     (*out)[i] = i < out->size() / 2 ? 0 : color | SampleHead::kDrawn;
   }
 }
 
-// In the primitive's coordinates.
+// Returns: the bounds in the primitive's coordinates.
 Bounds BoundsOf(const ReadGrid& grid) {
   Bounds box;
   box.empty = false;
@@ -255,7 +255,7 @@ Bounds BoundsOf(const ReadGrid& grid) {
   return MapBounds(grid.map, box);
 }
 
-// Of a surface: which entry of the table a place of the samples has.
+// For a surface: maps a position in the samples to an entry of the table.
 MaybeFault ToColorsByPlace(const FieldPath& path, const v1::ColorScale& in, ReadGrid* grid,
                            gpu::GeometryRecord* look, Table* out) {
   if (auto fault = ToScaleTable(path, in, out)) return fault;
@@ -298,7 +298,7 @@ MaybeFault Finish(const FieldPath& path, const ReadGrid& grid, const Table& tabl
   std::copy(table.begin(), table.end(), all.begin() + gpu::kSampleHeadWords);
   const std::span<uint32_t> samples =
       all.subspan(gpu::kSampleHeadWords + SampleHead::kTableEntries + head.bricks);
-  samples.back() = 0;  // beyond the last sample
+  samples.back() = 0;  // after the last sample
   std::memcpy(samples.data(), grid.bytes->data(), grid.bytes->size());
   if (head.format == SampleFormat::kRgba8) {
     for (uint32_t& word : samples) {  // 0xAARRGGBB
@@ -352,7 +352,7 @@ MaybeFault ToIsosurface(const FieldPath& path, const v1::Isosurface& in, uint32_
   if (auto fault = ToShell(path, in.shell(), surface, context, &look)) return fault;
   grid.head.by_level = 1;
   grid.head.level = static_cast<float>(in.level());
-  // Thickness in the primitive's units, of which a sample is as many as its cell's edge.
+  // Converts the thickness from the primitive's units to samples, by the mean edge of a cell.
   if (look.thickness_unit == gpu::ThicknessUnit::kUnits) {
     const double thickness =
         static_cast<double>(look.thickness) / std::cbrt(std::fabs(gpu::Determinant(grid.map)));

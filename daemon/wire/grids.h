@@ -1,4 +1,4 @@
-// Volumes and isosurfaces: the wire's grids into the engine's samples.
+// Converts volumes and isosurfaces from the protocol's grids to the engine's samples.
 #pragma once
 
 #include "daemon/wire/check.h"
@@ -13,11 +13,11 @@ namespace voxeld::daemon::wire {
 
 struct ShapeContext;
 
-// A group of one: the samples, under the map from their own coordinates. `color`: 0xRRGGBB. What it is called,
-// and what was sent, is the caller's.
+// Creates a group of one part: the samples, with the map from their own coordinates. `color`:
+// 0xRRGGBB. The caller sets the kind and the primitive as it was sent.
 MaybeFault ToVolume(const FieldPath& path, const v1::Volume& in, uint32_t color,
                     const DecodeContext& context, GroupData* out);
-// By `shape` also the scale, if there is one.
+// `shape` also contains the colour scale, if there is one.
 MaybeFault ToIsosurface(const FieldPath& path, const v1::Isosurface& in, uint32_t color,
                         const ShapeContext& shape, GroupData* out);
 

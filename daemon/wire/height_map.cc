@@ -21,7 +21,7 @@ using gpu::implicit::Vector;
 
 constexpr uint32_t kCornersPerCell = 6;
 
-// A grid of samples: counts and payloads that fit one another.
+// Checks the counts of the grid and the sizes of its payloads.
 MaybeFault CheckGrid(const FieldPath& path, const v1::HeightMap& in, const Limits& limits) {
   const std::pair<const char*, uint32_t> sides[] = {{"columns", in.columns()}, {"rows", in.rows()}};
   for (const auto& [name, count] : sides) {
@@ -74,7 +74,7 @@ double HeightAt(const v1::HeightMap& in, size_t sample) {
   return static_cast<double>(height);
 }
 
-// Two triangles to each square, cut from its first sample to the opposite one.
+// Creates two triangles per square, divided from its first sample to the opposite one.
 void FillTriangles(uint32_t columns, uint32_t rows, std::span<uint32_t> out) {
   size_t at = 0;
   for (uint32_t row = 0; row + 1 < rows; ++row) {
@@ -87,7 +87,7 @@ void FillTriangles(uint32_t columns, uint32_t rows, std::span<uint32_t> out) {
   }
 }
 
-// Between neighbours along rows and columns.
+// Creates lines between neighbours along rows and columns.
 void FillLines(uint32_t columns, uint32_t rows, std::span<uint32_t> out) {
   size_t at = 0;
   for (uint32_t row = 0; row < rows; ++row) {
@@ -198,7 +198,7 @@ MaybeFault ToHeightMap(const FieldPath& path, const v1::HeightMap& in, const Dec
   return {};
 }
 
-// From edge to edge, whatever the heights.
+// The picture extends from edge to edge, regardless of the heights.
 MaybeFault AddHeightMapPicture(const FieldPath& path, const v1::HeightMap& in,
                                const DecodeContext& context, GeometryData* out) {
   if (in.picture().empty()) return {};

@@ -1,6 +1,6 @@
-// Height maps (voxeld.v1.HeightMap) into triangles.
+// Converts height maps (voxeld.v1.HeightMap) to triangles.
 //
-// Guarantee: as its triangles (gpu/primitives/triangle.h): nothing gets through.
+// Guarantee: like its triangles (gpu/primitives/triangle.h), the surface has no gaps.
 #pragma once
 
 #include "daemon/wire/check.h"
@@ -12,10 +12,10 @@ class HeightMap;
 
 namespace voxeld::daemon::wire {
 
-// Fills record, arrays and bounds of `out`, all but the uniform colour and the picture.
+// Fills record, arrays and bounds of `out`, but neither the uniform colour nor the picture.
 MaybeFault ToHeightMap(const FieldPath& path, const v1::HeightMap& in, const DecodeContext& context,
                        GeometryData* out);
-// Then, when it has its colours, the picture that lies over it, if there is one.
+// Adds the picture over the surface, if there is one. Call it after the colours are set.
 MaybeFault AddHeightMapPicture(const FieldPath& path, const v1::HeightMap& in,
                                const DecodeContext& context, GeometryData* out);
 

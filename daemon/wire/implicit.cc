@@ -22,7 +22,7 @@ using gpu::implicit::Graph;
 using gpu::implicit::Parameters;
 using gpu::implicit::ProgramSource;
 
-// `name`: not empty (SplitNames).
+// Requires: `name` is not empty (SplitNames).
 bool IsName(std::string_view name) {
   if (absl::ascii_isdigit(static_cast<unsigned char>(name[0]))) return false;
   return std::all_of(name.begin(), name.end(), [](char c) {
@@ -94,7 +94,7 @@ MaybeFault ToColor(const FieldPath& path, const v1::Implicit& in, const Expressi
   return {};
 }
 
-// The domain: what is to be looked at, and a bound.
+// Reads the domain: the region to examine, which also bounds the shape.
 MaybeFault ToDomain(const FieldPath& path, const v1::Box3& in, Graph& graph, Graph::Node* bound,
                     GeometryData* out) {
   if (auto fault = CheckBox(path, in)) return fault;

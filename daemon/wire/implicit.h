@@ -1,4 +1,4 @@
-// Implicit shapes (voxeld.v1.Implicit) into programs that engines run.
+// Converts implicit shapes (voxeld.v1.Implicit) to programs that engines run.
 #pragma once
 
 #include <vector>
@@ -13,12 +13,12 @@ class Implicit;
 
 namespace voxeld::daemon::wire {
 
-// Compiles; fills kind, counts and arrays of `out`.
+// Compiles the graph; fills kind, counts and arrays of `out`.
 MaybeFault ToProgram(const FieldPath& path, const gpu::implicit::Graph& graph,
                      const gpu::implicit::ProgramSource& source,
                      const std::vector<float>& ring_points, GeometryData* out);
 
-// Fills record, program and bounds of `out`, all but the colour.
+// Fills record, program and bounds of `out`, but not the colour.
 MaybeFault ToImplicit(const FieldPath& path, const v1::Implicit& in, const DecodeContext& context,
                       GeometryData* out);
 

@@ -16,7 +16,7 @@
 namespace voxeld::daemon::wire {
 namespace {
 
-// A row of SQLite's has at most 10⁹ bytes; this leaves room for the rest of the message.
+// An SQLite row holds at most 10⁹ bytes; this leaves room for the rest of the message.
 constexpr uint64_t kMostStoredBytes = uint64_t{900} << 20;
 
 template <typename Message>
@@ -27,7 +27,7 @@ absl::Status ParseStored(std::string_view bytes, Message* out) {
 
 absl::StatusOr<Operation> TheOperation(const v1::StreamRequest& request, const Limits& limits,
                                        gpu::BulkPool* pool, text::Fonts* fonts) {
-  // It was taken whole once, in one message or in several.
+  // The content was accepted earlier, in one message or in several.
   Decoded decoded = DecodeStreamRequest(request, limits, 0, pool, {}, fonts);
   if (!decoded.status.ok()) return decoded.status;
   if (decoded.refused.first.has_value()) {
@@ -79,7 +79,7 @@ absl::StatusOr<std::string> EncodeKept(const Entity& entity, const TwoClocks& no
   to->set_erase(entity.data.erase);
   to->set_label(entity.data.label);
   if (entity.expires_ns != sync::kNever) {
-    // Centuries ahead it is the last time that there is.
+    // Saturates at the latest time that can be represented, centuries ahead.
     const int64_t left = entity.expires_ns - now.monotonic_ns;
     out.set_expires_unix_ns(now.unix_ns + std::min(left, INT64_MAX - now.unix_ns));
   }

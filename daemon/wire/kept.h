@@ -1,4 +1,4 @@
-// What is kept over the daemon's end, as bytes (state.proto), and back. Reentrant.
+// Encodes persistent state as bytes (state.proto), and decodes it. Reentrant.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ class Fonts;
 
 namespace voxeld::daemon::wire {
 
-// Both clocks at one moment: lifetimes count by the monotonic one, and are kept by the other.
+// Both clocks at one moment: lifetimes use the monotonic clock in memory and Unix time on disk.
 struct TwoClocks {
   sync::TimeNs monotonic_ns = 0;
   int64_t unix_ns = 0;
@@ -30,15 +30,15 @@ struct TwoClocks {
 std::string EncodeKept(const OwnerRecord& owner);
 std::string EncodeKept(const OwnedName& key, const Layer& layer);
 std::string EncodeKept(const Object& object);
-// ResourceExhausted for contents that no row can hold (900 MiB).
+// Errors: ResourceExhausted for content that does not fit into a row (900 MiB).
 absl::StatusOr<std::string> EncodeKept(const Entity& entity, const TwoClocks& now);
 
-// Bytes that are none are DataLoss. `pool` and `fonts` as DecodeStreamRequest has them; what limits refuse
-// is InvalidArgument.
+// `pool` and `fonts` are as for DecodeStreamRequest. Errors: DataLoss for malformed bytes,
+// InvalidArgument for content that the limits refuse.
 absl::StatusOr<OwnerRecord> DecodeKeptOwner(std::string_view bytes);
 
 struct KeptLayerRow {
-  uint64_t number = 0;  // of its making
+  uint64_t number = 0;  // assigned on creation
   std::string client_name;
   Operation operation;
 };
@@ -46,13 +46,13 @@ absl::StatusOr<KeptLayerRow> DecodeKeptLayer(std::string_view bytes, const Limit
 
 struct KeptObjectRow {
   Operation operation;
-  std::vector<std::string> refers_to;  // objects
+  std::vector<std::string> refers_to;  // names of objects
 };
 absl::StatusOr<KeptObjectRow> DecodeKeptObject(const std::string& name, std::string_view bytes,
                                                const Limits& limits, gpu::BulkPool* pool,
                                                text::Fonts* fonts);
 
-// Nothing: its time is over.
+// Returns: nothing if the entity has expired.
 absl::StatusOr<std::optional<Operation>> DecodeKeptEntity(
     const std::string& layer, const std::string& id, std::string_view bytes, const TwoClocks& now,
     const Limits& limits, gpu::BulkPool* pool, text::Fonts* fonts);

@@ -1,5 +1,5 @@
-// What a request may name in place of payloads (voxeld.v1.MemoryRange). The decoder reads it through
-// this; where it comes from (daemon/local, daemon/assets) is not its business.
+// Memory that a request may name in place of payloads (voxeld.v1.MemoryRange). The decoder reads it
+// through these interfaces, which daemon/local and daemon/assets implement.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@ class Budget;
 
 namespace voxeld::daemon::wire {
 
-// Bytes that stay there, and as they are, for as long as `mapping` lives.
+// Bytes that stay valid and unchanged as long as `mapping` exists.
 struct MappedRange {
   std::string_view bytes;
   std::shared_ptr<const void> mapping;
@@ -25,11 +25,11 @@ class MemorySource {
  public:
   virtual ~MemorySource() = default;
 
-  // `size` bytes from `offset` of the memory that the client calls `memory`. Thread-safe.
+  // Returns: `size` bytes from `offset` of the client's memory `memory`. Thread-safe.
   //
-  // NotFound: there is no such memory. OutOfRange: it ends before. Anything else: it cannot be read
-  // now. Each message goes on from the name of the field at fault, as in "is 7; …": memory, size,
-  // memory.
+  // Errors: NotFound if the memory does not exist; OutOfRange if it ends earlier; any other error
+  // means that it cannot be read now. Each message continues after the name of the faulty field, as
+  // in "is 7; …": respectively memory, size, memory.
   virtual absl::StatusOr<MappedRange> Find(uint64_t memory, uint64_t offset,
                                            uint64_t size) const = 0;
 };
@@ -40,20 +40,20 @@ class AssetSource {
 
   virtual ~AssetSource() = default;
 
-  // `size` bytes from `offset` of the content whose SHA-256 is `digest`, so many bytes. It counts as used.
-  // Thread-safe; reads a file.
+  // Returns: `size` bytes from `offset` of the content whose SHA-256 is `digest`, a string of
+  // kDigestBytes. Marks it as used. Thread-safe; reads a file.
   //
-  // NotFound: it is not here, or not yet whole. OutOfRange: it ends before. Anything else: it cannot be
-  // read now. Messages as above: asset, size, asset.
+  // Errors: NotFound if the asset is missing or incomplete; OutOfRange if it ends earlier; any
+  // other error means that it cannot be read now. Messages are as above: asset, size, asset.
   virtual absl::StatusOr<MappedRange> FindAsset(std::string_view digest, uint64_t offset,
                                                 uint64_t size) = 0;
 };
 
-// Each may be none.
+// Either source may be null.
 struct Sources {
   const MemorySource* memory = nullptr;
   AssetSource* assets = nullptr;
-  // What has what was read of assets, while a request is decoded; none: nothing is charged.
+  // Charged for bytes read from assets while a request is decoded; null: not charged.
   Budget* budget = nullptr;
 };
 

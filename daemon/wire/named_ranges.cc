@@ -20,12 +20,12 @@ Fault NoLocalMemory(const FieldPath& path, const v1::MemoryRange& range) {
                        "themselves (Stream tells of its socket in Opened.local_socket)")};
 }
 
-// One field that a range may stand in place of.
+// A field that can be replaced by a range.
 struct Named {
   const char* name;
   const char* range_name;
   const v1::MemoryRange* range;  // null: none
-  std::string* bytes;            // where they are to be
+  std::string* bytes;            // destination
 };
 
 MaybeFault Fetch(const FieldPath& path, const Named& named, const DecodeContext& context) {
@@ -72,7 +72,7 @@ MaybeFault FetchHeights(const FieldPath& path, const DecodeContext& context, v1:
   return {};
 }
 
-// `out` names some (NamesMore).
+// Requires: `out` names samples (NamesMore).
 MaybeFault FetchSamples(const FieldPath& path, const DecodeContext& context, v1::Grid* out) {
   auto fault =
       Fetch(path, {"samples", "samples_in", &out->samples_in(), out->mutable_samples()}, context);

@@ -1,4 +1,4 @@
-// What one request names in place of payloads: found, checked, counted.
+// Finds, checks and counts the ranges that one request names in place of payloads.
 #pragma once
 
 #include <cstdint>
@@ -15,18 +15,18 @@ namespace voxeld::daemon::wire {
 
 struct DecodeContext;
 
-// A range costs its sender nothing, and what it names is copied: so there is a most that one
-// request may name, whatever it names twice counted twice.
+// Naming a range costs the sender nothing, but its bytes are copied. One request may therefore name
+// a limited number of bytes; ranges that are named twice count twice.
 class NamedRanges {
  public:
-  // `sources` outlive it.
+  // `sources` must outlive this object.
   NamedRanges(const Sources& sources, const Limits& limits)
       : sources_(sources), limit_(limits.max_uncommitted_bytes) {}
   ~NamedRanges();
   NamedRanges(const NamedRanges&) = delete;
   NamedRanges& operator=(const NamedRanges&) = delete;
 
-  // `path` is that of the MemoryRange. Its size has been compared with what is wanted, or is whatever there is.
+  // `path` is that of the MemoryRange. The caller has checked its size, or accepts any.
   MaybeFault Read(const FieldPath& path, const v1::MemoryRange& range, MappedRange* out);
 
   uint64_t bytes_read() const { return bytes_read_; }
@@ -35,17 +35,19 @@ class NamedRanges {
   const Sources& sources_;
   const uint64_t limit_;
   uint64_t bytes_read_ = 0;
-  uint64_t charged_ = 0;  // of the budget, until the request is decoded
+  uint64_t charged_ = 0;  // charged to the budget until the request is decoded
 };
 
-// The same, by what the decoder is given.
+// Does the same with the context's ranges.
 MaybeFault ReadRange(const FieldPath& path, const v1::MemoryRange& range,
                      const DecodeContext& context, MappedRange* out);
 
-// Whether something beside its vertices (a texture's picture, samples, heights) is named by ranges.
+// Returns: whether ranges name something other than vertices (a texture's picture, samples,
+// heights).
 bool NamesMore(const v1::Primitive& in);
 
-// Puts what is named so in place, into a copy of `in`: so that whoever keeps it as it was sent keeps the bytes.
+// Copies `in` and inserts the named bytes, so that a primitive that is kept as it was sent includes
+// them.
 MaybeFault PutInPlace(const FieldPath& path, const v1::Primitive& in, const DecodeContext& context,
                       v1::Primitive* out);
 

@@ -8,10 +8,10 @@
 namespace voxeld::daemon::wire {
 namespace {
 
-// `vertex(corner)`, less than `vertices`.
+// Requires: `vertex(corner)` is less than `vertices`.
 template <typename VertexOf>
 std::optional<OpenEdge> Find(uint32_t corners, uint32_t vertices, VertexOf&& vertex) {
-  // Of each vertex the greater ones that it has edges with, in one array.
+  // For each vertex, the greater vertices with which it has edges, in one array.
   std::vector<uint32_t> begin(size_t{vertices} + 1), greater;
   const auto for_edges = [&](auto&& f) {
     for (uint32_t corner = 0; corner < corners; ++corner) {
@@ -23,7 +23,7 @@ std::optional<OpenEdge> Find(uint32_t corners, uint32_t vertices, VertexOf&& ver
   std::partial_sum(begin.begin(), begin.end(), begin.begin());
   greater.resize(begin.back());
   for_edges([&](uint32_t least, uint32_t most) { greater[begin[least]++] = most; });
-  // Each row's begin is now its end.
+  // Each entry of `begin` is now the end of its row.
   uint32_t row = 0;
   for (uint32_t least = 0; least < vertices; ++least) {
     const auto first = greater.begin() + row, end = greater.begin() + begin[least];
@@ -40,7 +40,7 @@ std::optional<OpenEdge> Find(uint32_t corners, uint32_t vertices, VertexOf&& ver
   return std::nullopt;
 }
 
-// Of each vertex the first one at its position.
+// Returns: for each vertex, the first vertex at its position.
 std::vector<uint32_t> FirstAtPositions(std::span<const float> positions) {
   const auto at = [&](uint32_t vertex) {
     const float* p = &positions[size_t{vertex} * 3];

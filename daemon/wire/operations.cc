@@ -243,7 +243,7 @@ MaybeFault To(const FieldPath& path, const v1::DeleteObject& in, const Limits& l
   return CheckName(FieldPath(path, "object"), in.object(), limits.max_id_bytes);
 }
 
-// What is wrong with a Commit; it itself is carried out.
+// Checks a Commit. It is applied even if it has a fault.
 MaybeFault To(const FieldPath& path, const v1::Commit& in, const Limits&, Commit* out) {
   *out = {in.frame_id(), in.send_time_ns(), in.client_drops(), 0, in.must_show()};
   out->durable = in.durable();
@@ -257,7 +257,7 @@ MaybeFault To(const FieldPath& path, const v1::Commit& in, const Limits&, Commit
   return {};
 }
 
-// The message names the field alone; the whole path stands beside it.
+// The message contains only the field's name; the issue has the whole path.
 void AddIssue(Fault fault, uint64_t sequence, std::string layer, std::string id,
               const Limits& limits, const Sinks& out, bool applied = false) {
   std::string message =

@@ -1,4 +1,4 @@
-// The operations of a StreamRequest, one by one.
+// Decodes the operations of a StreamRequest individually.
 #pragma once
 
 #include <vector>
@@ -17,8 +17,8 @@ struct Sinks {
   Refusals* refused;
 };
 
-// Appends what `request` asks for (anything but an Open) to `out`, under `sequence`. `path` is that
-// of the request itself.
+// Appends the operations of `request` (which is not an Open) to `out`, numbered `sequence`. `path`
+// is that of the request.
 void DecodeOperation(const FieldPath& path, const v1::StreamRequest& request, uint64_t sequence,
                      const DecodeContext& context, const Sinks& out);
 

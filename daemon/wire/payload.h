@@ -1,4 +1,4 @@
-// The large bytes fields of a message, where they lie: in the pieces that gRPC hands over.
+// Large bytes fields of a message, left in the pieces that gRPC delivers.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 namespace voxeld::daemon::wire {
 
-// Bytes in pieces. Both what it is made of and what that points to outlive it.
+// Bytes in pieces. The pieces, and the bytes to which they point, must outlive it.
 class Payload {
  public:
   Payload() = default;
@@ -22,9 +22,9 @@ class Payload {
   uint64_t size() const { return size_; }
   bool empty() const { return size_ == 0; }
 
-  // Calls `run(data, count)` for elements of `element` bytes (16 at most) side by side, in order;
-  // one that lies in several pieces is put together first. A rest that is no whole element is left
-  // out.
+  // Calls `run(data, count)` for contiguous elements of `element` bytes (at most 16), in order. An
+  // element that spans several pieces is copied together first. Incomplete elements at the end are
+  // ignored.
   template <typename Run>
   void ForEachRun(size_t element, Run&& run) const {
     char joined[16];
@@ -49,24 +49,24 @@ class Payload {
 
  private:
   std::span<const std::string_view> pieces_;
-  std::string_view whole_;  // if there are no pieces
+  std::string_view whole_;  // used if there are no pieces
   uint64_t size_ = 0;
 };
 
-// Payloads that were left out of a message, each named there by a token.
+// Payloads that were removed from a message; the message refers to each by a token.
 class PayloadTable {
  public:
-  // Adds a payload, its pieces one after another; Token names it.
+  // Begins a payload; Add appends its pieces and Token returns its name.
   void Begin();
   void Add(std::string_view piece);
   std::string Token() const;
 
-  // What a bytes field of that content stands for. Empty for what is no token.
+  // Returns: the payload for which the content of a bytes field stands; empty if it is not a token.
   Payload Find(std::string_view token) const;
 
  private:
   struct Range {
-    size_t begin = 0, end = 0;  // of pieces_
+    size_t begin = 0, end = 0;  // indices in pieces_
     uint64_t size = 0;
   };
   std::vector<std::string_view> pieces_;

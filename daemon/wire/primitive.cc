@@ -60,7 +60,7 @@ MaybeFault ToPoints(const FieldPath& path, const v1::Points& in, const DecodeCon
   return ToVertices(FieldPath(path, "vertices"), in.vertices(), false, context, out);
 }
 
-// How many corners the primitive has: its indices, or its vertices as they stand.
+// Returns: the number of corners: indices, or consecutive vertices.
 uint32_t Corners(const gpu::GeometryRecord& record) {
   return record.index_count != 0 ? record.index_count : record.vertex_count;
 }
@@ -103,7 +103,7 @@ MaybeFault ToSegments(const FieldPath& path, const v1::Segments& in, const Decod
   return ToElementColors(FieldPath(path, "vertices"), in.vertices(), context, out);
 }
 
-// An open one keeps its surface.
+// An open mesh is drawn as its surface.
 MaybeFault FillMesh(const FieldPath& path, const DecodeContext& context, GeometryData* out) {
   out->record.fill = gpu::Fill::kSurface;
   const FieldPath fill(path, "fill");
@@ -235,10 +235,10 @@ MaybeFault ToGeometry(const FieldPath& path, const v1::Primitive& in, const Deco
                                out);
     case v1::Primitive::kArrow:
       return ToShape(FieldPath(path, "arrow"), in.arrow(), shape, out);
-    case v1::Primitive::kVolume:  // these are groups, and have been dealt with
+    case v1::Primitive::kVolume:  // groups, which were handled earlier
     case v1::Primitive::kIsosurface:
-    case v1::Primitive::kText:      // is several geometries, and has been dealt with
-    case v1::Primitive::kInstance:  // is no geometry, and has been dealt with
+    case v1::Primitive::kText:      // several geometries; handled earlier
+    case v1::Primitive::kInstance:  // not a geometry; handled earlier
     case v1::Primitive::KIND_NOT_SET:
       break;
   }
@@ -249,7 +249,7 @@ MaybeFault ToGeometry(const FieldPath& path, const v1::Primitive& in, const Deco
                "bezier_surface, arrow, text, volume, isosurface"};
 }
 
-// Whether record and arrays do not say what was sent.
+// Returns: whether record and arrays do not represent what was sent.
 bool IsKeptAsSent(const v1::Primitive& in, const GeometryData& data) {
   switch (in.kind_case()) {
     case v1::Primitive::kPoints:
@@ -269,14 +269,14 @@ bool IsKeptAsSent(const v1::Primitive& in, const GeometryData& data) {
   }
 }
 
-// Whether what is read of it becomes something else.
+// Returns: whether the vertices are converted after they have been read.
 bool IsConverted(const v1::Primitive& in) {
   return in.has_curve() || in.has_bezier_surface() ||
          (in.has_mesh() && (in.mesh().has_texture() || in.mesh().fill() == v1::FILL_LINES ||
                             in.mesh().fill() == v1::FILL_DOTS));
 }
 
-// A primitive that has been read, its arrays in the message wherever they lay.
+// Returns: a primitive that has been read, with its arrays in the message.
 std::string AsRead(const v1::Primitive& in, const GeometryData& data) {
   v1::Primitive sent = in;
   v1::Vertices* const vertices = sent.has_curve() ? sent.mutable_curve()->mutable_vertices()
@@ -322,7 +322,7 @@ MaybeFault ToColors(const FieldPath& path, const v1::Primitive& in, const Decode
     case v1::Primitive::kVolume:
       break;
     default:
-      if (implicit) return {};  // it has them
+      if (implicit) return {};  // its program includes the colours
       if (!in.color_scale().scalars().empty()) {
         return Fault{FieldPath(scale, "scalars").ToString(), Reason::kInvalidValue,
                      "is given, but the shape has no vertices; give along"};
@@ -392,8 +392,8 @@ MaybeFault ToWhatItIs(const FieldPath& path, const v1::Primitive& in, const Deco
   return {};
 }
 
-// Of what may take more than its message: what is kept as it was sent has become something else, and elements with colours have
-// vertices of their own.
+// Returns: the memory of content that may exceed its message: converted primitives, and elements
+// with colours, which get separate vertices.
 uint64_t MadeBytes(const v1::Primitive& in, const Content& content) {
   if (const auto* group = std::get_if<GroupPtr>(&content)) return (*group)->bytes();
   const auto* geometry = std::get_if<GeometryPtr>(&content);

@@ -1,4 +1,4 @@
-// Primitives (voxeld.v1.Primitive) into content that the core keeps and the engine draws.
+// Converts primitives (voxeld.v1.Primitive) to content that the core stores and the engine draws.
 #pragma once
 
 #include "daemon/wire/check.h"

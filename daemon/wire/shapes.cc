@@ -44,7 +44,8 @@ inline constexpr bool kHasInside =
     !std::is_same_v<Message, v1::Disc> && !std::is_same_v<Message, v1::Patch> &&
     !std::is_same_v<Message, v1::Polygon>;
 
-// Fill and all of a look, of what has lines and dots; `*done`: it has been drawn as these.
+// Reads the fill and style of a shape that supports lines and dots. `*done`: it has been converted
+// to these.
 template <typename Message, typename Shape>
 MaybeFault ToLookOrFrame(const FieldPath& path, const Message& in, const ShapeContext& context,
                          const Shape& shape, GeometryData* out, bool* done) {
@@ -68,7 +69,8 @@ MaybeFault ToField(const FieldPath& path, const ShapeContext& context, Graph& gr
   gpu::implicit::ProgramSource source{.surface = made.surface, .bound = made.bound};
   source.ring_ends = made.ring_ends;
   source.ring_axis = made.ring_axis;
-  // The engine looks beyond the box by as much as a shell is thick; bounds are for what fits a display.
+  // The engine extends the box by the thickness of the shell; bounds are used to check what fits a
+  // display.
   const bool units = out->record.thickness_unit == gpu::ThicknessUnit::kUnits;
   const double shell = units ? static_cast<double>(out->record.thickness) / 2 : 0;
   out->record.params[6] = 1;

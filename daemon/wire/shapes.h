@@ -1,4 +1,4 @@
-// Shapes that are drawn by the general method (gpu/primitives/): the wire's fields into their programs.
+// Converts shapes that use the general method (gpu/primitives/) to programs.
 #pragma once
 
 #include "daemon/wire/check.h"
@@ -22,14 +22,14 @@ namespace voxeld::daemon::wire {
 struct ShapeContext {
   const DecodeContext& context;
   const FieldPath& scale_path;
-  const v1::ColorScale* scale = nullptr;  // in place of one colour, if there is one
+  const v1::ColorScale* scale = nullptr;  // replaces the uniform colour; may be null
 };
 
-// A shape as a field, all but its look: program, domain and bounds.
+// Converts a shape to a field, without style: program, domain and bounds.
 MaybeFault ToField(const FieldPath& path, const ShapeContext& context, gpu::implicit::Graph& graph,
                    const gpu::implicit::FieldShape& made, GeometryData* out);
 
-// Each fills record, program and bounds of `out`, all but the colour.
+// Each function fills record, program and bounds of `out`, but not the colour.
 MaybeFault ToShape(const FieldPath& path, const v1::Arrow& in, const ShapeContext& context,
                    GeometryData* out);
 MaybeFault ToShape(const FieldPath& path, const v1::Cone& in, const ShapeContext& context,

@@ -12,19 +12,19 @@ namespace {
 
 using google::protobuf::internal::WireFormatLite;
 
-// Beyond, a skeleton that is not far smaller than the message costs more than it saves.
+// Beyond this size, a skeleton that is not much smaller than the message costs more than it saves.
 constexpr uint64_t kSpareBytes = 16 << 10;
 constexpr uint64_t kLeastFactor = 4;
 
 constexpr int kMostVarint = 10, kMostTag = 5, kMostLength = 5;
 
-// A message on the way to payloads: its fields that lead there.
+// A message on the path to payloads, with the fields that lead there.
 struct FieldNode {
   struct Step {
     int field = 0;
     const FieldNode* to = nullptr;  // null: a payload
   };
-  Step steps[5];  // field 0: none
+  Step steps[5];  // field 0: unused
 };
 
 constexpr FieldNode kVertices = {{{v1::Vertices::kIndicesFieldNumber},
@@ -62,10 +62,10 @@ class Walker {
 
   uint64_t left() const { return left_; }
 
-  // The next `size` bytes, which are there, are a message of that kind. Every function answers false
-  // if what it finds is not plain.
+  // Processes the next `size` bytes as a message of this kind. Requires: the bytes exist. All
+  // functions return false for anything unusual.
   bool Message(const FieldNode& node, uint64_t size) {
-    const uint64_t end = left_ - size;  // what is left then
+    const uint64_t end = left_ - size;  // bytes left at its end
     while (left_ > end) {
       if (!Field(node, end)) return false;
     }
@@ -109,7 +109,7 @@ class Walker {
       PatchLength(at);
       return true;
     }
-    if (size == 0) {  // as good as absent, but it may undo one that came before
+    if (size == 0) {  // equivalent to absent, but may override an earlier occurrence
       PutVarint(0);
       return true;
     }
@@ -121,12 +121,12 @@ class Walker {
     return true;
   }
 
-  // To the next byte that there is.
+  // Moves to the next byte.
   void Advance() {
     while (next_ < slices_.size() && piece_.empty()) piece_ = slices_[next_++];
   }
 
-  // Has `take(piece)` called for the next `size` bytes, which are there.
+  // Calls `take(piece)` for the next `size` bytes. Requires: they exist.
   template <typename TakePiece>
   void Take(uint64_t size, TakePiece&& take) {
     left_ -= size;
@@ -182,7 +182,7 @@ class Walker {
     out_.bytes.push_back(static_cast<char>(value));
   }
 
-  // The length of what follows the room at `at`, in as many bytes as were left for it.
+  // Writes the length of the data after the gap at `at`, using all bytes of the gap.
   void PatchLength(size_t at) {
     uint64_t size = out_.bytes.size() - at - kMostLength;
     for (int i = 0; i < kMostLength; ++i, size >>= 7) {
@@ -192,8 +192,8 @@ class Walker {
 
   const std::span<const std::string_view> slices_;
   Skeleton& out_;
-  size_t next_ = 0;         // slice after the one that is read
-  std::string_view piece_;  // what is left of that; empty at the end only
+  size_t next_ = 0;         // the slice after the current one
+  std::string_view piece_;  // the rest of the current slice; empty only at the end
   uint64_t left_ = 0, consumed_ = 0;
 };
 

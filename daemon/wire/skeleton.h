@@ -1,10 +1,10 @@
-// A message without its payloads: what the generated parser is given instead of the bytes that came,
-// so that positions, colours and indices are copied once, to where they are kept, and not into the
-// parser's strings first.
+// Separates the payloads of a message before the generated parser runs, so that positions, colours
+// and indices are copied once, directly to their destination, and not first into the parser's
+// strings.
 //
-// Every payload (the three bytes fields of voxeld.v1.Vertices, wherever they occur) is replaced by a
-// token; all else stays. So the parser alone decides what a message means: repeated occurrences,
-// oneofs, unknown fields and text that is not UTF-8 are dealt with as ever.
+// Every payload (the three bytes fields of voxeld.v1.Vertices, wherever they occur) is replaced by
+// a token; everything else stays. The parser alone therefore determines what a message means:
+// repeated occurrences, oneofs, unknown fields and invalid UTF-8 are handled as usual.
 #pragma once
 
 #include <cstdint>
@@ -20,12 +20,12 @@ enum class Root : uint8_t { kStreamRequest, kApplyUpdateRequest };
 
 struct Skeleton {
   std::string bytes;
-  PayloadTable payloads;  // views of the slices
+  PayloadTable payloads;  // views into the slices
 };
 
-// False: `out` is not to be used, and the parser is to be given what came. So it is for everything
-// that is not plain, well-formed protobuf (groups too, which no message of ours has), and where
-// payloads are so small that it is not worth while.
+// Returns: false if `out` must not be used and the parser must get the original message. This is so
+// for anything but plain, well-formed protobuf (including groups, which the protocol does not use),
+// and if the payloads are too small to save work.
 bool MakeSkeleton(std::span<const std::string_view> slices, Root root, Skeleton* out);
 
 }  // namespace voxeld::daemon::wire

@@ -20,7 +20,7 @@ bool SliceStream::Next(const void** data, int* size) {
   return true;
 }
 
-// Only ever within the piece that the last Next gave out.
+// Requires: `count` lies within the piece that the last Next returned.
 void SliceStream::BackUp(int count) {
   offset_ -= static_cast<size_t>(count);
   consumed_ -= count;

@@ -1,5 +1,5 @@
-// Protobuf's input stream over memory in pieces, as gRPC hands a message over:
-// nothing is copied together first.
+// Protobuf's input stream over memory in pieces, as gRPC delivers a message, without copying them
+// together.
 #pragma once
 
 #include <google/protobuf/io/zero_copy_stream.h>
@@ -23,8 +23,8 @@ class SliceStream final : public google::protobuf::io::ZeroCopyInputStream {
 
  private:
   std::span<const std::string_view> slices_;
-  size_t slice_ = 0;   // the one that is read
-  size_t offset_ = 0;  // within it
+  size_t slice_ = 0;   // the current slice
+  size_t offset_ = 0;  // position in it
   int64_t consumed_ = 0;
 };
 

@@ -28,13 +28,14 @@ namespace {
 using gpu::implicit::Vector;
 
 constexpr size_t kMostBytes = 64 << 10;
-constexpr double kFlatness = 1.0 / 1500;  // of what letters' curves become, capital heights
+constexpr double kFlatness = 1.0 / 1500;  // maximum error of flattened outlines, in capital heights
 constexpr const char* kStrokeFont = "futural";
-constexpr double kStrokeLine = 1.6;  // from one line of strokes to the next, capital heights
+constexpr double kStrokeLine = 1.6;  // line spacing of stroke fonts, in capital heights
 
-// Where the text stands: letters' x, y and z, in capital heights, to the primitive's coordinates.
+// The placement of a text: maps letters' x, y and z, in capital heights, to the primitive's
+// coordinates.
 struct Place {
-  Vector origin, right, up, facing;  // of the height's length
+  Vector origin, right, up, facing;  // as long as the height
 
   Vector At(double x, double y) const { return origin + x * right + y * up; }
   gpu::Affine Map(double x, double y) const {
@@ -75,7 +76,7 @@ MaybeFault ToPlace(const FieldPath& path, const v1::Text& in, Place* out) {
 
 struct Wording {
   text::Layout layout;
-  double depth = 0;  // capital heights
+  double depth = 0;  // in capital heights
 };
 
 MaybeFault ToWording(const FieldPath& path, const v1::Text& in, Wording* out) {
@@ -121,7 +122,8 @@ Fault FromStatus(const FieldPath& path, const char* field, const absl::Status& s
   return {FieldPath(path, field).ToString(), reason, std::string(status.message())};
 }
 
-// A contour's curves as straight pieces, none farther from them than kFlatness; its last point is its first.
+// Converts a contour's curves to straight lines that deviate by at most kFlatness. Its last point
+// is its first.
 void Flatten(const text::Contour& contour, std::vector<Vector>* out) {
   for (size_t i = 0; i + 4 <= contour.size(); i += 4) {
     Vector p[4];
@@ -131,7 +133,7 @@ void Flatten(const text::Contour& contour, std::vector<Vector>* out) {
   }
 }
 
-// One letter, flat or solid, in its own coordinates.
+// Converts one letter, flat or solid, in its own coordinates.
 MaybeFault ToLetter(const FieldPath& path, const text::Glyph& glyph, double depth,
                     const ShapeContext& context, GeometryData* out) {
   std::vector<Vector> points;
@@ -154,10 +156,10 @@ MaybeFault ToLetter(const FieldPath& path, const text::Glyph& glyph, double dept
   return ToField(path, context, graph, gpu::Polygon{points, ends}.Make(graph), out);
 }
 
-// Of all its parts, thickness left out.
+// Sets the bounds of all parts, without thickness.
 void SetBounds(const Place& place, GroupData* out) {
   bool first = true;
-  for (int a = 0; a < 3; ++a) out->min[a] = out->max[a] = place.origin[a];  // of nothing
+  for (int a = 0; a < 3; ++a) out->min[a] = out->max[a] = place.origin[a];  // if it is empty
   for (const GroupData::Part& part : out->parts) {
     Bounds box;
     box.empty = false;
@@ -200,17 +202,18 @@ MaybeFault ToLetters(const FieldPath& path, const text::LaidOut& laid, const Pla
   return {};
 }
 
-// The scale of a part, in the part's own coordinates, where `scale` has its ends.
+// Returns: the colour scale in the part's own coordinates. Requires: `scale` has its ends.
 v1::ColorScale ScaleOf(const v1::ColorScale& scale, const gpu::Affine& part) {
   const double along[3] = {scale.along().x(), scale.along().y(), scale.along().z()};
   const double square = along[0] * along[0] + along[1] * along[1] + along[2] * along[2];
-  Vector rise;  // of the number, by each of the part's units
+  Vector rise;  // increase of the number per unit of the part
   double start = 0;
   for (int a = 0; a < 3; ++a) {
     rise = rise + along[a] / square * Vector{part.m[a * 4], part.m[a * 4 + 1], part.m[a * 4 + 2]};
     start += along[a] / square * part.m[a * 4 + 3];
   }
-  // Along a part nothing may rise: then it has the number of where it begins, as good as everywhere.
+  // If the number is constant along a part, a minimal increase gives practically all of it the
+  // number of its beginning.
   constexpr double kLeastRise = 1e-9;
   const double range = scale.high() - scale.low();
   if (!(gpu::implicit::Length(rise) > kLeastRise * std::fabs(range)))
@@ -225,8 +228,8 @@ v1::ColorScale ScaleOf(const v1::ColorScale& scale, const gpu::Affine& part) {
   return own;
 }
 
-// Before they are made: each letter takes what the plain one does, and a table. `plain`: all of
-// them.
+// Checks the memory before creating coloured letters: each takes as much as the plain letter, and a
+// table. `plain` contains all letters.
 MaybeFault CheckColored(const FieldPath& path, const GroupData& plain,
                         const DecodeContext& context) {
   if (context.decoded_bytes == nullptr) return {};
@@ -241,7 +244,8 @@ MaybeFault CheckColored(const FieldPath& path, const GroupData& plain,
                             " of others; max_uncommitted_bytes is ", most)};
 }
 
-// Letters in colours of a scale: each is one of its own. `out` has the plain ones.
+// Creates letters in the colours of a scale; each has its own geometry. `out` contains the plain
+// ones.
 MaybeFault ToColoredLetters(const FieldPath& path, const v1::ColorScale& in,
                             const text::LaidOut& laid, const Place& place, double depth,
                             const gpu::GeometryRecord& look, const ShapeContext& context,
@@ -266,7 +270,7 @@ MaybeFault ToColoredLetters(const FieldPath& path, const v1::ColorScale& in,
   }
   return {};
 }
-// Strokes of lines, broken like any text, as straight spans.
+// Converts the lines of a stroke font to straight spans, with line breaks as in any text.
 MaybeFault ToStrokes(const FieldPath& path, const v1::Text& in, const text::Layout& layout,
                      const Place& place, const DecodeContext& context, gpu::Spans* out) {
   const auto found = context.fonts->Strokes(layout.font.empty() ? kStrokeFont : layout.font);
@@ -362,7 +366,7 @@ MaybeFault ToText(const FieldPath& primitive_path, const v1::Primitive& primitiv
   }
   if (!lines) {
     auto group = std::make_shared<GroupData>();
-    // Letters are made in capital heights.
+    // Letters use capital heights as their unit.
     if (look.thickness_unit == gpu::ThicknessUnit::kUnits)
       look.thickness /= static_cast<float>(in.height());
     if (auto fault = ToLetters(path, laid, place, wording.depth, look, context, group.get())) {
@@ -392,7 +396,7 @@ MaybeFault ToText(const FieldPath& primitive_path, const v1::Primitive& primitiv
   }
   auto data = std::make_shared<GeometryData>();
   data->record = look;
-  for (int a = 0; a < 3; ++a) data->min[a] = data->max[a] = place.origin[a];  // of nothing
+  for (int a = 0; a < 3; ++a) data->min[a] = data->max[a] = place.origin[a];  // if it is empty
   if (auto fault = SetSpans(path, spans, context, data.get())) return fault;
   if (primitive.has_color_scale() && data->record.vertex_count != 0) {
     if (auto fault = ToVertexColors(scale_path, primitive.color_scale(), context, data.get())) {

@@ -1,7 +1,8 @@
-// Text: letters of the server's fonts into polygons, solids, curves or strokes, whose voxels they then have.
+// Converts text to polygons, solids, curves or strokes with the server's fonts. Its voxels are those
+// of these shapes.
 //
-// Guarantee: filled letters hold what their outlines do, but for 1/1500 of a capital's height; flat
-// ones are as thick as they are said to be, outlines and strokes are curves (gpu/curves/cut.h).
+// Guarantee: filled letters match their outlines within 1/1500 of a capital's height. Flat ones
+// have the given thickness; outlines and strokes are curves (gpu/curves/cut.h).
 #pragma once
 
 #include "daemon/wire/check.h"
@@ -13,7 +14,8 @@ class Primitive;
 
 namespace voxeld::daemon::wire {
 
-// `path`: of the primitive. Letters become a group, which share what they share; lines one geometry. `color`: 0xRRGGBB.
+// `path` is that of the primitive. Letters become a group with shared geometries; lines become one
+// geometry. `color`: 0xRRGGBB.
 MaybeFault ToText(const FieldPath& path, const v1::Primitive& in, uint32_t color,
                   const DecodeContext& context, Content* out);
 

@@ -1,4 +1,4 @@
-// Pictures on triangles (voxeld.v1.Texture, and HeightMap's).
+// Applies pictures to triangles (voxeld.v1.Texture, and HeightMap's).
 #pragma once
 
 #include <span>
@@ -13,13 +13,13 @@ class Texture;
 
 namespace voxeld::daemon::wire {
 
-// Lays a picture, the file's bytes at `path`, over the triangles of `out`, which has none yet. places: two of each vertex
-// (gpu/primitives/texture.h), finite.
+// Applies the picture file at `path` to the triangles of `out`. Requires: they have no picture yet.
+// `places` has two finite coordinates per vertex (gpu/primitives/texture.h).
 MaybeFault AddPicture(const FieldPath& path, const std::string& picture,
                       std::span<const float> places, const DecodeContext& context,
                       GeometryData* out);
 
-// The same by a message, for a mesh.
+// Does the same for a mesh, from a message.
 MaybeFault ToTexture(const FieldPath& path, const v1::Texture& in, const DecodeContext& context,
                      GeometryData* out);
 

@@ -10,18 +10,19 @@ namespace {
 static_assert(std::endian::native == std::endian::little,
               "payloads are little-endian and read by memcpy");
 
-// So many are converted before their bounds are taken: they are still in the nearest cache.
+// Vertices are converted in blocks of this size, whose bounds are computed while they are in the L1
+// cache.
 constexpr size_t kBlock = 1024;
 
-// Vectors of the language's own: four vertices are three of them, whose lanes run through the axes.
+// Compiler vectors: four vertices fill three of them, whose lanes cycle through the axes.
 typedef float Float4 __attribute__((vector_size(16)));
 typedef int32_t Int4 __attribute__((vector_size(16)));
 
-constexpr int32_t kExponent = 0x7F800000;  // all ones: infinity or not a number
+constexpr int32_t kExponent = 0x7F800000;  // all ones: infinity or NaN
 
 class Scan {
  public:
-  // From `in` to `out`, which may be the same.
+  // Copies from `in` to `out`, which may be the same.
   void Copy(const char* in, size_t vertices, float* out) {
     Float4 low[3], high[3];
     Int4 bad = bad_;
@@ -153,7 +154,7 @@ bool CopyIndices16(const Payload& in, uint32_t vertex_count, std::span<uint32_t>
 void CopyColors(const Payload& in, size_t element_bytes, std::span<uint32_t> out) {
   uint32_t* to = out.data();
   in.ForEachRun(element_bytes, [&](const char* data, size_t count) {
-    // All but the last may be read together with the byte behind it.
+    // Every element except the last may be read together with the following byte.
     const size_t whole = element_bytes == 4 ? count : count - 1;
     for (size_t i = 0; i < whole; ++i) {
       uint32_t value;

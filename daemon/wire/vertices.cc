@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::array<const char*, 3> kAxes = {"x", "y", "z"};
 
-// Bytes of one element; 0 if the type does not fit the array.
+// Returns: the bytes of one element; 0 if the type does not fit the array.
 uint64_t PositionBytes(v1::ElementType type) {
   switch (type) {
     case v1::ELEMENT_TYPE_UNSPECIFIED:
@@ -58,18 +58,18 @@ uint64_t ColorBytes(v1::ElementType type) {
   }
 }
 
-// One of the arrays: its field, the one that may stand in its place, and where the bytes are.
+// One of the arrays: its field, the field that may replace it, and the location of the bytes.
 struct Array {
   const char* name;
   const char* range_name;
   const v1::MemoryRange* range;  // null: none
-  Payload payload;               // of a range, once that has been checked
+  Payload payload;               // for a range, set after it has been checked
   std::shared_ptr<const void> mapping = {};
 
   bool given() const { return range != nullptr || !payload.empty(); }
 };
 
-// Finds the bytes, and holds their number against what is wanted.
+// Finds the bytes and compares their number with the expected one.
 MaybeFault CheckArray(const FieldPath& path, uint64_t count, uint64_t element_bytes,
                       const DecodeContext& context, Array* array) {
   // count < 2³² and element_bytes ≤ 12: no overflow.
@@ -113,7 +113,7 @@ MaybeFault BadPosition(const FieldPath& path, size_t at, const std::string& valu
                absl::StrCat("is ", value, "; ", right)};
 }
 
-// The fault in positions that were found to have one.
+// Finds the fault in positions that are known to have one.
 MaybeFault FindFloat(const FieldPath& path, std::span<const float> positions) {
   for (size_t i = 0; i < positions.size(); ++i) {
     if (!std::isfinite(positions[i])) {
@@ -171,7 +171,7 @@ MaybeFault ToIndices(const FieldPath& path, v1::ElementType type, const Payload&
                             vertex_count - 1, " are possible")};
 }
 
-// The arrays of a message, wherever they lie.
+// The arrays of a message, wherever they are stored.
 struct Arrays {
   Array positions, indices, colors;
 };
@@ -188,7 +188,7 @@ Arrays ArraysOf(const v1::Vertices& in, const DecodeContext& context) {
       {"colors", "colors_in", in.has_colors_in() ? &in.colors_in() : nullptr, find(in.colors())}};
 }
 
-// Types that fit their arrays, and arrays that are there where a type or count speaks of them.
+// Checks that types fit their arrays, and that arrays exist if a type or count refers to them.
 MaybeFault CheckTypes(const FieldPath& path, const v1::Vertices& in, const Payload& indices,
                       bool with_indices) {
   if (PositionBytes(in.position_type()) == 0) {
@@ -221,7 +221,7 @@ MaybeFault CheckTypes(const FieldPath& path, const v1::Vertices& in, const Paylo
   return {};
 }
 
-// Whether colours are those of segments or triangles; of points and vertices are as good as each other.
+// Checks whether colours belong to segments or triangles. For points, both settings are equivalent.
 MaybeFault CheckColorsOf(const FieldPath& path, const v1::Vertices& in, bool colored,
                          gpu::PrimitiveKind kind, bool* of_elements) {
   *of_elements = false;
@@ -245,7 +245,7 @@ MaybeFault CheckColorsOf(const FieldPath& path, const v1::Vertices& in, bool col
                "is ELEMENTS, which are segments and triangles; give VERTICES"};
 }
 
-// How many corners the elements have, each its own.
+// Returns: the number of corners of all elements, counted separately for each.
 uint64_t CountCorners(const gpu::GeometryRecord& record) {
   const uint64_t corners = record.index_count != 0 ? record.index_count : record.vertex_count;
   if (record.kind == gpu::PrimitiveKind::kTriangles || record.topology == gpu::Topology::kList) {
@@ -254,7 +254,7 @@ uint64_t CountCorners(const gpu::GeometryRecord& record) {
   return 2 * (record.topology == gpu::Topology::kLoop ? corners : corners - 1);
 }
 
-// Of the corner `i` of all elements, one after another, the vertex.
+// Returns: the vertex of corner `i`, numbered consecutively over all elements.
 uint32_t VertexOfCorner(const gpu::GeometryRecord& record, std::span<const uint32_t> indices,
                         uint64_t i) {
   const bool listed =
@@ -359,7 +359,7 @@ MaybeFault ToElementColors(const FieldPath& path, const v1::Vertices& in,
     const float* const position = &out->arrays.positions()[vertex * 3];
     std::copy_n(position, 3, &kept->writable_positions()[i * 3]);
     kept->writable_colors()[i] = of_elements[i / each];
-    // Of the vertices that are kept.
+    // The bounds include only vertices that are used.
     for (int a = 0; a < 3; ++a) {
       const double value = double{position[a]};
       out->min[a] = i == 0 ? value : std::min(out->min[a], value);

@@ -15,7 +15,7 @@ namespace {
 // Protobuf's own limit is 2 GiB; this leaves room for the rest of the message.
 constexpr uint64_t kMostContentBytes = (uint64_t{2} << 30) - (uint64_t{1} << 20);
 
-// Of a repeated message: its tag and length.
+// Size of the tag and length of an element of a repeated message.
 constexpr size_t kFieldBytes = 6;
 
 class Filler final : public SceneChangeVisitor {

@@ -1,10 +1,11 @@
-// A watch of the scene as messages: what differs from what its client has been told, in pieces.
+// Encodes a watch of the scene as messages: the difference from what its client has received, in
+// pieces.
 //
 //   WatchMessages messages(filter);
-//   messages.Begin(snapshot);                      // to the whole of it, or from the last to this
+//   messages.Begin(snapshot);                      // from the last one (or nothing) to this one
 //   while (!messages.in_sync()) { messages.Next(&message); … }
 //
-// It holds two snapshots while it tells of a change set, one in between, and no message.
+// It holds two snapshots during a change set and one otherwise, and no message.
 //
 // Single-threaded.
 #pragma once
@@ -24,26 +25,26 @@ namespace voxeld::daemon::wire {
 
 class WatchMessages {
  public:
-  // A message ends with the first change that takes it to this size: so it is at most that, and one
-  // entity or object.
+  // A message ends with the change that makes it reach this size. It is therefore at most this
+  // large, plus one entity or object.
   static constexpr size_t kMessageBytes = size_t{128} << 10;
 
   explicit WatchMessages(const v1::WatchSceneRequest& request,
                          size_t message_bytes = kMessageBytes);
 
-  // Of what has been told, whole; 0: of none.
+  // Returns: the number of the snapshot that was sent completely; 0: none.
   uint64_t told() const { return told_ == nullptr ? 0 : told_->number; }
   bool in_sync() const { return !changes_.has_value(); }
 
-  // Begins the change set that leads to `target`. Only when in sync.
+  // Begins the change set that leads to `target`. Requires: in_sync().
   void Begin(SnapshotPtr target);
 
-  // The next message of the change set, over whatever is in `out`; the last one says in_sync. Only
-  // between Begin and that. FailedPrecondition, and the end of the watch, for contents that no
-  // message can hold.
+  // Writes the next message of the change set to `out`; the last one sets in_sync. Requires:
+  // !in_sync(). Errors: FailedPrecondition for content that no message can hold, which ends the
+  // watch.
   absl::Status Next(v1::WatchSceneResponse* out);
 
-  // Gives its snapshots away: the watch is over.
+  // Releases its snapshots to the caller at the end of the watch.
   void LetGo(SnapshotPtr* told, SnapshotPtr* target) {
     changes_.reset();
     told_.swap(*told);
