@@ -1,4 +1,5 @@
-# Writes a C++ source that has others as text: FormulaSources() of gpu/cuda/formula_source.h.
+# Writes a C++ source that contains other sources as text: FormulaSources() of
+# gpu/cuda/formula_source.h.
 #   cmake -DROOT=… -DSOURCES=a;b -DOUTPUT=… -P EmbedSources.cmake
 set(text "// Written by cmake/EmbedSources.cmake.\n#include \"gpu/cuda/formula_source.h\"\n\n")
 string(APPEND text "namespace voxeld::gpu::cuda {\nnamespace {\n\nconstexpr NamedSource kSources[] = {\n")
@@ -6,7 +7,7 @@ foreach(source ${SOURCES})
   file(READ ${ROOT}/${source} content)
   string(APPEND text "    {\"${source}\", R\"voxeld(${content})voxeld\"},\n")
 endforeach()
-# What of the standard library these take.
+# The parts of the standard library that these sources use.
 string(APPEND text "    {\"cstddef\", \"using size_t = decltype(sizeof(0));\\n\"},\n")
 string(APPEND text "    {\"cstdint\", R\"voxeld(
 using int8_t = signed char;

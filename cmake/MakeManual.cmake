@@ -1,5 +1,6 @@
-# Manual pages and shells' completions, from the programs themselves: cmake -DVOXELD= -DVOXELCTL= -DGZIP= -DOUT=FOLDER -P. What is in
-# the folder before goes.
+# Generates manual pages and shell completions by running the programs:
+#   cmake -DVOXELD= -DVOXELCTL= -DGZIP= -DOUT=FOLDER -P MakeManual.cmake
+# Previous content of the folder is removed.
 file(REMOVE_RECURSE ${OUT})
 
 function(run)
@@ -9,7 +10,7 @@ function(run)
   endif()
 endfunction()
 
-# write(FILE PROGRAM ARGUMENT …): the file is what the program prints.
+# write(FILE PROGRAM ARGUMENT …): writes what the program prints to the file.
 function(write file)
   get_filename_component(folder ${OUT}/${file} DIRECTORY)
   file(MAKE_DIRECTORY ${folder})

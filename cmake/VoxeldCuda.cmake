@@ -1,8 +1,9 @@
-# Finds CUDA by itself, also where nvcc is not on the PATH. Sets VOXELD_HAVE_CUDA.
+# Finds CUDA, even if nvcc is not on the PATH. Sets VOXELD_HAVE_CUDA.
 #
-# VOXELD_CUDA: AUTO builds the CUDA engine where there are nvcc and a GPU, ON wherever nvcc is, OFF leaves it out.
-# VOXELD_CUDA_ARCHITECTURES: the architectures for which the kernels are compiled. GPUs other than Hopper compile the PTX for
-# Ampere, the oldest architecture that the engine supports: earlier ones have too little shared memory per thread block.
+# VOXELD_CUDA: AUTO builds the CUDA engine if nvcc and a GPU exist, ON if nvcc exists, OFF never.
+# VOXELD_CUDA_ARCHITECTURES: the architectures for which the kernels are compiled. GPUs other than
+# Hopper compile the PTX for Ampere, the oldest architecture that the engine supports: earlier ones
+# have too little shared memory per thread block.
 set(VOXELD_CUDA_ARCHITECTURES "80-virtual;90-real" CACHE STRING "CUDA architectures, as CMAKE_CUDA_ARCHITECTURES names them")
 set(VOXELD_HAVE_CUDA OFF)
 string(TOUPPER "${VOXELD_CUDA}" VOXELD_CUDA)
@@ -21,7 +22,7 @@ if(NOT CMAKE_CUDA_COMPILER)
   endif()
 endif()
 if(VOXELD_CUDA STREQUAL "AUTO")
-  # What NVIDIA's kernel driver makes for each GPU; a container may have the device alone.
+  # NVIDIA's kernel driver creates an entry for each GPU; a container may have only the device.
   file(GLOB gpus /proc/driver/nvidia/gpus/* /dev/nvidia[0-9]*)
   if(NOT gpus)
     if(CMAKE_CUDA_COMPILER)
@@ -46,7 +47,7 @@ if(VOXELD_CCACHE)
   set(CMAKE_CUDA_COMPILER_LAUNCHER ${VOXELD_CCACHE})
 endif()
 enable_language(CUDA)
-# CMake 3.25 does not know this level of the newest compilers.
+# CMake 3.25 does not know this standard level of the newest compilers.
 if(NOT CMAKE_CUDA20_STANDARD_COMPILE_OPTION)
   set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION "-std=c++20")
   set(CMAKE_CUDA20_EXTENSION_COMPILE_OPTION "-std=c++20")

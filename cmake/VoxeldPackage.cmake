@@ -1,6 +1,7 @@
-# What `cmake --install` installs, and the Debian packages that are made of it (tools/package, or cpack --preset release): a package a
-# component. `service` is the package voxeld, `cuda` is voxeld-cuda, `import` is voxeld-import, and `client` (client/cpp/CMakeLists.txt) is libvoxeld-dev. The paths
-# in packaging/ are those of the prefix /usr.
+# Defines what `cmake --install` installs, and the Debian packages (tools/package, or cpack --preset
+# release), one per component: `service` is the package voxeld, `cuda` is voxeld-cuda, `import` is
+# voxeld-import, and `client` (client/cpp/CMakeLists.txt) is libvoxeld-dev. The paths in packaging/
+# assume the prefix /usr.
 include(GNUInstallDirs)
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME service)
 set(VOXELD_MAINTAINER "voxeld maintainers <maintainers@voxeld.invalid>" CACHE STRING "Maintainer of the package")
@@ -21,11 +22,11 @@ function(voxeld_install_programs destination component)
   endforeach()
 endfunction()
 voxeld_install_programs(${CMAKE_INSTALL_BINDIR} service voxeld voxelctl)
-# Not of the package, which would depend on ROS: cmake --install BUILD --component ros
+# Not part of the package, which would then depend on ROS: cmake --install BUILD --component ros
 if(TARGET voxeld-ros)
   voxeld_install_programs(${CMAKE_INSTALL_BINDIR} ros EXCLUDE_FROM_ALL voxeld-ros)
 endif()
-# Where voxeld looks for it: gpu/worker/worker_engine.h.
+# The folder where voxeld looks for it: gpu/worker/worker_engine.h.
 voxeld_install_programs(libexec/voxeld service voxeld-engine)
 if(TARGET voxeld-engine-cuda)
   voxeld_install_programs(libexec/voxeld cuda voxeld-engine-cuda)
@@ -33,7 +34,7 @@ if(TARGET voxeld-engine-cuda)
           COMPONENT cuda)
   install(FILES ${CMAKE_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/voxeld-cuda RENAME copyright COMPONENT cuda)
 endif()
-# Where voxelctl looks for it: tools/voxelctl/import/import_program.cc.
+# The folder where voxelctl looks for it: tools/voxelctl/import/import_program.cc.
 if(TARGET voxeld-import)
   voxeld_install_programs(libexec/voxeld import voxeld-import)
   install(FILES ${CMAKE_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/voxeld-import RENAME copyright COMPONENT import)
@@ -50,7 +51,7 @@ install(FILES ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_SOURCE_DIR}/CHANGELOG.md ${C
               ${CMAKE_SOURCE_DIR}/docs/configuration.md ${CMAKE_SOURCE_DIR}/docs/recordings.md ${CMAKE_SOURCE_DIR}/SECURITY.md
         DESTINATION ${doc})
 
-# Manual pages and completions, which the programs write: into share/, as they are installed.
+# The programs generate manual pages and completions, which are installed into share/.
 find_program(VOXELD_GZIP gzip REQUIRED)
 set(written ${CMAKE_BINARY_DIR}/share)
 add_custom_command(
@@ -64,7 +65,7 @@ add_custom_command(
 add_custom_target(voxeld_manual ALL DEPENDS ${CMAKE_BINARY_DIR}/share.stamp)
 install(DIRECTORY ${written}/ DESTINATION share)
 
-# What all this is made of, told from the programs and from Ninja's log, and what must be said of it.
+# The SBOM, derived from the programs and from Ninja's log, and the licence notices.
 set(sbom ${CMAKE_BINARY_DIR}/sbom)
 find_program(VOXELD_DPKG_QUERY dpkg-query)
 if(VOXELD_DPKG_QUERY AND CMAKE_GENERATOR STREQUAL "Ninja")
@@ -103,8 +104,9 @@ else()
   message(STATUS "voxeld is built without a list of what it is made of: that takes dpkg and Ninja")
 endif()
 
-# Everything that tools/package packages: programs, manual, SBOM, client libraries; no tests. Also voxel-bench, to measure this build; it is
-# not published, because it compares with a loop that is compiled for the processor of the machine that builds it.
+# Everything that tools/package needs: programs, manual, SBOM and client libraries; no tests. Also
+# voxel-bench, to measure this build; it is not published, because it compares with a loop that is
+# compiled for the processor of the build machine.
 add_custom_target(packaged DEPENDS voxeld voxelctl voxeld-engine voxeld-emulator voxeld_client_shared voxeld_manual python_client)
 foreach(part voxeld-engine-cuda voxeld-import voxel-bench sbom)
   if(TARGET ${part})
@@ -143,7 +145,7 @@ if(TARGET voxeld-import)
   set(CPACK_DEBIAN_IMPORT_PACKAGE_SECTION graphics)
   set(CPACK_DEBIAN_IMPORT_DESCRIPTION
       "more file formats for voxelctl\nMeshes with materials, volumes, molecules, maps and drawings, besides the formats that\nvoxelctl reads itself (STL, PLY, VOX, GeoJSON and point clouds as text).")
-  # Both programs speak one version of the protocol between them.
+  # The two programs share one version of their protocol.
   set(CPACK_DEBIAN_IMPORT_PACKAGE_DEPENDS "voxeld (= ${PROJECT_VERSION})")
 endif()
 
@@ -153,9 +155,10 @@ if(TARGET voxeld-engine-cuda)
   set(CPACK_DEBIAN_CUDA_PACKAGE_SECTION graphics)
   set(CPACK_DEBIAN_CUDA_DESCRIPTION
       "CUDA engine of voxeld, for NVIDIA GPUs\nThe daemon starts it where a GPU is found, in place of the engine on the CPU, and\ngoes back to that one when this package is removed. It needs the GPU's driver.")
-  # Both programs speak one version of the protocol between them.
+  # The two programs share one version of their protocol.
   set(CPACK_DEBIAN_CUDA_PACKAGE_DEPENDS "voxeld (= ${PROJECT_VERSION})")
-  set(CPACK_DEBIAN_CUDA_PACKAGE_SUGGESTS "libcuda1, libnccl2")  # loaded if they are there: the driver, and several GPUs for one display
+  # Used if present: the driver, and several GPUs for one display.
+  set(CPACK_DEBIAN_CUDA_PACKAGE_SUGGESTS "libcuda1, libnccl2")
   set(CPACK_DEBIAN_CUDA_PACKAGE_CONTROL_EXTRA ${packaging}/cuda/postinst ${packaging}/cuda/postrm)
 endif()
 
@@ -165,7 +168,7 @@ set(CPACK_DEBIAN_CLIENT_DESCRIPTION
     "development files of voxeld, the driver service for volumetric displays\nThe C++ client library with its headers and CMake files, and the protocol as\n.proto files, for clients in other languages.")
 set(CPACK_DEBIAN_CLIENT_PACKAGE_DEPENDS "libabsl-dev")  # its headers include Abseil's
 set(CPACK_DEBIAN_CLIENT_PACKAGE_SUGGESTS "voxeld")
-# Archives carry the commit's time (cmake/VoxeldHardening.cmake), whenever they are made.
+# Archives always carry the commit's time (cmake/VoxeldHardening.cmake).
 file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/PackProject.cmake @ONLY CONTENT [[
 if(NOT DEFINED ENV{SOURCE_DATE_EPOCH})
   set(ENV{SOURCE_DATE_EPOCH} @VOXELD_EPOCH@)

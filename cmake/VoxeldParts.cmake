@@ -15,7 +15,7 @@ option(VOXELD_BENCH "Build the benchmarks" ${by_default})
 option(VOXELD_PYTHON_CLIENT "Python client: the wheel (target python_client)" ${by_default})
 option(VOXELD_PAGE "Web viewer served by voxeld; skipped if Node.js or its npm packages are missing" ON)
 
-# Tests that go through several parts run where all of these are built.
+# Tests that use several parts run if all of these are built.
 set(VOXELD_ALL_PARTS OFF)
 if(VOXELD_IMPORTERS AND VOXELD_RECORDING AND VOXELD_LIGHTS AND VOXELD_MARKERS)
   set(VOXELD_ALL_PARTS ON)

@@ -1,5 +1,5 @@
-# Targets of this project: one place for the language level, warnings, sanitizers, and the two shapes of
-# target (library, test) that every folder uses.
+# Defines the project's targets: the language level, warnings, sanitizers, and the two kinds of
+# targets (library, test) that every folder uses.
 
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
@@ -20,7 +20,7 @@ endif()
 find_program(VOXELD_CCACHE ccache)
 if(VOXELD_CCACHE)
   set(CMAKE_C_COMPILER_LAUNCHER ${VOXELD_CCACHE})
-  # The second is what it asks for where headers are precompiled.
+  # Precompiled headers require the second option.
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${VOXELD_CCACHE})
 endif()
 
@@ -37,7 +37,7 @@ target_include_directories(voxeld_options INTERFACE ${CMAKE_SOURCE_DIR})
 # CPU and GPU must round identically, so never fuse a multiplication and an addition.
 target_compile_options(voxeld_options INTERFACE -ffp-contract=off)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
-  # Where it vectorises straight code, GCC 12 forgets that a double was rounded to float on its way.
+  # When GCC 12 vectorises straight-line code, it ignores that a double was rounded to float.
   target_compile_options(voxeld_options INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-fno-tree-slp-vectorize>)
 endif()
 if(VOXELD_SANITIZE)
@@ -57,14 +57,15 @@ if(VOXELD_FUZZ)
   target_compile_options(voxeld_options INTERFACE -fsanitize=fuzzer-no-link -fprofile-instr-generate -fcoverage-mapping)
   target_link_options(voxeld_options INTERFACE -fprofile-instr-generate)
 endif()
-# Under AddressSanitizer by Clang edges are counted too, cheaply: tests run each fuzz target for a few seconds, guided by them.
+# AddressSanitizer builds by Clang also count edges, cheaply: tests run each fuzz target for a few
+# seconds, guided by them.
 set(VOXELD_FUZZ_TESTS OFF)
 if(VOXELD_SANITIZE MATCHES "address" AND CMAKE_CXX_COMPILER_ID MATCHES "Clang" AND NOT VOXELD_FUZZ)
   set(VOXELD_FUZZ_TESTS ON)
   target_compile_options(voxeld_options INTERFACE -fsanitize-coverage=inline-8bit-counters,pc-table)
 endif()
 if(VOXELD_COVERAGE)
-  # Atomic, since threads that count at once would otherwise lose counts.
+  # Atomic, because threads that count concurrently would otherwise lose counts.
   target_compile_options(voxeld_options INTERFACE -fprofile-instr-generate -fcoverage-mapping -fprofile-update=atomic)
   target_link_options(voxeld_options INTERFACE -fprofile-instr-generate)
 endif()
@@ -130,7 +131,7 @@ endfunction()
 # compile it with -O1, instrumented builds with -O0, since optimising instrumented code takes longest.
 macro(voxeld_reduce_optimisation)
   if(VOXELD_FUZZ)
-    # Fuzz targets run all of it as often as possible.
+    # Fuzz targets should run all of it as often as possible.
   elseif(VOXELD_INSTRUMENTED)
     add_compile_options($<$<COMPILE_LANGUAGE:CXX>:-O0>)
   elseif(VOXELD_QUICK)
@@ -264,7 +265,7 @@ function(voxeld_test name)
       list(JOIN ARG_LONG ":" long)
       voxeld_whole_test(${whole}.long ${name} "${ARG_LABELS}" "${long}" "${skipped}" ${ARG_TIMEOUT} ${ARG_COST} ${ARG_SHARDS} ON)
     endif()
-    # The default tier's build does without programs that only the deep tier runs.
+    # The default tier does not build programs that only the deep tier runs.
     if(ARG_DEEP AND VOXELD_QUICK)
       set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
       add_dependencies(deep_tests ${name})
@@ -312,9 +313,11 @@ function(voxeld_whole_test test program labels filter without timeout cost shard
   endforeach()
 endfunction()
 
-# voxeld_fuzz(FOLDER/NAME SOURCES … LINK …): a fuzz target `NAME_fuzz` in bin/fuzz, of FOLDER/NAME_fuzz.cc and SOURCES. With VOXELD_FUZZ libFuzzer
-# drives it (tools/fuzz runs it); elsewhere it is a test, fuzz.NAME, which replays its corpus as unpacked into fuzz/corpus/NAME of the build
-# (target fuzz_corpora), and where edges are counted (VOXELD_FUZZ_TESTS) has libFuzzer look for more for VOXELD_FUZZ_SECONDS.
+# voxeld_fuzz(FOLDER/NAME SOURCES … LINK …): a fuzz target `NAME_fuzz` in bin/fuzz, built from
+# FOLDER/NAME_fuzz.cc and SOURCES. With VOXELD_FUZZ it is driven by libFuzzer (tools/fuzz runs it).
+# Otherwise it is a test, fuzz.NAME, which replays its corpus as unpacked into fuzz/corpus/NAME of
+# the build (target fuzz_corpora). If edges are counted (VOXELD_FUZZ_TESTS), the test also lets
+# libFuzzer search for VOXELD_FUZZ_SECONDS.
 function(voxeld_fuzz path)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
   get_filename_component(name ${path} NAME)
