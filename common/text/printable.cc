@@ -124,7 +124,7 @@ std::string EscapeQuoted(absl::string_view text) {
 
 std::string EscapeJson(absl::string_view json) {
   return Escaped(json, [](std::string* out, std::optional<uint32_t> code, absl::string_view bytes) {
-    // No harmful character is beyond U+FFFF, so that none needs a pair of surrogates.
+    // No harmful character is above U+FFFF, so that none needs a surrogate pair.
     if (code && *code >= 0x7f && Harmful(*code)) {
       absl::StrAppendFormat(out, "\\u%04x", *code);
     } else {

@@ -30,7 +30,7 @@ size_t EditDistance(std::string_view a, std::string_view b) {
 
 std::string Nearest(std::string_view wrong, const std::vector<std::string>& known) {
   std::string nearest;
-  size_t least = 1 + wrong.size() / 6;  // with more edits in so few letters it would be a guess
+  size_t least = 1 + wrong.size() / 6;  // a suggestion that needs more edits would be a guess
   if (wrong.size() > 64) return nearest;
   for (const std::string& name : known) {
     const size_t distance = EditDistance(wrong, name);

@@ -1,4 +1,4 @@
-// "Did you mean …?"
+// Suggests known words for a misspelt one: "Did you mean …?"
 #pragma once
 
 #include <cstddef>
@@ -8,15 +8,15 @@
 
 namespace voxeld {
 
-// Single characters to add, drop, change, or swap with their neighbour, to make one of the other;
-// case counts not.
+// Returns: the number of single characters to insert, delete, replace, or swap with their
+// neighbour, to turn one text into the other. Ignores case.
 size_t EditDistance(std::string_view a, std::string_view b);
 
-// The one of `known` that `wrong` is nearest to or begins,
-// if it is near enough to be meant; else empty.
+// Returns: the word of `known` that is most similar to `wrong`, or of which `wrong` is the
+// beginning, if it is similar enough; else an empty string.
 std::string Nearest(std::string_view wrong, const std::vector<std::string>& known);
 
-// "; did you mean X?", or "; known are …" if nothing is near.
+// Returns: "; did you mean X?", or "; known are …" if nothing is similar.
 std::string Suggestion(std::string_view wrong, const std::vector<std::string>& known);
 
 }  // namespace voxeld

@@ -16,8 +16,9 @@ struct LimitViolation {
   std::string what;
 };
 
-// Walks over the text without recursion. It knows strings and comments, and otherwise only counts: dots between two delimiters
-// (of a number there is one at the most) and brackets that are open. Of text that is not TOML it may count too many, never too few.
+// Scans the text without recursion. Recognises strings and comments, and otherwise only counts dots
+// between two delimiters (a number has at most one) and open brackets. For text that is not TOML it
+// may count too many, but never too few.
 class LimitChecker {
  public:
   LimitChecker(std::string_view text, const TomlLimits& limits) : text_(text), limits_(limits) {}
