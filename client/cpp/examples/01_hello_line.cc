@@ -1,4 +1,4 @@
-// Puts up one line and waits until it is shown.
+// Draws one line and waits until it is shown.
 #include "example.h"
 
 using namespace voxeld::client;        // NOLINT

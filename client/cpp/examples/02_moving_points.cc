@@ -1,4 +1,4 @@
-// Immediate mode: each frame replaces all that its layer held.
+// Immediate mode: each frame replaces everything that its layer held.
 #include <cmath>
 
 #include "example.h"
@@ -13,7 +13,8 @@ absl::Status Run(const std::string& address) {
 
   constexpr int kFrames = 100, kPoints = 1000;
   for (int f = 0; f < kFrames; ++f) {
-    // Asked to: no more under way than the displays can show. Nothing else here blocks.
+    // Optional: keep no more commits in flight than the displays can show. Nothing else here
+    // blocks.
     if (absl::Status room = (*session)->WaitForRoom(10s); !room.ok()) return room;
     std::vector<float> xyz;
     std::vector<uint8_t> rgb;
@@ -23,7 +24,7 @@ absl::Status Run(const std::string& address) {
       rgb.insert(rgb.end(), {static_cast<uint8_t>(255 * along), 255, 128});
     }
     Frame frame = layer.BeginFrame();
-    // Moved in: the arrays go to the wire without a copy.
+    // Moved in, the arrays are sent without a copy.
     frame.Draw(Points{.vertices = {.positions = std::move(xyz), .colors = std::move(rgb)}});
     if (auto number = frame.Commit(); !number.ok()) return number.status();
   }

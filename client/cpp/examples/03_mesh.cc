@@ -1,4 +1,4 @@
-// A mesh from arrays that lie in the caller's memory, as an object that two instances draw.
+// A mesh from arrays in the caller's memory, defined as an object that two instances draw.
 #include "example.h"
 
 using namespace voxeld::client;        // NOLINT

@@ -1,10 +1,11 @@
-// Retained mode: entities stay, and a change of one sends what changed alone.
+// Retained mode: entities stay, and changing one sends only the change.
 #include "example.h"
 
 using namespace voxeld::client;        // NOLINT
 using namespace std::chrono_literals;  // NOLINT
 
-// Commits and waits; how many bytes the server was given for it: over the wire, and in sealed memory.
+// Commits and waits; returns how many bytes were handed to the server, over the wire and in sealed
+// memory.
 static absl::StatusOr<uint64_t> CommitAndCount(Session& session) {
   const auto given = [&session] {
     const Tally tally = session.GetTally();

@@ -30,7 +30,7 @@ absl::Status Run(const std::string& address) {
   if (!shown.ok()) return shown.status();
   std::printf("three layers: %s\n",
               shown->outcomes.empty() ? "no display" : Word(shown->outcomes[0].kind));
-  // A hidden layer keeps what it has; what is put into it is not shown.
+  // A hidden layer keeps its content; what is put into it is not shown.
   set(glow, {.visible = false});
   if (!status.ok()) return status;
   auto hidden = (*session)->Commit();

@@ -1,4 +1,4 @@
-// Receipts by callback, and where the time of a commit goes.
+// Receipts by callback, and the time that a commit spends in each stage.
 #include <atomic>
 
 #include "example.h"
@@ -9,7 +9,7 @@ using namespace std::chrono_literals;  // NOLINT
 absl::Status Run(const std::string& address) {
   std::atomic<int> settled = 0;
   Options options{.address = address, .client_name = "receipts"};
-  // On the session's own thread, after each change.
+  // Called on the session's own thread, after each change.
   options.on_receipt = [&settled](const Receipt& receipt) { settled += receipt.settled ? 1 : 0; };
   auto session = Session::Open(std::move(options));
   if (!session.ok()) return session.status();
@@ -39,7 +39,7 @@ absl::Status Run(const std::string& address) {
     bool ascending = true;
     std::printf("%s: %s\n", outcome.display.c_str(), Word(outcome.kind));
     for (const auto& [name, time] : stages) {
-      if (time == 0) continue;  // not known
+      if (time == 0) continue;  // unknown
       if (before != 0)
         std::printf("  %-12s +%.3f ms\n", name, static_cast<double>(time - before) / 1e6);
       ascending = ascending && time >= before;

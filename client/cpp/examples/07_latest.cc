@@ -1,5 +1,5 @@
-// More frames than anybody could show, under the policy LATEST: what is given up is counted, here and
-// in the server, and the newest is always shown.
+// More frames than any display could show, under the policy LATEST: dropped frames are counted,
+// here and in the server, and the newest is always shown.
 #include "example.h"
 
 using namespace voxeld::client;        // NOLINT
@@ -19,7 +19,7 @@ absl::Status Run(const std::string& address) {
     Frame frame = layer.BeginFrame();
     frame.Draw(Points{.vertices = {.positions = xyz}},
                {.transform = Affine::Rotate({0, 0, 1}, 0.01 * static_cast<double>(f))});
-    auto number = frame.Commit();  // never blocks, and never fails for want of room
+    auto number = frame.Commit();  // never blocks, and never fails for lack of room
     if (!number.ok()) return number.status();
     newest = *number;
   }

@@ -1,5 +1,5 @@
-// A session that outlives its server: what is up is put up again, and the loop goes on meanwhile. Ends
-// when the server was there, was gone, and is there again.
+// A session that outlives its server: its content is restored after a restart, and the loop
+// continues meanwhile. Ends after the server was reachable, was gone, and is back.
 #include <condition_variable>
 #include <mutex>
 #include <thread>
@@ -14,7 +14,8 @@ absl::Status Run(const std::string& address) {
   std::condition_variable changed;
   bool again = false;
   Options options{.address = address, .client_name = "reconnect"};
-  options.on_disconnect = OnDisconnect::kLinger;  // a server that stays keeps the session that long
+  // a server that keeps running keeps the session that long
+  options.on_disconnect = OnDisconnect::kLinger;
   options.linger = 10s;
   options.first_pause = 50ms;
   options.longest_pause = 500ms;
@@ -38,7 +39,7 @@ absl::Status Run(const std::string& address) {
   if (auto receipt = (*session)->WaitAccepted(*frame, 10s); !receipt.ok()) return receipt.status();
   std::printf("up\n");
 
-  // The caller's loop, which no lost connection holds up.
+  // The caller's loop, which a lost connection does not block.
   for (int i = 1;; ++i) {
     if (absl::Status moved = ball->SetTransform(Affine::Rotate({0, 0, 1}, 0.01 * i)); !moved.ok())
       return moved;
@@ -47,7 +48,7 @@ absl::Status Run(const std::string& address) {
     std::unique_lock lock(mutex);
     if (changed.wait_for(lock, 20ms, [&] { return again; })) break;
   }
-  // Moving what is not there would be refused: it is there.
+  // Moving a missing entity would be refused, so this shows that it was restored.
   if (absl::Status moved = ball->SetTransform(Affine()); !moved.ok()) return moved;
   frame = (*session)->Commit();
   if (!frame.ok()) return frame.status();

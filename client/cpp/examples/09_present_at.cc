@@ -1,4 +1,4 @@
-// Commits for times to come, by the server's clock, which pings estimate.
+// Commits for future times, by the server's clock, which pings estimate.
 #include <thread>
 
 #include "example.h"

@@ -1,4 +1,4 @@
-// Two sessions of one owner share layers and objects; and what strict means.
+// Two sessions of one owner share layers and objects; and the effect of `strict`.
 #include "example.h"
 
 using namespace voxeld::client;        // NOLINT
@@ -21,7 +21,7 @@ absl::Status Run(const std::string& address) {
   if (absl::Status opened = (*second)->WaitOpened(10s); !opened.ok()) return opened;
   std::printf("one owner: %s\n",
               (*first)->server()->owner == (*second)->server()->owner ? "yes" : "no");
-  // The second moves what the first put up.
+  // The second session moves what the first has drawn.
   const Layer shared = (*second)->GetLayer("shared");
   if (absl::Status moved = shared.SetTransform("ball", Affine::Translate({0.2, 0, 0})); !moved.ok())
     return moved;
@@ -37,7 +37,7 @@ absl::Status Run(const std::string& address) {
   if (!frame.ok()) return frame.status();
   auto refused = (*second)->WaitAccepted(*frame, 10s);
   std::printf("%s\n", refused.ok() ? "accepted?" : std::string(refused.status().message()).c_str());
-  // Not strict: the rest goes on.
+  // Not strict: the rest of the commit is applied.
   if (auto bad = (*first)->GetLayer("shared").Put("bad", Sphere{.radius = -1}); !bad.ok())
     return bad.status();
   if (auto good = (*first)->GetLayer("shared").Put("good", Box{}); !good.ok()) return good.status();

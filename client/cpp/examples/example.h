@@ -1,4 +1,5 @@
-// What all examples share: an address as their first argument, and a status as their end.
+// Shared by all examples: the first argument is an address, and the returned status ends the
+// program.
 #pragma once
 
 #include <cstdio>
@@ -7,7 +8,7 @@
 #include "absl/status/status.h"
 #include "voxeld/client.h"
 
-// The address is that of the server; empty: the default one.
+// `address` is the server's address; empty: the default.
 inline int RunExample(int argc, char** argv, absl::Status (*run)(const std::string& address)) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
   const absl::Status status = run(argc > 1 ? argv[1] : "");
@@ -16,7 +17,7 @@ inline int RunExample(int argc, char** argv, absl::Status (*run)(const std::stri
   return 1;
 }
 
-// One word for what became of a commit.
+// Returns one word for the outcome of a commit.
 inline const char* Word(voxeld::client::Outcome::Kind kind) {
   using Kind = voxeld::client::Outcome::Kind;
   switch (kind) {

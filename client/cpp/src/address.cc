@@ -13,8 +13,8 @@ namespace {
 
 constexpr char kServiceSocket[] = "/run/voxeld/voxeld.sock";
 
-// A socket that somebody else put into a shared directory is not to be trusted. The service's own
-// folder only root can make, for whatever user the service runs as.
+// A socket that another user put into a shared directory must not be trusted. Only root can create
+// the service's own directory, whichever user the service runs as.
 bool IsTrustedSocket(const std::string& path) {
   struct stat info {};
   return ::lstat(path.c_str(), &info) == 0 && S_ISSOCK(info.st_mode) &&

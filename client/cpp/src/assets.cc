@@ -17,15 +17,15 @@
 namespace voxeld::client {
 namespace {
 
-// Small enough for progress over slow links, large enough to cost nothing.
+// Small enough for progress over slow links, large enough for negligible overhead.
 constexpr size_t kPieceBytes = 256u << 10;
-constexpr int kKeepaliveMs = 20'000;  // a dead connection is noticed
+constexpr int kKeepaliveMs = 20'000;  // detects dead connections
 
 using Clock = std::chrono::steady_clock;
 
-// One question waits no longer, so that whoever wants to stop is heard.
+// Limits one query, so that a request to stop is noticed.
 constexpr std::chrono::milliseconds kAskTime(1000);
-// Between two attempts.
+// Pause between two attempts.
 constexpr std::chrono::milliseconds kPause(100);
 
 absl::Status FromGrpc(const grpc::Status& status) {
@@ -37,17 +37,17 @@ bool MayGoOn(const absl::Status& status) {
          absl::IsDeadlineExceeded(status);
 }
 
-// One asset on its way.
+// One upload in progress.
 class Upload {
  public:
   Upload(v1::SceneService::Stub& stub, std::string_view bytes, const Asset& asset,
          const UploadOptions& options)
       : stub_(stub), bytes_(bytes), asset_(asset), options_(options) {}
 
-  // Until it is there, or has not moved for the patience.
+  // Returns when the asset is stored, or when there was no progress for the patience.
   absl::Status Run() {
     uint64_t stored = 0;
-    bool anew = false;  // what was there is wrong
+    bool anew = false;  // the stored part is wrong: start again from 0
     absl::Status last = absl::UnavailableError("the server does not answer");
     Clock::time_point moved = Clock::now();
     for (;; std::this_thread::sleep_for(kPause)) {
@@ -60,7 +60,7 @@ class Upload {
         last = Send(
             from, std::max<uint64_t>(1, std::min<uint64_t>(kPieceBytes, there->max_piece_bytes())));
         if (last.ok()) return last;
-        // A part that somebody else began with other bytes: once more, all of it.
+        // Another client began this part with other bytes: send all of it once more.
         if (absl::IsDataLoss(last) && from > 0) {
           anew = true;
           continue;
@@ -79,7 +79,7 @@ class Upload {
     return !options_.progress || options_.progress(stored, bytes_.size());
   }
 
-  // How much is there.
+  // Asks how much is stored.
   absl::StatusOr<v1::ListAssetsResponse> Ask() {
     grpc::ClientContext context;
     context.set_wait_for_ready(true);
@@ -92,7 +92,7 @@ class Upload {
     return response;
   }
 
-  // From there to the end, in one call.
+  // Sends everything from `from` to the end, in one call.
   absl::Status Send(uint64_t from, uint64_t piece_bytes) {
     grpc::ClientContext context;
     v1::UploadAssetResponse response;

@@ -22,7 +22,7 @@ namespace {
 
 namespace experimental = grpc::experimental;
 
-// "authorization: Bearer TOKEN" on every call.
+// Adds "authorization: Bearer TOKEN" to every call.
 class TokenAdder final : public experimental::Interceptor {
  public:
   explicit TokenAdder(const std::string& value) : value_(value) {}

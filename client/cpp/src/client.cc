@@ -12,7 +12,7 @@
 
 namespace voxeld::client {
 
-// What the session's core needs around it: time, and a thread that steps it.
+// Provides what the session's core needs: a clock, and a thread that runs it.
 class RunningCore {
  public:
   RunningCore(Options options, std::unique_ptr<Transport> transport)

@@ -8,7 +8,7 @@ void ClockEstimator::Add(int64_t sent_ns, int64_t received_ns, int64_t answered_
                          int64_t heard_ns) {
   const int64_t round_trip = (heard_ns - sent_ns) - (answered_ns - received_ns);
   if (heard_ns < sent_ns || answered_ns < received_ns || round_trip < 0) return;
-  // Halved one by one: sums of two clocks could overflow.
+  // Halve each difference separately: sums of two clocks could overflow.
   samples_.push_back({(received_ns - sent_ns) / 2 + (answered_ns - heard_ns) / 2, round_trip});
   if (samples_.size() > kSamples) samples_.pop_front();
   ++count_;

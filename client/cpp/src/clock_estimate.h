@@ -1,4 +1,4 @@
-// The server's clock from round trips, as NTP does it: of the last ones the fastest counts.
+// Estimates the server's clock from round trips, as NTP does: the fastest of the last ones is used.
 #pragma once
 
 #include <cstdint>
@@ -13,11 +13,11 @@ class ClockEstimator {
  public:
   static constexpr size_t kSamples = 16;
 
-  // One round trip: sent and heard by the client's clock, received and answered by the server's.
-  // One that cannot be (heard before it was sent, …) is ignored.
+  // Adds one round trip: sent and heard by the client's clock, received and answered by the
+  // server's. Impossible ones (heard before sent, …) are ignored.
   void Add(int64_t sent_ns, int64_t received_ns, int64_t answered_ns, int64_t heard_ns);
   std::optional<ClockEstimate> Get() const;
-  // Another server, another clock.
+  // Call when connected to another server, which has another clock.
   void Reset() { *this = ClockEstimator(); }
 
  private:

@@ -14,7 +14,7 @@
 namespace voxeld::client {
 namespace {
 
-// Numbers of fields are those of the generated code, so that there is one place for each.
+// Field numbers come from the generated code, so that each is defined in one place.
 using v1::Batch;
 using v1::StreamRequest;
 
@@ -75,14 +75,14 @@ void AppendThickness(int field, const Thickness& thickness, std::string* out) {
   AppendPresentBytes(field, inner, out);
 }
 
-// The wire's enumerations begin with UNSPECIFIED and go on as ours.
+// The wire's enumerations begin with UNSPECIFIED and then match ours.
 template <typename Enum>
 uint64_t AfterUnspecified(Enum value) {
   return static_cast<uint64_t>(value) + 1;
 }
 
 struct ShapeEncoder {
-  std::string before;  // what precedes the shape within the primitive: its colour
+  std::string before;  // precedes the shape within the primitive: its colour
 
   absl::StatusOr<Rope> operator()(const Points& points) const {
     if (!points.vertices.indices.empty() || !points.vertices.short_indices.empty()) {
@@ -234,7 +234,7 @@ struct ShapeEncoder {
     return Wrap(before, v1::Primitive::kIsosurfaceFieldNumber,
                 Wrap(fields, v1::Isosurface::kGridFieldNumber, *std::move(grid)));
   }
-  // The others' bytes are a primitive's: they follow what precedes.
+  // The other shapes are encoded as a complete primitive, which is appended to `before`.
   template <typename Measured>
   absl::StatusOr<Rope> operator()(const Measured& shape) const {
     absl::StatusOr<std::string> encoded = EncodeShape(shape);
@@ -377,7 +377,7 @@ struct OperationEncoder {
     AppendUnsigned(v1::DeleteObject::kCascadeFieldNumber, remove.cascade ? 1 : 0, &fields);
     return Request(StreamRequest::kDeleteObjectFieldNumber, std::move(fields));
   }
-  // Frames are several messages.
+  // Frames are encoded as several messages elsewhere.
   Rope operator()(const FrameOperation&) const { return Rope(); }
 };
 
@@ -386,7 +386,8 @@ struct OperationEncoder {
 absl::StatusOr<Rope> EncodePrimitive(const Shape& shape, Color color,
                                      const std::optional<ColorScale>& scale) {
   std::string before;
-  // An instance has the colours of its object. Black is present and empty, unlike the default, white.
+  // An instance has the colours of its object. Black is present and empty, unlike the default,
+  // white.
   if (!std::holds_alternative<Instance>(shape)) {
     std::string rgb;
     AppendFixed32(v1::Color::kRgbFieldNumber, RgbOf(color), &rgb);
@@ -443,7 +444,7 @@ Rope EncodeFrameEnd(std::string_view layer) {
 
 void Batcher::Add(const UpsertOperation& upsert) {
   const Rope encoded = Wrap("", Batch::kUpsertsFieldNumber, EncodeUpsert(upsert));
-  // Equal hashes of two entities cost a message, and nothing else.
+  // Equal hashes of two entities only cost an extra message.
   const std::hash<std::string_view> hash;
   const size_t entity = hash(upsert.layer) * 31 + hash(upsert.id);
   const bool fits = open_.size() + encoded.size() <= most_bytes_ && !entities_.contains(entity);

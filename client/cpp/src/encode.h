@@ -1,5 +1,5 @@
-// Operations as bytes of v1.StreamRequest. Payloads come last in whatever holds them, so that large
-// ones are never moved about.
+// Encodes operations as bytes of v1.StreamRequest. Payloads are the last field of each message that
+// has them, so that large ones are never moved.
 #pragma once
 
 #include <cstdint>
@@ -17,23 +17,24 @@
 
 namespace voxeld::client {
 
-// Entities are gathered into one message until it has this many bytes; one that is larger goes alone.
+// Entities are combined into one message until it has this many bytes; a larger entity is sent
+// alone.
 inline constexpr size_t kBatchBytes = 192 << 10;
 
-// InvalidArgument if an array's size does not fit: says which, its size, and what would be right.
-// Views are copied; what the arrays own is shared.
+// Encodes a shape as a v1.Primitive. Views are copied; what the arrays own is shared. Errors:
+// InvalidArgument if an array's size does not fit, with its name, its size, and what is expected.
 absl::StatusOr<Rope> EncodePrimitive(const Shape& shape, Color color,
                                      const std::optional<ColorScale>& scale = std::nullopt);
 absl::StatusOr<DefineOperation> EncodeDefinition(std::string object,
                                                  const std::vector<Part>& parts);
 
-// A request without its sequence, which AddSequence puts in front.
+// Encodes a request without its sequence, which AddSequence prepends.
 Rope EncodeOperation(const Operation& operation);
 Rope EncodeFrameBegin(std::string_view layer);
 Rope EncodeFrameEnd(std::string_view layer);
 
-// Upserts in their order, as batches. Of one entity there is one in each, so that (sequence, layer, id)
-// names it.
+// Combines upserts, in their order, into batches. A batch holds at most one upsert per entity, so
+// that (sequence, layer, id) identifies it.
 class Batcher {
  public:
   struct Message {
@@ -42,15 +43,15 @@ class Batcher {
   };
   explicit Batcher(size_t most_bytes = kBatchBytes) : most_bytes_(most_bytes) {}
   void Add(const UpsertOperation& upsert);
-  // All messages; it is empty again.
+  // Returns all messages and empties the batcher.
   std::vector<Message> Take();
 
  private:
   void Flush();
   const size_t most_bytes_;
   Rope open_;
-  std::unordered_set<size_t> entities_;  // in `open_`, by their hashes
-  size_t upserts_ = 0;                   // in `open_`
+  std::unordered_set<size_t> entities_;  // entities in `open_`, by their hashes
+  size_t upserts_ = 0;                   // upserts in `open_`
   std::vector<Message> messages_;
 };
 

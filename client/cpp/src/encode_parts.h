@@ -1,4 +1,4 @@
-// Messages that stand in others, as fields of these.
+// Messages that are fields of other messages.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// Arrays as fields of bytes, or as ranges of assets in their place.
+// Encodes arrays as bytes fields, or as ranges of assets in their place.
 #pragma once
 
 #include <cstddef>
@@ -13,10 +13,11 @@
 
 namespace voxeld::client {
 
-// Smaller payloads are not worth a piece of their own.
+// Payloads smaller than this are copied into the message instead of being shared.
 inline constexpr size_t kSharedBytes = 4096;
 
-// `in_field` is the MemoryRange that stands in place of `field`. Nothing of an empty one.
+// Appends `values` as `field`, or as the MemoryRange `in_field` if they are an asset. Appends
+// nothing for an empty array.
 template <typename T>
 void AppendPayload(int field, int in_field, const Array<T>& values, Rope* out) {
   if (values.empty()) return;

@@ -19,7 +19,7 @@ void Set(const Vec3& from, v1::Vec3* to) {
   to->set_z(from.z);
 }
 
-// The wire's enumerations begin with UNSPECIFIED and go on as ours.
+// The wire's enumerations begin with UNSPECIFIED and then match ours.
 template <typename Wire, typename Ours>
 Wire Word(Ours value) {
   return static_cast<Wire>(static_cast<int>(value) + 1);
@@ -32,14 +32,14 @@ void Set(const Thickness& from, v1::Thickness* to) {
   to->set_unit(Word<v1::Thickness::Unit>(from.unit));
 }
 
-// Sampling and thickness of a line.
+// Sets a line's sampling and thickness.
 template <typename Line, typename Message>
 void SetLine(const Line& from, Message* to) {
   to->set_sampling(Word<v1::LineSampling>(from.sampling));
   if (from.thickness.value != 0) Set(from.thickness, to->mutable_thickness());
 }
 
-// Rule and shell, and the fill of what has an inside.
+// Sets rule and shell, and the fill of shapes that have an inside.
 template <typename Shape, typename Message>
 void SetLook(const Shape& from, Message* to) {
   if constexpr (requires { to->set_fill(WireFill(from.fill)); }) to->set_fill(WireFill(from.fill));

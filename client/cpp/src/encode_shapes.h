@@ -1,4 +1,4 @@
-// Shapes by their measures as bytes of v1.Primitive.
+// Encodes shapes that are defined by measures as bytes of v1.Primitive.
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@
 
 namespace voxeld::client {
 
-// Each is a v1.Primitive with that shape alone. InvalidArgument for what cannot be said on the wire; what
-// is wrong with measures the server says.
+// Each returns a v1.Primitive with that shape alone. Errors: InvalidArgument for what the wire
+// cannot express; the server reports invalid measures.
 absl::StatusOr<std::string> EncodeShape(const Implicit& shape);
 absl::StatusOr<std::string> EncodeShape(const Ellipsoid& shape);
 absl::StatusOr<std::string> EncodeShape(const Torus& shape);
@@ -23,11 +23,11 @@ absl::StatusOr<std::string> EncodeShape(const Arc& shape);
 absl::StatusOr<std::string> EncodeShape(const Ellipse& shape);
 absl::StatusOr<std::string> EncodeShape(const Helix& shape);
 absl::StatusOr<std::string> EncodeShape(const Text& shape);
-// 0xRRGGBB.
+// Returns 0xRRGGBB.
 uint32_t RgbOf(const Color& color);
-// A v1.Transfer.
+// Returns a v1.Transfer.
 std::string EncodeTransfer(const Transfer& transfer);
-// A v1.ColorScale.
+// Returns a v1.ColorScale.
 std::string EncodeColorScale(const ColorScale& scale);
 
 }  // namespace voxeld::client

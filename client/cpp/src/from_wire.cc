@@ -35,7 +35,7 @@ Stages FromWire(const v1::Stages& s) {
 }
 
 Issue FromWire(const v1::Issue& issue) {
-  // The numbers are the same; those of a newer server are not known here.
+  // The numbers are the same; those of a newer server are unknown here.
   const int reason = issue.reason();
   return {.frame = 0,
           .sequence = issue.sequence(),

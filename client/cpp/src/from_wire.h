@@ -1,4 +1,4 @@
-// The server's messages in the client's words.
+// Converts the server's messages to the client's types.
 #pragma once
 
 #include "voxeld/client.h"

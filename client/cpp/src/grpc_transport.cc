@@ -15,7 +15,7 @@
 #include "client/cpp/src/local_socket.h"
 #include "display/sync/mutex.h"
 #include "voxeld/channel.h"
-#include "voxeld/v1/scene.grpc.pb.h"  // how gRPC reads answers
+#include "voxeld/v1/scene.grpc.pb.h"  // for gRPC's deserialisation of answers
 
 namespace voxeld::client {
 namespace {
@@ -23,7 +23,7 @@ namespace {
 constexpr char kMethod[] = "/voxeld.v1.SceneService/Stream";
 constexpr int kMostAnswerBytes = 64 << 20;
 
-// Payloads are referenced, and let go when gRPC has sent them.
+// References the payloads, and releases them when gRPC has sent them.
 grpc::ByteBuffer ToByteBuffer(const Rope& message) {
   std::vector<grpc::Slice> slices;
   slices.emplace_back(message.head());
@@ -46,7 +46,7 @@ class GrpcStream final : public Stream,
   GrpcStream(const std::shared_ptr<grpc::Channel>& channel, Events* events)
       : events_(events), stub_(channel) {
     stub_.PrepareBidiStreamingCall(&context_, kMethod, {}, this);
-    // Writes come from outside of reactions.
+    // Writes start outside of reactions.
     AddHold();
     StartRead(&response_);
     StartCall();
@@ -110,7 +110,7 @@ class GrpcTransport final : public Transport {
   }
 
   std::unique_ptr<Stream> Start(Stream::Events* events) override {
-    // The first is the one that was made to see whether it can be.
+    // The first stream uses the channel that was made to validate the arguments.
     if (std::exchange(started_, true)) {
       if (auto made = Make(); made.ok()) last_ = *std::move(made);
     }
@@ -127,13 +127,13 @@ class GrpcTransport final : public Transport {
   absl::StatusOr<std::shared_ptr<grpc::Channel>> Make() const {
     grpc::ChannelArguments arguments;
     arguments.SetMaxReceiveMessageSize(kMostAnswerBytes);
-    // The server is near; what a web proxy is set for is not meant for it.
+    // The server is nearby; a configured web proxy is not meant for it.
     arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-    // Pauses between attempts are the session's, not those that gRPC's pool remembers.
+    // The session decides the pauses between attempts, not gRPC's shared subchannel pool.
     arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
     arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, static_cast<int>(keepalive_.interval.count()));
     arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, static_cast<int>(keepalive_.timeout.count()));
-    // Else it asks twice, and then no more until data goes out.
+    // By default gRPC pings only twice without data, and then stops until data goes out.
     arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
     return MakeChannel(address_, credentials_, arguments);
   }
@@ -150,8 +150,8 @@ class GrpcTransport final : public Transport {
 absl::StatusOr<std::unique_ptr<Transport>> MakeGrpcTransport(std::string address,
                                                              Credentials credentials,
                                                              Keepalive keepalive) {
-  // gRPC stays up from now on: shutting it down waits, up to 10 s, for sockets that it is still taking
-  // down, and it would be at the end of whichever session happened to be the last.
+  // Keep gRPC initialised from now on: shutting it down waits, up to 10 s, for sockets that it is
+  // still closing, and that would happen at the end of the last session.
   static const bool up = (grpc_init(), true);
   static_cast<void>(up);
   auto transport =

@@ -11,16 +11,17 @@
 
 namespace voxeld::client {
 
-// How gRPC notices that nobody is at the other end any more: after `interval` without anything from there it asks,
-// and when there is no answer within `timeout` the stream ends (Unavailable). The session's own pings cannot do
-// that while a message is being written or no credit is left.
+// How gRPC detects a dead connection: after `interval` without incoming data it sends a ping, and
+// if no answer comes within `timeout` the stream ends (Unavailable). The session's own pings
+// cannot do that while a message is being written or no credit is left.
 struct Keepalive {
-  std::chrono::milliseconds interval{20'000};  // not less than the server allows: 5 s by default
+  std::chrono::milliseconds interval{20'000};  // not less than the server allows, 5 s by default
   std::chrono::milliseconds timeout{10'000};
 };
 
-// `address` as users write it (voxeld/address.h). Fails as MakeChannel does. Each stream has a channel of
-// its own, for which files are read anew; where that fails it is the last one's.
+// `address` as users write it (voxeld/address.h). Errors are those of MakeChannel. Each stream has
+// a channel of its own, for which the credential files are read again; if that fails, the stream
+// uses the previous channel.
 absl::StatusOr<std::unique_ptr<Transport>> MakeGrpcTransport(std::string address,
                                                              Credentials credentials = {},
                                                              Keepalive keepalive = {});

@@ -15,7 +15,7 @@ namespace {
 
 constexpr size_t kRangeAlignment = 4;
 
-// The messages in which vertices lie.
+// The messages that can contain vertices.
 enum class Level : uint8_t {
   kRequest,
   kBatch,
@@ -48,11 +48,12 @@ constexpr Step kSteps[] = {
     {Level::kPrimitive, v1::Primitive::kMeshFieldNumber, Level::kShape},
     {Level::kShape, v1::Points::kVerticesFieldNumber, Level::kVertices},
 };
-// Of every shape that has them.
+// All shapes with vertices use the same field number for them.
 static_assert(int{v1::Points::kVerticesFieldNumber} == int{v1::Segments::kVerticesFieldNumber});
 static_assert(int{v1::Points::kVerticesFieldNumber} == int{v1::Mesh::kVerticesFieldNumber});
 
-// The field that names a range in place of this payload of Vertices; 0: it is none.
+// Returns the field that names a range in place of this payload of Vertices; 0: it is not a
+// payload.
 int RangeField(int field) {
   switch (field) {
     case v1::Vertices::kPositionsFieldNumber:
@@ -66,7 +67,7 @@ int RangeField(int field) {
   }
 }
 
-// Reads a rope from its beginning; what is taken of it shares its payloads.
+// Reads a rope from its beginning; the parts taken share its payloads.
 class Reader {
  public:
   explicit Reader(const Rope& rope) : left_(rope.size()) {
@@ -79,7 +80,7 @@ class Reader {
 
   size_t left() const { return left_; }
 
-  // Not called when nothing is left.
+  // Requires: bytes are left.
   uint8_t Byte() {
     const auto byte = static_cast<uint8_t>(chunks_[at_].bytes.front());
     Skip(1);
@@ -118,7 +119,7 @@ class Reader {
     std::string_view bytes;
   };
 
-  // Within the first chunk.
+  // Skips bytes within the first chunk.
   void Skip(size_t size) {
     chunks_[at_].bytes.remove_prefix(size);
     left_ -= size;
@@ -134,7 +135,7 @@ class Mover {
  public:
   Mover(uint64_t memory_id, Rope* memory) : id_(memory_id), memory_(*memory) {}
 
-  // Nothing if it is no message of ours.
+  // Returns nothing if the message is not one that this client encodes.
   std::optional<Rope> Move(const Rope& message, Level level) {
     if (message.size() < kMemoryBytes) return message;
     Reader reader(message);
@@ -210,7 +211,7 @@ class Mover {
 }  // namespace
 
 std::optional<InMemory> MoveToMemory(const Rope& request, uint64_t memory_id) {
-  // At most three payloads together make so much. Most messages have none, and are left alone.
+  // A message has at most three such payloads. Most have none, and are left unchanged.
   const bool has_any =
       std::any_of(request.tail().begin(), request.tail().end(), [](const Rope::Chunk& chunk) {
         return chunk.owner != nullptr && chunk.shared.size() >= kMemoryBytes / 4;

@@ -39,7 +39,7 @@ class Descriptor {
   const int fd_;
 };
 
-// Not by a mapping: where there is no memory left that would be a signal, and this is an error.
+// Writes instead of mapping: out of memory would raise a signal there, and is an error here.
 bool WriteWhole(int fd, std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t written = write(fd, bytes.data(), bytes.size());
@@ -73,7 +73,7 @@ class LocalSocket final : public MemoryChannel {
       stop_ = true;
       changed_.NotifyAll();
     }
-    shutdown(socket_.get(), SHUT_RDWR);  // nobody waits for an answer any more
+    shutdown(socket_.get(), SHUT_RDWR);  // nobody waits for an answer now
     thread_.join();
   }
 
@@ -83,7 +83,7 @@ class LocalSocket final : public MemoryChannel {
  private:
   struct Job {
     uint64_t id = 0;
-    std::optional<Rope> content;  // none: release it
+    std::optional<Rope> content;  // empty: release it
   };
 
   void Add(Job job) {
@@ -157,8 +157,8 @@ class LocalSocket final : public MemoryChannel {
     held_.erase(it);
   }
 
-  // Sends it, with a descriptor unless that is below 0, and waits for the answer. None: the connection is of no
-  // use any more.
+  // Sends the message, with a descriptor if that is not negative, and waits for the answer. Returns
+  // nothing if the connection has become unusable.
   std::optional<v1::LocalAnswer> Ask(const v1::LocalMessage& asked, int descriptor) {
     std::optional<v1::LocalAnswer> answer = Exchange(asked.SerializeAsString(), descriptor);
     gone_ = gone_ || !answer;
@@ -202,11 +202,11 @@ class LocalSocket final : public MemoryChannel {
   sync::CondVar changed_;
   bool stop_ VOXELD_GUARDED_BY(mutex_) = false;
   std::deque<Job> jobs_ VOXELD_GUARDED_BY(mutex_);
-  // The thread's own.
+  // The following members are used by the thread only.
   bool gone_ = false;
   uint64_t max_memories_ = 0, max_bytes_ = 0, held_bytes_ = 0;
   std::map<uint64_t, uint64_t> held_;  // id → bytes
-  std::thread thread_;                 // the last: it uses the others
+  std::thread thread_;                 // last: it uses the others
 };
 
 }  // namespace

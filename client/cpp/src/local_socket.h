@@ -1,4 +1,4 @@
-// The memory channel over a daemon's local socket (voxeld/v1/local.proto).
+// The memory channel over the daemon's local socket (voxeld/v1/local.proto).
 #pragma once
 
 #include <memory>
@@ -8,8 +8,8 @@
 
 namespace voxeld::client {
 
-// With Opened.local_socket and local_token. Connects on its own thread; whatever fails there, and an
-// answer that does not come within 2 s, is Answer::kGone. `events` must outlive it.
+// Takes Opened.local_socket and local_token. Connects on its own thread; any failure there, and an
+// answer that does not come within 2 s, is reported as Answer::kGone. `events` must outlive it.
 std::unique_ptr<MemoryChannel> ConnectLocalSocket(std::string path, std::string token,
                                                   MemoryChannel::Events* events);
 

@@ -1,4 +1,4 @@
-// Memory that a server on this machine reads instead of payloads on a stream.
+// Memory that a server on this machine reads in place of payloads on a stream.
 #pragma once
 
 #include <cstdint>
@@ -8,27 +8,28 @@
 
 namespace voxeld::client {
 
-// Of one stream. Thread-safe; nothing blocks but its destruction, which ends what is under way, and
-// nothing calls back from within a call. Whatever is held goes with it.
+// Belongs to one stream. Thread-safe; only its destruction blocks, which ends what is in progress.
+// No callback runs from within a call. Destruction releases everything that is held.
 class MemoryChannel {
  public:
   enum class Answer : uint8_t {
     kHeld,     // requests may name it now
-    kNoRoom,   // as long as others are held
-    kRefused,  // the server would not have it
-    kGone,     // nor will anything else be held
+    kNoRoom,   // no room as long as others are held
+    kRefused,  // the server refused it
+    kGone,     // the channel failed: nothing else will be held either
   };
   class Events {
    public:
     virtual ~Events() = default;
-    // On a thread of the channel's own: exactly one answer to each Hold, in their order.
+    // Called on a thread of the channel: exactly one answer to each Hold, in their order.
     virtual void OnHold(uint64_t id, Answer answer) = 0;
   };
   virtual ~MemoryChannel() = default;
 
-  // Puts a copy of `content` into new memory and hands it over as `id`, which was not used before.
+  // Copies `content` into new memory and hands it over as `id`, which must not have been used
+  // before.
   virtual void Hold(uint64_t id, Rope content) = 0;
-  // It is not needed any more. Of one that is held.
+  // Releases the held memory `id`.
   virtual void Release(uint64_t id) = 0;
 };
 

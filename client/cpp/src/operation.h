@@ -1,4 +1,4 @@
-// What is staged: operations with their payloads encoded already.
+// Staged operations, whose payloads are already encoded.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace voxeld::client {
 
 struct UpsertOperation {
   std::string layer, id;
-  Rope primitive;  // a v1.Primitive
+  Rope primitive;  // encoded v1.Primitive
   Affine transform;
   uint32_t priority = 0;
   bool erase = false;
@@ -42,7 +42,7 @@ struct LayerOperation {
 
 struct DefineOperation {
   std::string object;
-  Rope definition;                // a v1.Object
+  Rope definition;                // encoded v1.Object
   std::vector<std::string> uses;  // objects that its parts draw
 };
 
@@ -51,7 +51,7 @@ struct RemoveObjectOperation {
   bool cascade = false;
 };
 
-// An immediate frame, whole.
+// A complete immediate frame.
 struct FrameOperation {
   std::string layer;
   std::vector<UpsertOperation> upserts;
@@ -60,14 +60,14 @@ struct FrameOperation {
 using Operation = std::variant<UpsertOperation, DeleteOperation, TransformOperation, LayerOperation,
                                DefineOperation, RemoveObjectOperation, FrameOperation>;
 
-// What the server refused of one commit. Operations are counted one by one, those of a frame too: its
-// begin, each upsert, its end; none for a frame that was given up.
+// The operations of one commit that the server refused. Operations are counted one by one,
+// including a frame's: FrameBegin, each upsert and FrameEnd; a dropped frame counts none.
 struct Refusals {
   struct Request {
     uint64_t sequence = 0;
     size_t operations = 0;
   };
-  std::vector<Request> requests;  // in their order, Commit left out
+  std::vector<Request> requests;  // in their order, without the Commit
   std::set<std::tuple<uint64_t, std::string, std::string>> refused;  // sequence, layer, id
 };
 

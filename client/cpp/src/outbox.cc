@@ -9,11 +9,11 @@
 namespace voxeld::client {
 namespace {
 
-// About what a Commit has on the wire.
+// Approximate wire size of a Commit.
 constexpr size_t kCommitBytes = 48;
-// At most, of AddSequence.
+// Maximum size added by AddSequence.
 constexpr size_t kSequenceBytes = 11;
-// Issues that are kept of one commit; the server's default is a thousand.
+// Limit of the issues kept per commit; the server's default is a thousand.
 constexpr size_t kMostRefused = 65536;
 
 size_t BytesOf(const Transaction& transaction) {
@@ -24,7 +24,7 @@ size_t BytesOf(const Transaction& transaction) {
   return bytes;
 }
 
-// The operation that the frame piece stands for is as if it had not been asked for.
+// Clears the operation of a dropped frame piece, as if it had not been requested.
 void ForgetFrame(size_t piece, Transaction* transaction) {
   const auto nth = std::count_if(
       transaction->pieces.begin(), transaction->pieces.begin() + static_cast<ptrdiff_t>(piece),
@@ -39,7 +39,7 @@ void ForgetFrame(size_t piece, Transaction* transaction) {
   }
 }
 
-// Of the upserts in one batch, for its message to have `most_bytes`.
+// Returns the bytes of upserts that fit into one batch whose message may have `most_bytes`.
 size_t BatchBytes(size_t most_bytes) {
   constexpr size_t kWrapping = kSequenceBytes + 6;
   return most_bytes > kWrapping ? most_bytes - kWrapping : 1;
@@ -58,7 +58,7 @@ struct NameParts {
   }
 };
 
-// Never less than the message that it takes alone; SIZE_MAX: encode it.
+// Upper bound of the message that an operation needs alone; SIZE_MAX: encode it to find out.
 struct AtMostBytes {
   static constexpr size_t kFields = 512;
   size_t operator()(const UpsertOperation& upsert) const {
@@ -109,7 +109,7 @@ std::shared_ptr<Transaction> MakeTransaction(std::vector<Operation> operations,
       add(EncodeOperation(operation), 1, &plain);
       continue;
     }
-    if (frame->layer.empty()) continue;  // given up
+    if (frame->layer.empty()) continue;  // dropped
     if (!plain.messages.empty()) transaction->pieces.push_back(std::exchange(plain, {}));
     Transaction::Piece piece;
     piece.frame = true;
@@ -129,7 +129,7 @@ std::shared_ptr<Transaction> MakeTransaction(std::vector<Operation> operations,
 std::vector<Oversized> TakeOversized(size_t most_bytes, std::vector<Operation>* operations) {
   std::vector<Oversized> oversized;
   std::erase_if(*operations, [&](Operation& operation) {
-    // A frame's upserts one by one, and its begin.
+    // Check a frame's upserts one by one, and its begin.
     const auto* frame = std::get_if<FrameOperation>(&operation);
     const auto too_large = [&](const Operation& one) {
       if (std::visit(AtMostBytes(), one) <= most_bytes) return false;
@@ -275,7 +275,7 @@ void Outbox::StreamOpened(uint64_t open_bytes, uint64_t credit_bytes) {
   open_ = true;
   sent_ = open_bytes;
   credit_ = credit_bytes;
-  // What was sent before and was not applied is like all the rest from now on.
+  // Commits that were sent before but not applied are treated like all others from now on.
   frames_.clear();
   for (const auto& [order, transaction] : queue_) {
     transaction->first_sequence = transaction->commit_sequence = 0;
@@ -315,7 +315,7 @@ std::vector<uint64_t> Outbox::StreamLost(std::optional<int64_t> server_now) {
     transaction->scheduled = false;
     queue_.emplace(order, transaction);
     waiting_bytes_ += BytesOf(*transaction);
-    // What was sent whole may have been applied: nothing of it is given up before that is known.
+    // A completely sent commit may have been applied: keep its frames until that is known.
     if (transaction->commit_sequence != 0) continue;
     NoteFrames(order, *transaction);
   }
@@ -372,7 +372,7 @@ void Outbox::DropFrame(const WaitingFrame& frame) {
 bool Outbox::DropOldestOfAny() {
   auto oldest = frames_.end();
   for (auto it = frames_.begin(); it != frames_.end(); ++it) {
-    if (it->second.size() < 2) continue;  // the newest of a layer stays
+    if (it->second.size() < 2) continue;  // the newest frame of a layer stays
     if (oldest == frames_.end() || it->second.front().order < oldest->second.front().order)
       oldest = it;
   }

@@ -36,7 +36,7 @@ void ReceiptBook::Sent(uint64_t frame, uint64_t first_sequence, uint64_t commit_
   entry->commit_sequence = commit_sequence;
   entry->sent_ns = now_ns;
   entry->receipt.state = Receipt::State::kSent;
-  // What was told of an earlier sending goes for nothing.
+  // Discard what was reported about an earlier sending.
   entry->receipt.outcomes.clear();
   std::erase_if(entry->receipt.issues,
                 [&](const Issue& issue) { return issue.sequence < first_sequence; });
@@ -76,7 +76,7 @@ void ReceiptBook::Settle(Entry* entry) {
   unsettled_.erase(frame);
   by_commit_sequence_.erase(entry->commit_sequence);
   settled_.insert(frame);
-  // A change that nobody has seen yet keeps its receipt.
+  // A change that has not been delivered yet keeps its receipt.
   while (settled_.size() > kMostSettled && !changed_.contains(*settled_.begin())) {
     entries_.erase(*settled_.begin());
     settled_.erase(settled_.begin());
@@ -128,13 +128,14 @@ void ReceiptBook::TellOutcome(const v1::Outcome& wire, int64_t now_ns, Entry* en
 void ReceiptBook::Told(const v1::Receipt& wire, int64_t now_ns) {
   Entry* entry = Open(wire.frame_id());
   if (entry == nullptr) {
-    // Of a commit that the book has closed, as after a resume: the sums alone.
+    // The commit is already settled, as can happen after a resume: count its outcome in the totals
+    // only.
     if (wire.has_outcome() && entries_.contains(wire.frame_id()))
       TellOutcome(wire.outcome(), now_ns, nullptr);
     return;
   }
   Receipt& receipt = entry->receipt;
-  // It was sent again since: what became of the earlier sending is not its outcome.
+  // The commit was sent again since: the outcome of the earlier sending does not count.
   const bool of_another_sending =
       receipt.state == Receipt::State::kQueued ||
       (wire.sequence() != 0 && wire.sequence() != entry->commit_sequence);
@@ -208,7 +209,7 @@ const Issue& ReceiptBook::Told(const v1::Issue& wire, uint64_t frame) {
 void ReceiptBook::TakeAsAccepted(Entry* entry) {
   entry->receipt.state = Receipt::State::kAccepted;
   entry->receipt.message = "applied; the answer that said so was lost with its connection";
-  entry->accepted_ns = INT64_MIN;  // on an earlier stream, whenever it was
+  entry->accepted_ns = INT64_MIN;  // on an earlier stream, at an unknown time
   ++tally_.accepted;
   changed_.insert(entry->receipt.frame);
 }

@@ -1,4 +1,4 @@
-// The book of all commits: what was asked for, what was answered, what is owed. Knows no gRPC.
+// Records all commits: what was requested, answered, and is still pending. Does not depend on gRPC.
 #pragma once
 
 #include <cstdint>
@@ -15,45 +15,46 @@ namespace voxeld::client {
 
 class ReceiptBook {
  public:
-  static constexpr size_t kMostSettled = 1024;  // whose receipts are kept: the newest
+  // the newest settled commits, whose receipts are kept
+  static constexpr size_t kMostSettled = 1024;
   static constexpr size_t kMostLatencies = 65536;
-  static constexpr size_t kMostIssues = 20;           // of the tally
-  static constexpr size_t kMostIssuesOfCommit = 100;  // of one receipt
+  static constexpr size_t kMostIssues = 20;           // in the tally
+  static constexpr size_t kMostIssuesOfCommit = 100;  // in one receipt
 
   explicit ReceiptBook(bool outcomes) : outcomes_(outcomes) {}
 
   void Queued(uint64_t frame);
-  // Its requests had these sequences, the Commit's last.
+  // The commit's requests had the sequences from `first_sequence` on; its Commit had the last.
   void Sent(uint64_t frame, uint64_t first_sequence, uint64_t commit_sequence, int64_t now_ns);
-  // Frames of it were given up here; `whole`: and with them the commit.
+  // Frames of the commit were dropped by the client; `whole`: and with them the entire commit.
   void Dropped(uint64_t frame, uint64_t frames, bool whole);
-  // All that was sent and not answered waits again.
+  // All sent but unanswered commits wait again.
   void StreamLost();
 
-  // Of what it does not know, only the sums are kept.
+  // Records a receipt. For unknown commits only the totals are updated.
   void Told(const v1::Receipt& receipt, int64_t now_ns);
-  // `frame`: the commit that it is of, if that is being sent; 0: not known.
+  // `frame`: the commit that the issue belongs to, if that is still being sent; 0: unknown.
   const Issue& Told(const v1::Issue& issue, uint64_t frame = 0);
 
-  // It was applied, and the answer that said so is lost; the outcomes of `displays` are still owed.
+  // The commit was applied, and its answer is lost; the outcomes of `displays` are still pending.
   void Applied(uint64_t frame, const std::vector<std::string>& displays);
-  // It was applied or refused, and the answer that said which is lost. An outcome will tell that it was
-  // applied; OutcomesLost ends the waiting.
+  // The commit was applied or refused, and the answer that said which is lost. An outcome will show
+  // that it was applied; OutcomesLost ends the waiting.
   void Unheard(uint64_t frame, const std::vector<std::string>& displays);
-  // It was not sent, because the server would not take it.
+  // The commit was not sent, because the server would reject it.
   void RefusedHere(uint64_t frame, const std::string& why);
-  // No answer will come.
+  // No answer to the commit will come.
   void Lost(uint64_t frame, const std::string& why);
-  // Outcomes of what had been accepted before `accepted_before_ns`, or was not heard of, will not come. How many
-  // commits.
+  // No outcomes will come for commits accepted before `accepted_before_ns`, or whose answer was
+  // lost. Returns the number of those commits.
   uint64_t OutcomesLost(int64_t accepted_before_ns, const std::string& why);
-  // No answer will come to anything. What was accepted keeps what it has.
+  // No more answers will come at all. Accepted commits keep the outcomes that they have.
   void Ended(const std::string& why);
 
   const Receipt* Find(uint64_t frame) const;
   uint64_t unsettled() const { return unsettled_.size(); }
   size_t changed() const { return changed_.size(); }
-  // Frames whose receipts changed since the last call, ascending.
+  // Returns the frames whose receipts changed since the last call, ascending.
   std::vector<uint64_t> TakeChanged();
 
   Tally GetTally() const;
@@ -76,8 +77,8 @@ class ReceiptBook {
   const bool outcomes_;
   std::map<uint64_t, Entry> entries_;
   std::set<uint64_t> unsettled_;
-  std::set<uint64_t> settled_;                       // kept for who asks
-  std::map<uint64_t, uint64_t> by_commit_sequence_;  // of the unsettled → frame
+  std::set<uint64_t> settled_;                       // kept for queries
+  std::map<uint64_t, uint64_t> by_commit_sequence_;  // of unsettled commits → frame
   std::set<uint64_t> changed_;
   Issue last_issue_;
   Tally tally_;

@@ -10,9 +10,9 @@
 namespace voxeld::client {
 namespace {
 
-// The object that an instance draws; empty for any other primitive.
+// Returns the object that an instance draws; empty for any other primitive.
 std::string InstanceOf(const Rope& primitive) {
-  // Instances are short: longer ones are not worth reading.
+  // Instances are short: longer primitives are not parsed.
   constexpr size_t kMostBytes = 4096;
   if (primitive.size() > kMostBytes) return "";
   v1::Primitive read;
@@ -69,9 +69,9 @@ struct RetainedBook::Applier {
   RetainedBook& book;
   const Refusals& refusals;
   int64_t now_ns;
-  size_t request = 0, operation = 0;  // the next
+  size_t request = 0, operation = 0;  // the next ones to check
 
-  // Whether the next operation was refused, which is called `id` in `layer`.
+  // Returns whether the next operation, on entity `id` in `layer`, was refused.
   bool Refused(const std::string& layer, const std::string& id) {
     while (request < refusals.requests.size() &&
            operation >= refusals.requests[request].operations) {
@@ -134,7 +134,7 @@ struct RetainedBook::Applier {
     if (removal.cascade) book.RemoveInstancesOf(removal.object);
   }
   void operator()(const FrameOperation& frame) {
-    if (frame.layer.empty()) return;  // given up
+    if (frame.layer.empty()) return;  // dropped
     const bool begins = !Refused(frame.layer, "");
     std::vector<const UpsertOperation*> taken;
     for (const UpsertOperation& upsert : frame.upserts) {
@@ -209,7 +209,7 @@ std::vector<Operation> RetainedBook::Restore(int64_t now_ns) const {
   std::sort(order.begin(), order.end());
   for (const auto& [number, name] : order) {
     const Layer& layer = layers_.at(name);
-    // Also when it sets nothing: it makes the layer, in its turn.
+    // Emitted even if it sets nothing: it creates the layer in the right order.
     out.push_back(LayerOperation{name, layer.look});
     std::vector<const Entity*> entities;
     for (const auto& [id, entity] : layer.entities) {

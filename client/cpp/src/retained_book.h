@@ -1,5 +1,5 @@
-// What a session has up, as far as the server has accepted it: to send it again to one that has lost
-// it. Knows no gRPC. Payloads are shared with those who made them.
+// The retained state of a session, as far as the server has accepted it, for restoring it on a
+// server that has lost it. Does not depend on gRPC. Payloads are shared with their owners.
 #pragma once
 
 #include <cstddef>
@@ -16,19 +16,19 @@ namespace voxeld::client {
 
 class RetainedBook {
  public:
-  // What `operations` did, less what was refused of them. `now_ns`: for lifetimes; what is over by then
-  // is forgotten. Nothing is taken to have been done before what is in doubt.
+  // Applies `operations` except those in `refusals`. Lifetimes are relative to `now_ns`; expired
+  // entities are forgotten. While earlier commits are in doubt, later ones wait behind them.
   void Apply(const std::vector<Operation>& operations, const Refusals& refusals, int64_t now_ns);
 
-  // The commit `frame` was applied or refused, and which is not known yet: it keeps its place.
+  // The commit `frame` was applied or refused, but it is not known yet which: it keeps its place.
   void Doubt(uint64_t frame, const std::vector<Operation>& operations, int64_t now_ns);
-  // It was applied. Nothing happens if it is not in doubt.
+  // The commit was applied. Does nothing if it is not in doubt.
   void WasApplied(uint64_t frame);
-  // What is still in doubt was not, as far as will ever be known.
+  // Treats the commits still in doubt as not applied, since no answer will come.
   void EndDoubts();
 
-  // Operations that put up all of it on an empty server: objects before those that use them, layers
-  // in the order of their creation. Lifetimes are what is left of them.
+  // Returns operations that restore the whole state on an empty server: objects before those that
+  // use them, layers in the order of their creation. Lifetimes are the remaining ones.
   std::vector<Operation> Restore(int64_t now_ns) const;
 
   size_t entities() const;
@@ -36,7 +36,7 @@ class RetainedBook {
  private:
   struct Entity {
     UpsertOperation upsert;
-    uint64_t number = 0;  // of insertion
+    uint64_t number = 0;  // order of insertion
     int64_t expires_ns = 0;
   };
   struct Layer {
@@ -53,7 +53,7 @@ class RetainedBook {
   };
   struct Expiry {
     int64_t expires_ns = 0;
-    uint64_t number = 0;  // of the entity, if it has not been replaced since
+    uint64_t number = 0;  // the entity's, if it has not been replaced since
     std::string layer, id;
     bool operator>(const Expiry& other) const { return expires_ns > other.expires_ns; }
   };
@@ -72,9 +72,10 @@ class RetainedBook {
   std::map<std::string, Layer> layers_;
   std::map<std::string, DefineOperation> objects_;
   uint64_t next_number_ = 1;
-  std::deque<Waiting> waiting_;   // the first is in doubt
-  std::vector<Expiry> expiries_;  // a heap, the next first; some of entities that are gone
-  size_t most_expiries_ = 64;     // beyond, those are looked for
+  std::deque<Waiting> waiting_;  // the first is in doubt
+  // a heap, the next to expire first; some belong to removed entities
+  std::vector<Expiry> expiries_;
+  size_t most_expiries_ = 64;  // beyond this size, entries of removed entities are purged
 };
 
 }  // namespace voxeld::client

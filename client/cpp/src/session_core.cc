@@ -10,7 +10,7 @@
 namespace voxeld::client {
 namespace {
 
-// An upsert's names and fields, about.
+// Approximate size of an upsert's names and fields.
 constexpr size_t kFieldBytes = 256;
 
 uint64_t KeepFrames(const Options& options) {
@@ -44,7 +44,7 @@ struct OperationBytes {
   }
 };
 
-// About, of the greatest message that it takes.
+// Approximate size of the largest message that an operation needs.
 struct MessageBytes {
   size_t operator()(const FrameOperation& frame) const {
     size_t bytes = 0;
@@ -106,7 +106,7 @@ void SessionCore::Run() {
     Step();
     sync::MutexLock lock(mutex_);
     if (stop_ && link_ == nullptr && !HasEvents()) return;
-    // Anew: a deadline may have come nearer since.
+    // Recompute: a deadline may have moved closer since.
     const sync::TimeNs next = DoDue(clock_.Now());
     if (!HasEvents() && ended_links_.empty() && next > clock_.Now())
       clock_.WaitUntil(mutex_, work_, next);
@@ -156,7 +156,7 @@ absl::Status SessionCore::Stage(Operation operation) {
   sync::MutexLock lock(mutex_);
   if (state_ == State::kEnded || closing_)
     return absl::FailedPreconditionError("the session is closed");
-  // About; Commit knows to the byte.
+  // An estimate; Commit knows the exact size.
   const size_t most = most_message_bytes();
   const size_t largest = std::visit(MessageBytes(), operation);
   if (most > 0 && largest > most + kFieldBytes) {
@@ -216,7 +216,7 @@ absl::StatusOr<uint64_t> SessionCore::Commit(FrameOperation* frame, const Commit
     staged_ = std::move(transaction->operations);
     return added;
   }
-  // Before the server has said what it reads they may be needed once more.
+  // Until the server has said what it can read, the operations may be needed again.
   if (!options_.restore && server_) transaction->operations.clear();
   staged_bytes_ = 0;
   receipts_.Queued(next_frame_);
@@ -229,7 +229,7 @@ absl::StatusOr<uint64_t> SessionCore::Commit(FrameOperation* frame, const Commit
 absl::Status SessionCore::GiveUpOversized(std::vector<Operation> operations,
                                           FrameOperation* frame) {
   const size_t most = most_message_bytes();
-  std::vector<Operation> last;  // the frame, which is the caller's
+  std::vector<Operation> last;  // the caller's frame
   if (frame != nullptr) {
     last.push_back(std::move(operations.back()));
     operations.pop_back();
@@ -304,7 +304,8 @@ absl::StatusOr<Receipt> SessionCore::AnswerOf(uint64_t frame) const {
       constexpr size_t kMost = 20;
       for (size_t i = 0; i < issues.size() && i < kMost; ++i) {
         const std::string described = DescribeIssue(issues[i]);
-        if (absl::StrContains(receipt->message, described)) continue;  // the first: it is there
+        // the first issue, which the message already contains
+        if (absl::StrContains(receipt->message, described)) continue;
         absl::StrAppend(&text, "\n  ", described);
       }
       if (issues.size() > kMost) absl::StrAppend(&text, "\n  and ", issues.size() - kMost, " more");

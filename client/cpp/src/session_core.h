@@ -1,5 +1,6 @@
-// A session below the words of client.h: what is staged, what waits, the stream and the next one.
-// Knows no gRPC; owns no thread: Step does all that is due, so that a test can be its only one.
+// The implementation of a session: staged operations, the queue, the stream and its successors.
+// Does not depend on gRPC and owns no thread: Step does all that is due, so a test can drive it
+// alone.
 #pragma once
 
 #include <cstdint>
@@ -33,15 +34,15 @@ class SessionCore {
   static constexpr size_t kMostUntold =
       65536;  // receipts, and issues, that wait for their callbacks
 
-  // `clock` must outlive it. Nothing begins before the first Step.
+  // `clock` must outlive it. Nothing starts before the first Step.
   SessionCore(Options options, std::unique_ptr<Transport> transport, sync::Clock& clock);
-  // After Stop.
+  // Requires: Stop was called.
   ~SessionCore();
 
-  // Does what is due, calls the callbacks, and returns when to be called again at the latest. One
-  // thread at a time.
+  // Does what is due, runs the callbacks, and returns the latest time for the next call. Call it
+  // from one thread at a time.
   sync::TimeNs Step() VOXELD_EXCLUDES(mutex_);
-  // Steps until Stop.
+  // Calls Step until Stop.
   void Run() VOXELD_EXCLUDES(mutex_);
   // Cancels the stream and returns when it has ended. Then Run returns.
   void Stop() VOXELD_EXCLUDES(mutex_);
@@ -49,7 +50,7 @@ class SessionCore {
   absl::Status Stage(Operation operation) VOXELD_EXCLUDES(mutex_);
   absl::Status StageUpsert(std::string layer, std::string id, const Shape& shape, const Look& look)
       VOXELD_EXCLUDES(mutex_);
-  // `frame` is taken if it was committed.
+  // `frame` is consumed if it was committed.
   absl::StatusOr<uint64_t> Commit(FrameOperation* frame, const CommitOptions& options)
       VOXELD_EXCLUDES(mutex_);
   size_t staged_bytes() const VOXELD_EXCLUDES(mutex_);
@@ -73,7 +74,7 @@ class SessionCore {
 
  private:
   enum class State : uint8_t { kPausing, kConnecting, kOpen, kEnded };
-  // What an Open of ours asks to take up.
+  // The session or owner that our Open asks to resume or join.
   enum class Take : uint8_t { kNothing, kSession, kOwner };
 
   // One stream and its events.
@@ -88,22 +89,22 @@ class SessionCore {
 
     std::unique_ptr<Stream> stream;
     bool opened = false;
-    bool writing = true;  // of Open
+    bool writing = true;  // the Open message is being written
     uint64_t open_bytes = 0;
-    absl::Status cancelled_for;  // not ok: we ended it, and why
+    absl::Status cancelled_for;  // not ok: the client ended the stream, for this reason
 
-    // A request whose content is being handed over, and is to go with the answer.
+    // A request whose content is being handed over; it is sent when the answer comes.
     struct Handing {
       Rope whole;
       InMemory moved;
       uint64_t frame_id = 0;
     };
     std::optional<Handing> handing;
-    uint64_t memories = 0;                             // handed over; the last one's id
-    uint64_t memories_refused = 0;                     // one after the other
-    std::map<uint64_t, std::vector<uint64_t>> in_use;  // by unanswered commits: ids
+    uint64_t memories = 0;                             // handed over so far; the last one's id
+    uint64_t memories_refused = 0;                     // consecutive refusals
+    std::map<uint64_t, std::vector<uint64_t>> in_use;  // memory ids, by unanswered commits
     std::unique_ptr<MemoryChannel>
-        memory;  // null: all goes over the stream. The first to be destroyed
+        memory;  // null: all content goes over the stream. Destroyed first
 
    private:
     SessionCore* const core_;
@@ -111,7 +112,7 @@ class SessionCore {
   };
   using Event = std::variant<Issue, ConnectionChange>;
 
-  // Streams: session_link.cc.
+  // Streams, implemented in session_link.cc.
   void Connect() VOXELD_REQUIRES(mutex_);
   void Read(Link* link, const v1::StreamResponse& response) VOXELD_EXCLUDES(mutex_);
   void Written(Link* link) VOXELD_EXCLUDES(mutex_);
@@ -120,7 +121,7 @@ class SessionCore {
   void TakeOpened(const v1::Opened& opened) VOXELD_REQUIRES(mutex_);
   void TakeIssue(const v1::Issue& issue) VOXELD_REQUIRES(mutex_);
   void TakeReceipt(const v1::Receipt& receipt) VOXELD_REQUIRES(mutex_);
-  // What was sent on the stream before and has no answer, of a session that was taken up.
+  // Handles the unanswered commits of the previous stream after the session was resumed.
   void TakeUnheard(uint64_t last_sequence) VOXELD_REQUIRES(mutex_);
   void SendRetained() VOXELD_REQUIRES(mutex_);
   void TellNotRestored(const std::string& why) VOXELD_REQUIRES(mutex_);
@@ -129,7 +130,7 @@ class SessionCore {
   void CancelLink(const absl::Status& why) VOXELD_REQUIRES(mutex_);
   void Pump() VOXELD_REQUIRES(mutex_);
   void Write(const Rope& message) VOXELD_REQUIRES(mutex_);
-  // False: it is to go as it is.
+  // Returns false if the request must be sent as it is.
   bool HandOver(const Outbox::Outgoing& next) VOXELD_REQUIRES(mutex_);
   void ReleaseMemory(uint64_t frame_id) VOXELD_REQUIRES(mutex_);
   sync::TimeNs DoDue(sync::TimeNs now) VOXELD_REQUIRES(mutex_);
@@ -137,14 +138,14 @@ class SessionCore {
 
   absl::Status GiveUpOversized(std::vector<Operation> operations, FrameOperation* frame)
       VOXELD_REQUIRES(mutex_);
-  // 0: not known.
+  // 0: unknown.
   size_t most_message_bytes() const VOXELD_REQUIRES(mutex_);
-  // on_receipt keeps too much waiting.
+  // on_receipt is too far behind.
   bool Behind() const VOXELD_REQUIRES(mutex_);
   bool Room() const VOXELD_REQUIRES(mutex_);
   bool HasEvents() const VOXELD_REQUIRES(mutex_);
   void NoteDrops() VOXELD_REQUIRES(mutex_);
-  // Events for the callbacks, and everybody who waits is woken.
+  // Queues events for the callbacks and wakes all waiting threads.
   void Changed() VOXELD_REQUIRES(mutex_);
   bool TakesEvents() const;
 
@@ -159,7 +160,7 @@ class SessionCore {
   sync::Clock& clock_;
 
   mutable sync::Mutex mutex_;
-  sync::CondVar changed_;  // for who waits
+  sync::CondVar changed_;  // for waiting callers
   sync::CondVar work_;     // for Run
   bool stop_ VOXELD_GUARDED_BY(mutex_) = false;
   bool interrupted_ VOXELD_GUARDED_BY(mutex_) = false;
@@ -182,7 +183,7 @@ class SessionCore {
 
   std::optional<ServerInfo> server_ VOXELD_GUARDED_BY(mutex_);
   std::string resume_token_ VOXELD_GUARDED_BY(mutex_);
-  std::string own_token_ VOXELD_GUARDED_BY(mutex_);  // of our owner, from the last Opened
+  std::string own_token_ VOXELD_GUARDED_BY(mutex_);  // our owner's token, from the last Opened
   sync::Backoff backoff_ VOXELD_GUARDED_BY(mutex_);
   sync::TimeNs opened_at_ VOXELD_GUARDED_BY(mutex_) = 0;
   sync::TimeNs retry_at_ VOXELD_GUARDED_BY(mutex_) = 0;
@@ -190,10 +191,10 @@ class SessionCore {
   sync::TimeNs last_heard_ VOXELD_GUARDED_BY(mutex_) = 0;
   sync::TimeNs ping_at_ VOXELD_GUARDED_BY(mutex_) = sync::kNever;
   bool ping_due_ VOXELD_GUARDED_BY(mutex_) = false;
-  uint64_t pings_ VOXELD_GUARDED_BY(mutex_) = 0;  // of this stream
+  uint64_t pings_ VOXELD_GUARDED_BY(mutex_) = 0;  // on this stream
   bool pong_seen_ VOXELD_GUARDED_BY(mutex_) = false;
   uint64_t unanswered_pings_ VOXELD_GUARDED_BY(mutex_) = 0;
-  // Outcomes of what was accepted before the resume may come until then.
+  // Outcomes of commits accepted before the resume may come until then.
   sync::TimeNs outcomes_until_ VOXELD_GUARDED_BY(mutex_) = sync::kNever;
   sync::TimeNs resumed_at_ VOXELD_GUARDED_BY(mutex_) = 0;
 };

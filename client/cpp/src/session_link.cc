@@ -1,4 +1,4 @@
-// The stream of a session, and the next one.
+// The stream of a session, and its successors.
 #include <algorithm>
 #include <utility>
 
@@ -11,17 +11,17 @@
 namespace voxeld::client {
 namespace {
 
-// The first pings of a stream come quickly, for an estimate that is soon of use.
+// The first pings of a stream are sent quickly, so that a clock estimate is soon available.
 constexpr uint64_t kQuickPings = 4;
 constexpr sync::TimeNs kQuickPing = 20 * sync::kMillisecond;
 constexpr uint64_t kMostUnansweredPings = 4;
-// The server sends owed outcomes for 10 s after a resume.
+// The server sends pending outcomes for 10 s after a resume.
 constexpr sync::TimeNs kOwedOutcomes = 12 * sync::kSecond;
 constexpr size_t kRestoreBytes = 4 << 20;
-// One after the other, and no more is offered on that stream.
+// After so many consecutive refusals, no more memory is offered on that stream.
 constexpr uint64_t kMostMemoriesRefused = 3;
 
-// No other attempt would end differently.
+// Returns true if another attempt would fail in the same way.
 bool IsFinal(const absl::Status& status) {
   switch (status.code()) {
     case absl::StatusCode::kInvalidArgument:
@@ -75,7 +75,8 @@ std::string SessionCore::OpenBytes(Take take) {
   open.set_no_outcomes(!options_.outcomes);
   if (take == Take::kSession) open.set_resume_token(resume_token_);
   if (take == Take::kOwner) open.set_owner_token(own_token_);
-  // One that was joined and is gone, as after the server's restart, nobody can join any more.
+  // An owner that was joined and no longer exists, as after a server restart, cannot be joined
+  // again.
   if (take == Take::kNothing && !server_) open.set_owner_token(options_.owner_token);
   return request.SerializeAsString();
 }
@@ -179,7 +180,7 @@ void SessionCore::Written(Link* link) {
   link->writing = false;
   if (link != link_.get()) return;
   Pump();
-  // Room may have come.
+  // There may be room now.
   if (outbox_.empty()) Changed();
 }
 
@@ -205,7 +206,7 @@ void SessionCore::TakeReceipt(const v1::Receipt& receipt) {
   const sync::TimeNs now = clock_.Now();
   receipts_.Told(receipt, now);
   if (receipt.has_scheduled()) outbox_.Scheduled(receipt.frame_id());
-  // It was read then, whatever became of it.
+  // The server has read it, whatever its outcome.
   if (!receipt.has_outcome()) ReleaseMemory(receipt.frame_id());
   if (receipt.has_outcome()) retained_.WasApplied(receipt.frame_id());
   if (!receipt.has_accepted() && !receipt.has_refused()) return;
@@ -213,7 +214,7 @@ void SessionCore::TakeReceipt(const v1::Receipt& receipt) {
   const std::shared_ptr<const Transaction> done = outbox_.Answered(receipt.frame_id());
   if (done == nullptr) return;
   if (done->restores) {
-    // Nobody asked for this commit, so nobody reads its receipt; and the book has it.
+    // The caller did not request this commit, so nobody reads its receipt; the book has it.
     if (receipt.has_refused()) TellNotRestored(receipt.refused().message());
     return;
   }
@@ -255,7 +256,7 @@ void SessionCore::TakeOpened(const v1::Opened& opened) {
   open_deadline_ = sync::kNever;
   opened_at_ = now;
   ++receipts_.tally().connections;
-  // A session may be kept, for its outcomes, longer than its layers.
+  // The server may keep a session, for its outcomes, longer than its layers.
   const bool layers_kept = resumed && (options_.on_disconnect == OnDisconnect::kKeep ||
                                        (options_.on_disconnect == OnDisconnect::kLinger &&
                                         now - last_heard_ < options_.linger.count()));
@@ -272,7 +273,8 @@ void SessionCore::TakeOpened(const v1::Opened& opened) {
         sync::kNever, "the connection was lost, and the server did not keep the session");
   }
   if (!first && !layers_kept) {
-    // What was applied unheard went with the layers: it is sent again, after what is restored.
+    // Commits applied without an answer were lost with the layers: send them again, after the
+    // restore.
     retained_.EndDoubts();
     outbox_.DropRestores();
     change.kind =
@@ -304,7 +306,8 @@ void SessionCore::TakeOpened(const v1::Opened& opened) {
 void SessionCore::TakeUnheard(uint64_t last_sequence) {
   const sync::TimeNs now = clock_.Now();
   for (const auto& unheard : outbox_.Applied(last_sequence)) {
-    // The last one was applied. Any before may have been refused, but whole only in a strict session.
+    // The last commit was applied. Earlier ones may have been refused, but whole only in a strict
+    // session.
     if (options_.strict && unheard->commit_sequence != last_sequence) {
       receipts_.Unheard(unheard->frame_id, server_->displays);
       if (options_.restore) retained_.Doubt(unheard->frame_id, unheard->operations, now);
@@ -313,7 +316,7 @@ void SessionCore::TakeUnheard(uint64_t last_sequence) {
       if (options_.restore) retained_.Apply(unheard->operations, unheard->GetRefusals(), now);
     }
   }
-  // Without outcomes nothing will tell.
+  // Without outcomes nothing will resolve the doubt.
   if (!options_.outcomes || server_->displays.empty()) retained_.EndDoubts();
 }
 
@@ -362,7 +365,7 @@ void SessionCore::Lose(const absl::Status& why) {
     receipts_.Lost(frame, absl::StrCat("the connection was lost before its time: ", why.message()));
   }
   receipts_.StreamLost();
-  // A stream that answered nothing and soon ended may have ended by what it was sent.
+  // A stream that soon ended without answering may have failed because of what was sent on it.
   if (clock_.Now() - opened_at_ >= options_.longest_pause.count()) backoff_.Reset();
   half_closed_ = false;
   ping_at_ = outcomes_until_ = sync::kNever;
@@ -398,7 +401,7 @@ void SessionCore::End(Link* link, const absl::Status& told) {
     EndSession(stop_ ? absl::CancelledError("the session was closed") : status);
     return;
   }
-  // What is to be taken up is no more: the next less will do, and at once.
+  // The session or owner to resume no longer exists: at once try the next best.
   if (!was_opened && absl::IsNotFound(status) && take != Take::kNothing) {
     (take == Take::kSession ? resume_token_ : own_token_).clear();
     state_ = State::kPausing;

@@ -1,4 +1,4 @@
-// Streams to a server, with gRPC or without.
+// Streams to a server, over gRPC or, in tests, without it.
 #pragma once
 
 #include <memory>
@@ -11,36 +11,37 @@
 
 namespace voxeld::client {
 
-// One call of SceneService.Stream. Thread-safe; nothing blocks, and nothing calls back from within
-// itself. Destroy it only after its OnEnd.
+// One call of SceneService.Stream. Thread-safe; nothing blocks, and no callback runs from within a
+// call. Destroy it only after its OnEnd.
 class Stream {
  public:
-  // Called on threads of the transport's own, one at a time but for OnWritten.
+  // Called on threads of the transport, one at a time except for OnWritten.
   class Events {
    public:
     virtual ~Events() = default;
     virtual void OnRead(const v1::StreamResponse& response) = 0;
-    // The transport has taken the message; the next may be written.
+    // The transport has accepted the message; the next may be written.
     virtual void OnWritten() = 0;
-    // The last one.
+    // The last event.
     virtual void OnEnd(const absl::Status& status) = 0;
   };
   virtual ~Stream() = default;
 
-  // A v1.StreamRequest. One at a time: after OnWritten of the one before. Nothing happens if the stream
-  // is ending.
+  // Writes a v1.StreamRequest. One at a time: the next only after OnWritten. Does nothing if the
+  // stream is ending.
   virtual void Write(const Rope& message) = 0;
-  virtual void WritesDone() = 0;  // when no write is under way
+  virtual void WritesDone() = 0;  // call it when no write is in progress
   virtual void Cancel() = 0;
 };
 
 class Transport {
  public:
   virtual ~Transport() = default;
-  // A stream over a connection of its own. `events` must outlive its OnEnd.
+  // Starts a stream over a connection of its own. `events` must outlive its OnEnd.
   virtual std::unique_ptr<Stream> Start(Stream::Events* events) = 0;
-  // With what Opened tells of the local socket. `events` must outlive it. Null: content is to go over the stream, as
-  // where the server is not on this machine.
+  // Opens the memory channel with the local socket's path and token from Opened. `events` must
+  // outlive it. Returns null if content must go over the stream, for example because the server is
+  // remote.
   virtual std::unique_ptr<MemoryChannel> OpenMemory(const std::string& /*path*/,
                                                     const std::string& /*token*/,
                                                     MemoryChannel::Events* /*events*/) {

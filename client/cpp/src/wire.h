@@ -1,5 +1,5 @@
-// Protobuf's wire format, written by hand: messages as ropes, whose large payloads are shared with
-// whoever made them and never copied.
+// A hand-written encoder of protobuf's wire format: messages are ropes, whose large payloads are
+// shared with their owners and never copied.
 #pragma once
 
 #include <cstddef>
@@ -11,12 +11,12 @@
 
 namespace voxeld::client {
 
-// Bytes in pieces. Copies share the payloads.
+// A sequence of byte chunks. Copies share the payloads.
 class Rope {
  public:
   struct Chunk {
     std::string text;                   // if `owner` is null
-    std::shared_ptr<const void> owner;  // of what `shared` points at
+    std::shared_ptr<const void> owner;  // owns what `shared` points to
     std::string_view shared;
     std::string_view bytes() const { return owner == nullptr ? std::string_view(text) : shared; }
   };
@@ -41,7 +41,7 @@ class Rope {
   size_t size_ = 0;
 };
 
-// Each appends one field. A field that has its default value is left out, but for Present….
+// Each appends one field. Fields with their default value are left out, except by Present….
 void AppendVarint(uint64_t value, std::string* out);
 void AppendUnsigned(int field, uint64_t value, std::string* out);
 void AppendSigned(int field, int64_t value, std::string* out);  // int64
@@ -51,10 +51,10 @@ void AppendDouble(int field, double value, std::string* out);
 void AppendFloat(int field, float value, std::string* out);
 void AppendFixed32(int field, uint32_t value, std::string* out);
 void AppendBytes(int field, std::string_view value, std::string* out);
-// Also when empty: of oneofs and messages.
+// Appends the field even if it is empty: for oneofs and messages.
 void AppendPresentBytes(int field, std::string_view value, std::string* out);
 
-// `before`, then `inner` as the message field `field`.
+// Returns `before` followed by `inner` as the message field `field`.
 Rope Wrap(std::string_view before, int field, Rope inner);
 
 }  // namespace voxeld::client

@@ -1,11 +1,11 @@
-// Content that is brought to the server once, and named by its hash from then on, by anybody:
+// Uploads content to the server once; from then on any client can name it by its hash:
 //
 //   auto file = UploadAsset(png, {.address = "tls:wall:7390"});
 //   layer.Put("globe", Mesh{…, .texture = Texture{.picture = *file, …}});
 //
-// Any Array of a shape may be one, but for the scalars of a colour scale. A server keeps so many bytes of
-// them; what was used least recently goes, and whoever names it then gets an Issue (NotFound). What is up
-// has a copy, and stays.
+// An asset can replace any Array of a shape, except the scalars of a colour scale. The server keeps
+// a limited number of bytes; it evicts the least recently used assets, and a request that names an
+// evicted one gets an Issue (NotFound). Existing entities have a copy and stay.
 #pragma once
 
 #include <chrono>
@@ -24,21 +24,22 @@ namespace voxeld::client {
 struct UploadOptions {
   std::string address;                     // empty: DefaultAddress()
   std::optional<Credentials> credentials;  // nothing: DefaultCredentials()
-  // How long the server may be away, or busy with another upload of the same, without a byte more being
-  // there, before it is given up. A server that is there and takes nothing is waited for.
+  // How long to wait without progress while the server is unreachable, or busy with another upload
+  // of the same content, before giving up. The wait for a server that is reachable but accepts
+  // nothing is not limited.
   std::chrono::nanoseconds patience = std::chrono::seconds(15);
-  // Called after each piece, and now and then while there is none, in the caller's thread: bytes that have
-  // been sent. False ends the upload
-  // (Cancelled); what came stays there, and the next upload goes on from it.
+  // Called with the number of bytes sent after each piece, and now and then in between, on the
+  // caller's thread. Return false to stop the upload (Cancelled); the server keeps what it has
+  // received, and the next upload continues from there.
   std::function<bool(uint64_t sent, uint64_t size)> progress;
 };
 
-// The asset of those bytes; nothing is sent.
+// Returns the asset of these bytes; sends nothing.
 Asset AssetOf(std::string_view bytes);
 
-// Brings what the server does not have of it. A call that breaks off goes on where it did. Blocks.
-// Unavailable, DeadlineExceeded: no server; else what the server says, as
-// InvalidArgument (too large), ResourceExhausted (no room), PermissionDenied.
+// Uploads what the server does not have yet; an interrupted upload continues where it stopped.
+// Blocks. Errors: Unavailable or DeadlineExceeded without a server; else the server's error, such
+// as InvalidArgument (too large), ResourceExhausted (no room) or PermissionDenied.
 absl::StatusOr<Asset> UploadAsset(std::string_view bytes, const UploadOptions& options = {});
 
 }  // namespace voxeld::client

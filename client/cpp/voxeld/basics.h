@@ -1,4 +1,4 @@
-// Words that everything drawn is made of.
+// Types that all drawing messages are made of.
 #pragma once
 
 #include <array>
@@ -22,28 +22,29 @@ struct Affine {
   static Affine Translate(const Vec3& by);
   static Affine Scale(const Vec3& by);
   static Affine Scale(double by) { return Scale({by, by, by}); }
-  // Right-handed, about an axis through the origin, of any length but 0.
+  // Right-handed rotation about an axis through the origin; the axis may have any length but 0.
   static Affine Rotate(const Vec3& axis, double radians);
 
   bool operator==(const Affine&) const = default;
 };
 
-// `second` after `first`.
+// Returns the map that applies `first`, then `second`.
 Affine operator*(const Affine& second, const Affine& first);
 
-// Diameter of a curve or point, thickness of a surface; 0: one voxel wide.
+// Diameter of a curve or point, or thickness of a surface; 0: one voxel wide.
 struct Thickness {
-  enum class Unit : uint8_t { kVoxels, kUnits };  // of the display, or the entity's own
+  enum class Unit : uint8_t { kVoxels, kUnits };  // the display's voxels, or the entity's own units
   float value = 0;
   Unit unit = Unit::kVoxels;
 };
 
 enum class LineSampling : uint8_t { kThin, kEuclidean, kCover };
 enum class SurfaceRule : uint8_t { kThin, kCover };
-// As lines: edges, or meridians and parallels 45° apart; as dots: where those meet.
+// kLines draws edges, or meridians and parallels 45° apart; kDots draws the places where those
+// meet.
 enum class Fill : uint8_t { kSurface, kSolid, kLines, kDots };
 
-// A part of a space, its faces included; `everything`: all of it, whatever the corners.
+// A part of a space, its faces included; with `everything`, all of it, whatever the corners.
 struct Region {
   Vec3 min, max;
   bool everything = false;

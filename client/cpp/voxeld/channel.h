@@ -1,4 +1,4 @@
-// A gRPC channel as the client makes its own, for calls of one's own over the generated stubs.
+// Makes a gRPC channel as the client does, for callers that use the generated stubs directly.
 #pragma once
 
 #include <memory>
@@ -14,9 +14,9 @@ class ChannelArguments;
 
 namespace voxeld::client {
 
-// `address`: HOST:PORT, tls:HOST:PORT or unix:PATH. Every call of the channel carries the token. Does not
-// connect yet. InvalidArgument for an address that is none or a token that would be readable on its way;
-// other errors are those of files.
+// Makes a channel to `address`: HOST:PORT, tls:HOST:PORT or unix:PATH. Every call of the channel
+// carries the token. Does not connect yet. Errors: InvalidArgument for an invalid address, or for a
+// token that would be sent unencrypted; other errors are those of files.
 absl::StatusOr<std::shared_ptr<grpc::Channel>> MakeChannel(const std::string& address,
                                                            const Credentials& credentials,
                                                            const grpc::ChannelArguments& arguments);

@@ -1,4 +1,4 @@
-// What can be drawn, and how it looks. Words only: nothing here talks to a server.
+// The shapes that can be drawn, and how they look. Data only: nothing here talks to a server.
 //
 // Coordinates are in the entity's own space: its transform, its layer's and the display's view
 // follow. Everything must be finite.
@@ -22,16 +22,16 @@
 
 namespace voxeld::client {
 
-// Content that the server has by its SHA-256 (UploadAsset, voxeld/assets.h).
+// Content that the server stores by its SHA-256 (UploadAsset, voxeld/assets.h).
 struct Asset {
   std::string sha256;  // 32 bytes
   uint64_t size = 0;   // in bytes
 };
 
-// A packed array of numbers. Made of an lvalue or a span it is a view, which must stay until the
-// call that it is given to returns; that call copies it once. Made of an rvalue vector or a list it
-// owns what it holds, and large ones go to the wire without another copy. Made of an asset it is that
-// asset's content, little-endian, which is named and not sent.
+// A packed array of numbers. Constructed from an lvalue or a span it is a view, which must stay
+// valid until the call that takes it returns; that call copies it once. Constructed from an rvalue
+// vector or a list it owns its elements, and large ones are sent without another copy. Constructed
+// from an asset it is that asset's content, little-endian, and only its name is sent.
 template <typename T>
 class Array {
  public:
@@ -48,7 +48,7 @@ class Array {
 
   size_t size() const { return asset_.has_value() ? asset_->size / sizeof(T) : view_.size(); }
   bool empty() const { return asset_.has_value() ? asset_->size == 0 : view_.empty(); }
-  std::span<const T> view() const { return view_; }  // of an asset nothing
+  std::span<const T> view() const { return view_; }  // empty for an asset
   // Null for a view.
   const std::shared_ptr<const std::vector<T>>& owner() const { return owner_; }
   const std::optional<Asset>& asset() const { return asset_; }
@@ -59,19 +59,20 @@ class Array {
   std::span<const T> view_;
 };
 
-// Vertices as they lie in memory. At most one of the two index arrays.
+// Vertices as they lie in memory. At most one of the two index arrays may be set.
 struct Vertices {
-  // Of kElements, each segment or triangle has one, in their order; only of segments and meshes.
+  // kElements: one colour per segment or triangle, in their order; only for segments and meshes.
   enum class ColorsOf : uint8_t { kVertices, kElements };
-  Array<float> positions;         // x y z of each
-  Array<uint8_t> colors;          // r g b of each, or as colors_of says; empty: Look::color
+  Array<float> positions;         // x y z per vertex
+  Array<uint8_t> colors;          // r g b per vertex, or as colors_of says; empty: Look::color
   Array<uint32_t> indices;        // empty: vertices are used as they stand
-  Array<uint16_t> short_indices;  // the same in less room
+  Array<uint16_t> short_indices;  // the same, in half the space
   ColorsOf colors_of = ColorsOf::kVertices;
 };
 
 struct Points {
-  // Of thick ones; kSoft fades out. kCell: sparse voxels, each point the cell (1 unit wide) that it lies in.
+  // Shape of thick points; kSoft fades out. kCell: sparse voxels, each point is the cell (1 unit
+  // wide) that contains it.
   enum class Splat : uint8_t { kBall, kSoft, kCube, kCell };
   Vertices vertices;  // without indices
   Thickness thickness;
@@ -86,11 +87,11 @@ struct Segments {
   Thickness thickness;
 };
 
-// A picture on a mesh, which colours are multiplied by.
+// An image on a mesh; colours are multiplied by it.
 struct Texture {
   Array<uint8_t> picture;  // a PNG or JPEG file
-  // Two of each vertex: how far right and how far down. (0, 0) is the picture's upper left corner, (1, 1) its lower right
-  // one; beyond them it repeats.
+  // Two per vertex: how far right and how far down. (0, 0) is the image's upper left corner, (1, 1)
+  // its lower right one; beyond them it repeats.
   Array<float> coordinates;
 };
 
@@ -99,12 +100,12 @@ struct Mesh {
   Vertices vertices;
   SurfaceRule rule = SurfaceRule::kThin;
   Fill fill = Fill::kSurface;
-  std::optional<Texture> texture;  // of a surface
-  Thickness shell;                 // of a surface, in the middle of it
+  std::optional<Texture> texture;  // only with Fill::kSurface
+  Thickness shell;                 // only with Fill::kSurface, which lies in its middle
 };
 
-// A smooth line along points: through them all (Catmull–Rom), near them (B-spline), or Béziers: an end, two
-// handles (one, of quadratic ones), an end, and so on.
+// A smooth line along points: through all of them (Catmull–Rom), near them (B-spline), or as
+// Béziers: an end, two handles (quadratic ones: one), an end, and so on.
 struct Curve {
   enum class Form : uint8_t { kCatmullRom, kBSpline, kBezier, kQuadratic };
   Vertices vertices;  // without indices
@@ -114,12 +115,12 @@ struct Curve {
   Thickness thickness;
 };
 
-// Bicubic Bézier patches: 16 control points each, four by four, or so many indices.
+// Bicubic Bézier patches: 16 control points each, four by four, or as many indices.
 struct BezierSurface {
   Vertices vertices;
   SurfaceRule rule = SurfaceRule::kThin;
-  Fill fill = Fill::kSurface;  // or lines, the edges of each, or dots, their corners
-  Thickness shell;             // of a surface
+  Fill fill = Fill::kSurface;  // or lines, the edges of each patch, or dots, their corners
+  Thickness shell;             // only with Fill::kSurface
 };
 
 // A surface over a grid of heights, row by row.
@@ -127,44 +128,46 @@ struct HeightMap {
   Vec3 corner;
   Vec3 edge_a = {1, 0, 0};  // from the first to the last sample of a row
   Vec3 edge_b = {0, 1, 0};  // from the first to the last row
-  Vec3 up = {0, 0, 1};      // by how much a height of 1 lifts a sample
+  Vec3 up = {0, 0, 1};      // displacement of a sample of height 1
   uint32_t columns = 0, rows = 0;
   Array<float> heights;
-  Array<uint8_t> colors;  // r g b of each; empty: Look::color
+  Array<uint8_t> colors;  // r g b per sample; empty: Look::color
   SurfaceRule rule = SurfaceRule::kThin;
   Fill fill = Fill::kSurface;  // or lines, which are rows and columns, or dots
-  Array<uint8_t>
-      picture;      // a PNG or JPEG file over all of it, from the first sample on; empty: none
-  Thickness shell;  // of a surface
+  // A PNG or JPEG file over the whole surface, from the first sample on; empty: none.
+  Array<uint8_t> picture;
+  Thickness shell;  // only with Fill::kSurface
 };
 
-// Samples in the middles of cells that fill what three edges span from a corner.
+// Samples in the middles of equal cells that fill the volume spanned by three edges from a corner.
 struct Grid {
   enum class Filter : uint8_t { kLinear, kNearest };
   Vec3 corner = {-1, -1, -1};
   Vec3 edge_a = {2, 0, 0}, edge_b = {0, 2, 0}, edge_c = {0, 0, 2};
   uint32_t size_a = 0, size_b = 0, size_c = 0;  // samples along each
-  // Those along edge_a side by side, then rows along edge_b. All in one message: a server takes so many bytes.
+  // Samples along edge_a first, then rows along edge_b. All in one message, whose size the server
+  // limits.
   std::variant<Array<float>, Array<uint16_t>, Array<uint8_t>> samples;
   Filter filter = Filter::kLinear;
 };
 
-// Colours and opacities of numbers, in 256 steps from the first value to the last.
+// Maps numbers to colours and opacities, in 256 steps from the first value to the last.
 struct Transfer {
   std::vector<double> values;     // 2 to 256, not descending
-  std::vector<Color> colors;      // of each; or
-  std::string colormap;           // matplotlib's name of a row of colours
-  std::vector<double> opacities;  // 0 to 1 of each, 0: nothing is drawn; empty: 1
+  std::vector<Color> colors;      // one per value; or
+  std::string colormap;           // matplotlib's name of a colour map
+  std::vector<double> opacities;  // 0 to 1 per value, 0: nothing is drawn; empty: 1
 };
 
-// Numbers through a transfer function, without one what is above their middle; or colours.
+// Numbers mapped by a transfer function (without one: those above their middle are drawn), or
+// colours.
 struct Volume {
   Grid grid;
-  bool colors = false;  // the samples are bytes, r g b a of each
+  bool colors = false;  // the samples are bytes, r g b a each
   std::optional<Transfer> transfer;
 };
 
-// Where numbers are at a level; inside is where they are no less.
+// The surface where numbers reach a level; inside is where they are at least the level.
 struct Isosurface {
   Grid grid;
   double level = 0;
@@ -173,7 +176,8 @@ struct Isosurface {
   Thickness shell;
 };
 
-// With a shell or a colour scale, boxes, spheres and cylinders are what parallelepipeds, ellipsoids and cones are.
+// Boxes, spheres and cylinders with a shell or a colour scale are drawn as parallelepipeds,
+// ellipsoids and cones.
 struct Box {
   Vec3 center;
   Vec3 size = {1, 1, 1};  // full edge lengths
@@ -190,7 +194,7 @@ struct Sphere {
   Thickness shell;
 };
 
-// Along its own z axis, centred.
+// A cylinder along its own z axis, centred.
 struct Cylinder {
   Vec3 center;
   double radius = 1;
@@ -203,19 +207,20 @@ struct Cylinder {
 // Draws an object that Session::DefineObject defined.
 struct Instance {
   std::string object;
-  Color tint;  // all its colours are multiplied by this one, 255 being 1
+  Color tint;  // all its colours are multiplied by this one; 255 is 1
 };
 
-// Colours by numbers, from one end of a row of colours to the other. Along a direction for all but Implicit, which has a level,
-// volumes and instances; numbers for what has vertices, or samples of heights.
+// Colours by numbers, from one end of a colour map to the other. `along` works for all shapes but
+// Implicit, which has a level, volumes and instances; `scalars` for shapes that have vertices, and
+// for the samples of height maps.
 struct ColorScale {
-  std::string colormap;       // matplotlib's, as "viridis", or "viridis_r": turned round;
-  std::vector<Color> colors;  // or 2 to 256 colours, evenly apart
+  std::string colormap;       // matplotlib's name, such as "viridis", or "viridis_r": reversed;
+  std::vector<Color> colors;  // or 2 to 256 colours, evenly spaced
   double low = 0,
-         high = 0;  // the numbers at the two ends; both 0: the least and the greatest there are
-  // What the numbers are: how far a place is along this, (p · along) / |along|²;
+         high = 0;  // the numbers at the two ends; both 0: the least and the greatest present
+  // Where the numbers come from: the position along this vector, (p · along) / |along|²;
   std::optional<Vec3> along;
-  Array<float> scalars;  // or one for each vertex
+  Array<float> scalars;  // or one per vertex
 };
 
 using Shape =
@@ -223,15 +228,16 @@ using Shape =
                  Torus, Cone, Parallelepiped, Disc, Patch, Polygon, HeightMap, Curve, Arc, Ellipse,
                  Helix, BezierSurface, Arrow, Text, Volume, Isosurface>;
 
-// Everything about an entity but its shape.
+// Everything about an entity except its shape.
 struct Look {
-  Color color;  // of what has no colours of its own; black covers. Instances have their object's
+  // for shapes without colours of their own; black covers. Instances use their object's colours
+  Color color;
   std::optional<ColorScale> color_scale;  // in place of colours
   Affine transform;
-  uint32_t priority = 0;  // 0 to 126: within its layer the higher wins
-  bool erase = false;     // removes what is of lower or equal priority within its layer
-  std::chrono::nanoseconds lifetime{0};  // it goes that long after it was applied; 0: it stays
-  std::string label;                     // for people
+  uint32_t priority = 0;  // 0 to 126: within its layer the higher priority wins
+  bool erase = false;     // removes content of lower or equal priority within its layer
+  std::chrono::nanoseconds lifetime{0};  // removed that long after it was applied; 0: it stays
+  std::string label;                     // for people to read
 };
 
 // A piece of an object.
@@ -255,7 +261,7 @@ struct ClipBox {
   Affine transform;
 };
 
-// Round, from one point to another, its ends flat.
+// A cylinder from one point to another, with flat ends.
 struct ClipCylinder {
   Vec3 start, end;
   double radius = 0;  // greater than 0
@@ -263,17 +269,19 @@ struct ClipCylinder {
 
 using ClipPart = std::variant<HalfSpace, ClipBox, ClipCylinder>;
 
-// What is set is changed; the rest stays as it was.
+// Fields that are set change the layer; the others stay unchanged.
 struct LayerLook {
   std::optional<bool> visible;
   std::optional<uint8_t> opacity;
   std::optional<int32_t> order;  // layers combine in ascending (order, creation)
   std::optional<Blend> blend;
   std::optional<Affine> transform;
-  // Only what lies in all of these and in the region is drawn. An empty list takes the former away.
+  // Only content inside all of these and the region is drawn. An empty list removes the former
+  // clip.
   std::optional<std::vector<ClipPart>> clip;
   std::optional<Region> region;
-  // A layer of this client: only where it covers is anything seen. Empty: none any more.
+  // A layer of this client: content is visible only where that layer covers. Empty: removes the
+  // mask.
   std::optional<std::string> mask;
 };
 

@@ -1,10 +1,10 @@
-// Expressions of a shape's own coordinates, for the general method: as text, or computed with.
+// Expressions of a shape's own coordinates, for implicit shapes: as text, or built from terms.
 //
 //   using namespace voxeld::client::expressions;
 //   session.Set("bowl", Implicit{.surface = "x^2 + y^2 - z = 0", .bound = square(x) + square(y) <= 1});
 //
-// docs/expressions.md has what text may say. A condition is a number that is ≤ 0 where it is true:
-// square(x) <= 1 is square(x) - 1, and max is "and".
+// docs/expressions.md describes the syntax of text. A condition is a number that is ≤ 0 where it is
+// true: square(x) <= 1 is square(x) - 1, and max is "and".
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@
 namespace voxeld::client {
 namespace expressions {
 
-// Numbered as the wire's Expression.Tree.Op.
+// The numbers of the wire's Expression.Tree.Op.
 enum class Op : uint8_t {
   kConstant = 1,
   kX,
@@ -53,12 +53,13 @@ enum class Op : uint8_t {
   kSmoothMax,
 };
 
-// A number as a function of x, y and z, in postfix order; the numbers and names are those of its constants and parameters, in
-// turn. Immutable. A number that is not finite, and a name that is none, are refused when the shape is sent.
+// A number as a function of x, y and z, in postfix order; `values` and `names` are those of its
+// constants and parameters, in turn. Immutable. A number that is not finite, or an invalid name, is
+// rejected when the shape is sent.
 class Term {
  public:
   Term(double number) : ops_{Op::kConstant}, values_{number} {}  // NOLINT: implicit
-  // Of an operation and what it takes.
+  // An operation applied to its operands.
   explicit Term(Op op, std::initializer_list<Term> operands = {});
   static Term Parameter(std::string name);
 
@@ -74,7 +75,8 @@ class Term {
 
 inline const Term x(Op::kX), y(Op::kY), z(Op::kZ);
 inline const Term voxel(Op::kVoxel);  // the edge of a voxel in the shape's units
-// Of Implicit::parameters. Letters, digits and _ make a name, a digit not first.
+// Names an entry of Implicit::parameters. A name has letters, digits and _, and begins with no
+// digit.
 inline Term parameter(std::string name) { return Term::Parameter(std::move(name)); }
 
 inline Term operator-(const Term& a) { return Term(Op::kNegate, {a}); }
@@ -100,13 +102,13 @@ inline Term log(const Term& a) { return Term(Op::kLog, {a}); }
 inline Term floor(const Term& a) { return Term(Op::kFloor, {a}); }
 inline Term pow(const Term& a, const Term& b) { return Term(Op::kPower, {a, b}); }
 inline Term atan2(const Term& a, const Term& b) { return Term(Op::kAtan2, {a, b}); }
-// a − b·⌊a/b⌋.
+// Returns a − b·⌊a/b⌋.
 inline Term mod(const Term& a, const Term& b) { return Term(Op::kModulo, {a, b}); }
-// Of shapes: union, intersection, what is in a and not in b.
+// On shapes: union, intersection, and what is in a but not in b.
 inline Term min(const Term& a, const Term& b) { return Term(Op::kMin, {a, b}); }
 inline Term max(const Term& a, const Term& b) { return Term(Op::kMax, {a, b}); }
 inline Term difference(const Term& a, const Term& b) { return Term(Op::kDifference, {a, b}); }
-// The lesser and the greater, rounded off where the two differ by less than `within`.
+// The smaller and the greater value, rounded off where the two differ by less than `within`.
 inline Term smooth_min(const Term& a, const Term& b, const Term& within) {
   return Term(Op::kSmoothMin, {a, b, within});
 }
@@ -128,7 +130,7 @@ class Expression {
     const std::string* const said = text();
     return term() == nullptr && (said == nullptr || said->empty());
   }
-  // Null: it is not that.
+  // Null if the expression has the other form.
   const std::string* text() const { return std::get_if<std::string>(&form_); }
   const expressions::Term* term() const { return std::get_if<expressions::Term>(&form_); }
 

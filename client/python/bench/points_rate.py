@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""How many clouds of so many points (16 bytes each: float32 × 3 and RGBX) go through a second, and what that costs here.
-Prints JSON; ends with 1 if some were not accepted, or one cost more than --most-cpu-ms.
+"""Measures how many point clouds (16 bytes per point: float32 × 3 and RGBX) are sent in a second, and the CPU time that each costs.
+Prints JSON; exits with 1 if some were not accepted, or one cost more than --most-cpu-ms.
 
 usage: points_rate.py [--server ADDRESS] [--points N] [--frames N] [--flow POLICY] [--most-cpu-ms T]
-The daemon is to run with no display, or the display's own rate is in the figure; there is one by default:
+Run the daemon without a display, or the figure includes the display's rate; by default it has one:
     echo 'display = []' >none.toml; voxeld --config none.toml --listen unix:/tmp/v.sock --http off
 """
 from __future__ import annotations

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The three axes, and what became of them."""
+"""The three axes, and their outcome on each display."""
 import voxeld as voxel
 
 with voxel.connect(name="hello") as v:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Boxes, spheres, cylinders and a mesh; hollow and solid, in one commit."""
+"""Boxes, spheres, cylinders and a mesh, hollow and solid, in one commit."""
 import numpy as np
 
 import voxeld as voxel

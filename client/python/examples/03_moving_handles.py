@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A large mesh goes over once; after that each step sends its transform, 12 numbers."""
+"""A large mesh is sent once; after that each step sends only its transform, 12 numbers."""
 import argparse
 import time
 

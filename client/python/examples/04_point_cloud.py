@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A galaxy that turns: a cloud in immediate mode, frame after frame, and a picture of what the display showed.
+"""A turning galaxy: a cloud in immediate mode, frame after frame, and a picture of what the display showed.
 
 usage: 04_point_cloud.py [--points N] [--seconds S] [--picture FILE]
 """
@@ -15,7 +15,7 @@ import voxeld as voxel
 
 
 class Galaxy:
-    """Stars on the arms of two logarithmic spirals and in a bulge; the inner ones go round faster."""
+    """Stars on the arms of two logarithmic spirals and in a bulge; the inner ones orbit faster."""
 
     def __init__(self, stars: int) -> None:
         random = np.random.default_rng(7)

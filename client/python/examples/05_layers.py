@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Layers over one another: order, opacity, adding light, erasing, hiding."""
+"""Layers over one another: order, opacity, additive blending, erasing, hiding."""
 import voxeld as voxel
 
 with voxel.connect(name="layers") as v:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A field of numbers: two orbitals that pull apart, as points at the cells' centres above a threshold."""
+"""A field of numbers: two orbitals that separate, drawn as points at the centres of cells above a threshold."""
 import numpy as np
 
 import voxeld as voxel

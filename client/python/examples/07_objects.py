@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""An object is defined once and drawn by instances; defining it anew changes them all."""
+"""An object is defined once and drawn by instances; defining it again changes them all."""
 import numpy as np
 
 import voxeld as voxel

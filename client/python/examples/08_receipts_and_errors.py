@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What is wrong is said here where it can be known here, and by the server otherwise; nothing is lost in silence."""
+"""Errors are raised locally where the client can detect them, and reported by the server otherwise; none is silent."""
 from typing import Callable
 
 import numpy as np

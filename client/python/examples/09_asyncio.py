@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Two tasks draw over one connection, each into its own layer and in its own time."""
+"""Two tasks draw over one connection, each into its own layer and at its own pace."""
 import asyncio
 
 import numpy as np

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""One connection draws, another watches the scene: all there is first, then what changes."""
+"""One connection draws, another watches the scene: first the whole scene, then its changes."""
 import voxeld as voxel
 
 with voxel.connect(name="painter") as painter, voxel.connect(name="watcher") as watcher:

@@ -1,4 +1,4 @@
-"""voxeld: draw in volumetric displays.
+"""voxeld: draw on volumetric displays.
 
     import voxeld as voxel
     v = voxel.connect()

@@ -1,4 +1,4 @@
-"""Where the server is: HOST:PORT, tls:HOST:PORT or unix:PATH, found as voxelctl finds it."""
+"""The server's address: HOST:PORT, tls:HOST:PORT or unix:PATH, found as voxelctl finds it."""
 from __future__ import annotations
 
 import ipaddress
@@ -13,8 +13,8 @@ SERVICE_SOCKET = "/run/voxeld/voxeld.sock"
 
 
 def _trusted(path: str) -> bool:
-    # A socket that somebody else put into a shared directory is not to be trusted. The service's own folder only
-    # root can make, for whatever user the service runs as.
+    # A socket that another user put into a shared directory must not be trusted. Only root can create the service's own
+    # directory, whichever user the service runs as.
     try:
         info = os.lstat(path)
     except OSError:
@@ -24,8 +24,8 @@ def _trusted(path: str) -> bool:
 
 
 def choose(address: str | None = None, environment: Mapping[str, str] | None = None) -> str:
-    """`address`, else VOXELD_SERVER, else the first unix socket of: the run-time directory, the service, the user's own
-    folder in /tmp; else 127.0.0.1:50551."""
+    """Returns `address`, else VOXELD_SERVER, else the first existing unix socket: in the run-time directory, the service's, in
+    the user's own directory in /tmp; else 127.0.0.1:50551."""
     if address:
         return address
     env = os.environ if environment is None else environment
@@ -45,7 +45,7 @@ def is_tls(address: str) -> bool:
 
 
 def is_local(address: str) -> bool:
-    """Whether what is sent there stays on this machine."""
+    """Returns whether data sent to the address stays on this machine."""
     if address.startswith("unix:"):
         return True
     host = address.removeprefix("tls:").rpartition(":")[0].strip("[]")
@@ -58,7 +58,7 @@ def is_local(address: str) -> bool:
 
 
 def target(address: str) -> str:
-    """The address in gRPC's words, which do not say that it speaks TLS."""
+    """Returns the address in gRPC's notation, which does not mention TLS."""
 
     def wrong(why: str) -> InvalidValue:
         return InvalidValue(

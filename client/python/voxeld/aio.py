@@ -1,4 +1,4 @@
-"""The same for asyncio: drawing calls are the same and never wait; what waits is awaited.
+"""The asyncio client: drawing calls are the same and never wait; waiting calls are awaited.
 
     v = await voxeld.aio.connect()
     v.points("cloud", cloud)
@@ -27,13 +27,13 @@ async def _within(future: "Future[Frame]", timeout: Optional[float]) -> Frame:
 
 
 async def accepted(frame: Union[Frame, FrameBlock], timeout: Optional[float] = None) -> Frame:
-    """Until the commit is answered. Raises as Frame.wait() does, or asyncio.TimeoutError."""
+    """Waits until the commit is answered. Raises as Frame.wait() does, or asyncio.TimeoutError."""
     ticket = frame if isinstance(frame, Frame) else frame.ticket
     return (await _within(ticket.future(), timeout)).raise_if_failed()
 
 
 async def shown(frame: Union[Frame, FrameBlock], timeout: Optional[float] = None) -> dict[str, Outcome]:
-    """Until every display has said what became of the commit: that, by the display's name."""
+    """Waits until every display has reported the commit's outcome; returns the outcomes by display name."""
     ticket = frame if isinstance(frame, Frame) else frame.ticket
     return (await _within(ticket.future(shown=True), timeout)).raise_if_failed().outcomes
 
@@ -51,7 +51,7 @@ class Connection(BaseConnection):
             raise ConnectionLost(self._transport.last_error or f"no voxeld answered at {self.server} in {timeout} s")
 
     async def flush(self, timeout: Optional[float] = None) -> None:
-        """As voxeld.Connection.flush: until all has been sent, whatever became of it."""
+        """As voxeld.Connection.flush: waits until everything has been sent, whatever the outcome."""
         if not await asyncio.to_thread(self._transport.wait_until, self._session.idle, timeout):
             raise asyncio.TimeoutError(f"after {timeout} s {self.counts['waiting_commits']} commits still wait to be sent")
 
@@ -76,12 +76,13 @@ class Connection(BaseConnection):
 
     async def upload(self, content: Content, progress: Optional[Callable[[int, int], None]] = None, *,
                      patience: float = 15.0) -> Asset:
-        """As Connection.upload(); `progress` is called in another thread."""
+        """As Connection.upload(); `progress` is called on another thread."""
         return await asyncio.to_thread(self._queries.upload, content, progress, patience)
 
     async def watch_scene(self, layer: str = "", owner: int = 0, *, contents: bool = False,
                           timeout: Optional[float] = None) -> AsyncIterator[ChangeSet]:
-        """The scene's changes as they come; the first has all there is. `async for`; the end of the loop ends the call."""
+        """Yields the scene's changes as they come; the first holds the whole scene. For `async for`; leaving the loop ends the
+        call."""
         changes = self._queries.watch(layer, owner, contents, timeout)
         try:
             while (change := await asyncio.to_thread(changes.next)) is not None:

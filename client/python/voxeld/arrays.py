@@ -1,4 +1,4 @@
-"""Arrays as they go over the wire: checked, C-contiguous, little-endian; converted only where they must be."""
+"""Converts arrays for the wire: checked, C-contiguous, little-endian; copied only where necessary."""
 from __future__ import annotations
 
 import sys
@@ -12,12 +12,12 @@ from .v1 import primitives_pb2 as pb
 
 Array = npt.NDArray[Any]
 
-# The largest whole number that positions may have (ELEMENT_TYPE_I32).
+# The largest integer that positions may have (ELEMENT_TYPE_I32).
 MAX_INTEGER = 1 << 24
 
 
 def as_array(values: npt.ArrayLike, what: str) -> Array:
-    """`values` as an array of numbers; no copy of one that is an array already."""
+    """Returns `values` as an array of numbers; an array is not copied."""
     try:
         array = np.asarray(values)
     except ValueError:
@@ -43,10 +43,10 @@ def _shape_hint(shape: tuple[int, ...]) -> str:
 
 
 def require_finite(array: Array, what: str) -> None:
-    """Raises InvalidArray that names the first element that is NaN or infinite."""
+    """Raises InvalidArray, naming the first element that is NaN or infinite."""
     if array.dtype.kind != "f" or array.size == 0:
         return
-    # One pass without a temporary: a NaN or an infinity makes the sum one. Large numbers may too, so look closer then.
+    # One pass without a temporary: a NaN or an infinity makes the sum non-finite. So may large numbers, so look closer then.
     with np.errstate(over="ignore", invalid="ignore"):
         if np.isfinite(array.sum()):
             return
@@ -64,8 +64,8 @@ def _little_endian(array: Array) -> Array:
 
 
 def positions(values: npt.ArrayLike, what: str = "positions") -> tuple[Array, pb.ElementType]:
-    """(n, 3) float32, int16 or int32, C-contiguous, and the wire's word for its elements. These three are taken without
-    a copy; other floats become float32, other whole numbers int32."""
+    """Returns (n, 3) float32, int16 or int32, C-contiguous, and the wire's element type. Arrays of these three types are not
+    copied; other floats become float32, other integers int32."""
     array = as_array(values, what)
     if array.size == 0 and array.ndim <= 2:
         array = array.reshape(0, 3)
@@ -88,7 +88,7 @@ def positions(values: npt.ArrayLike, what: str = "positions") -> tuple[Array, pb
 
 
 def indices(values: npt.ArrayLike, count: int, what: str = "faces") -> Array:
-    """(m, 3) uint32, each below `count`. uint32 and int32 are taken without a copy."""
+    """Returns (m, 3) uint32, each below `count`. uint32 and int32 arrays are not copied."""
     array = as_array(values, what)
     if array.size == 0 and array.ndim <= 2:
         array = array.reshape(0, 3).astype(np.uint32)
@@ -110,7 +110,7 @@ def indices(values: npt.ArrayLike, count: int, what: str = "faces") -> Array:
 
 
 def vector(values: npt.ArrayLike, what: str) -> tuple[float, float, float]:
-    """Three finite numbers."""
+    """Returns three finite numbers."""
     array = as_array(values, what)
     if array.shape != (3,):
         raise InvalidArray(f"{what} must be three numbers, got shape {array.shape}")
@@ -119,7 +119,7 @@ def vector(values: npt.ArrayLike, what: str) -> tuple[float, float, float]:
 
 
 def number(value: float, what: str, *, above: float | None = None, least: float | None = None) -> float:
-    """A finite number, greater than `above`, not less than `least`."""
+    """Returns a finite number, greater than `above` and not less than `least`."""
     try:
         result = float(value)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""Content that is brought to the server once, and named by its hash from then on."""
+"""Content that is uploaded to the server once, and named by its hash from then on."""
 from __future__ import annotations
 
 import dataclasses
@@ -19,8 +19,8 @@ Content = Union[str, "os.PathLike[str]", bytes, bytearray, memoryview, npt.Array
 
 @dataclasses.dataclass(frozen=True)
 class Asset:
-    """Content that the server has by its SHA-256, as upload() answers it. One of a picture goes where a texture is wanted, one
-    of an array where a volume's or isosurface's samples are."""
+    """Content that the server stores by its SHA-256, as upload() returns it. An image's asset can be used as a texture, an
+    array's as the samples of a volume or isosurface."""
 
     sha256: bytes
     size: int
@@ -29,12 +29,12 @@ class Asset:
     dtype: Optional[np.dtype] = None  # type: ignore[type-arg]
 
     def range(self) -> pb.MemoryRange:
-        """All of it."""
+        """Returns the range of the whole asset."""
         return pb.MemoryRange(asset=self.sha256, size=self.size)
 
 
 def samples(array: npt.ArrayLike) -> "np.typing.NDArray[np.generic]":
-    """A field as the wire has it: uint8, uint16 or float32."""
+    """Returns a field in the wire's format: uint8, uint16 or float32."""
     field = as_array(array, "array")
     if field.ndim not in (3, 4) or 0 in field.shape or (field.ndim == 4 and (field.shape[3] != 4 or field.dtype != np.uint8)):
         raise InvalidArray(f"array must be of shape (nx, ny, nz), or, of colours, uint8 of (nx, ny, nz, 4), got {field.shape}")
@@ -50,7 +50,7 @@ def x_fastest(field: "np.typing.NDArray[np.generic]") -> bytes:
 
 
 def pack(content: Content) -> tuple[bytes, Asset]:
-    """The bytes, and what they are called; OSError if a file cannot be read."""
+    """Returns the bytes and their asset. Raises OSError if a file cannot be read."""
     shape, dtype = None, None
     if isinstance(content, (bytes, bytearray, memoryview)):
         data = bytes(content)

@@ -1,4 +1,4 @@
-"""A connection as far as nothing blocks: drawing, layers, commits. connection.py and aio.py add what waits."""
+"""The non-blocking part of a connection: drawing, layers, commits. connection.py and aio.py add the calls that wait."""
 from __future__ import annotations
 
 import atexit
@@ -32,7 +32,7 @@ log = logging.getLogger("voxeld")
 
 DEFAULT_LAYER = "main"
 
-# What a call comes to, once its turn has come: by then it is known what there is.
+# Makes a call's operations when its turn has come, because only then the existing pieces are known.
 Step = Callable[[Draft], Sequence[operations.Operation]]
 
 
@@ -42,7 +42,7 @@ class _Batch:
         self.steps: list[Step] = []
 
 
-# Of this thread or task, the innermost last. A task that is made within a batch draws in it while that lasts.
+# Batches of this thread or task, the innermost last. A task that is created within a batch draws in it while it lasts.
 _batches: ContextVar[tuple[_Batch, ...]] = ContextVar("voxeld_batches", default=())
 
 _transports: set[Transport] = set()
@@ -56,7 +56,7 @@ def _close_all() -> None:
 
 def settings(name: Optional[str], flow: str, keep_frames: int, on_disconnect: Union[str, float], strict: bool,
              outcomes: bool, buffer_bytes: int, owner_token: bytes, resume_token: bytes) -> Settings:
-    """Checked."""
+    """Returns the settings, after checking them."""
     if flow not in FLOWS:
         raise InvalidValue(f"flow is {flow!r}; give one of {', '.join(map(repr, FLOWS))}")
     if not (isinstance(keep_frames, int) and keep_frames >= 1):
@@ -72,10 +72,10 @@ def settings(name: Optional[str], flow: str, keep_frames: int, on_disconnect: Un
 
 
 class BaseConnection(Draw[Handle]):
-    """What is drawn on the connection itself lands in the layer "main".
+    """Drawing calls on the connection itself draw in the layer "main".
 
     Any thread may draw. Autocommit: outside of `with v.batch()`, every call is a commit of its own (a frame or an object
-    is one call, made at the end of its `with`). With `autocommit` off nothing takes effect until commit().
+    counts as one call, made at the end of its `with`). With `autocommit` off nothing takes effect until commit().
     """
 
     def __init__(self, server: Optional[str], options: Settings, autocommit: bool, when_full: str,
@@ -93,7 +93,7 @@ class BaseConnection(Draw[Handle]):
         self._transport = Transport(self.server, who, self._session, on_issue or (lambda issue: log.warning("%s", issue)))
         self._queries = Queries(self.server, who)
         _transports.add(self._transport)
-        # Its threads would go on without it, and what it drew stay lit.
+        # Otherwise its threads would continue, and its drawings would stay visible.
         self._abandoned = weakref.finalize(self, _abandon, self._transport, self._queries)
         self._abandoned.atexit = False
 
@@ -116,7 +116,7 @@ class BaseConnection(Draw[Handle]):
               order: Optional[int] = None, blend: Optional[str] = None, transform: Optional[npt.ArrayLike] = None,
               clip: Optional[Sequence[ClipPart]] = None,
               region: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None, mask: Optional[str] = None) -> Layer:
-        """The layer of that name, to draw in; it is made when it is first drawn in or set. See Layer.set()."""
+        """Returns the layer of that name, to draw in; it is created when first drawn in or set. See Layer.set()."""
         layer = Layer(self, name)
         given = (visible, opacity, order, blend, transform, clip, region, mask)
         if any(value is not None for value in given):
@@ -125,7 +125,7 @@ class BaseConnection(Draw[Handle]):
         return layer
 
     def frame(self, layer: str = DEFAULT_LAYER, *, present_in: Optional[float] = None, must_show: bool = False) -> FrameBlock:
-        """`with v.frame("layer") as f: f.points(…)`: replaces what the layer held, whole."""
+        """`with v.frame("layer") as f: f.points(…)`: replaces everything that the layer held."""
         return FrameBlock(self, layer, present_in, must_show)
 
     def object(self, name: str) -> ObjectBlock:
@@ -133,11 +133,11 @@ class BaseConnection(Draw[Handle]):
         return ObjectBlock(self, name)
 
     def remove_object(self, name: str, *, cascade: bool = False) -> Optional[Frame]:
-        """`cascade`: its instances too; else having some is an issue."""
+        """`cascade` removes the object's instances too; otherwise existing instances are an issue."""
         return self._stage_ready([operations.undefine(checked_name(name, "object"), cascade)])
 
     def clear(self, layer: Optional[str] = None) -> Optional[Frame]:
-        """Takes out everything of this connection's, or of one layer."""
+        """Removes everything of this connection, or of one layer."""
         clear = operations.clear_all() if layer is None else operations.clear_layer(layer)
 
         def step(draft: Draft) -> Sequence[operations.Operation]:
@@ -150,8 +150,9 @@ class BaseConnection(Draw[Handle]):
 
     @contextmanager
     def batch(self, *, present_in: Optional[float] = None, must_show: bool = False) -> Iterator[list[Frame]]:
-        """The calls within, of this thread or asyncio task, take effect together, at the end: one commit, whose Frame is then
-        in the list that the `with` gives. If the block raises, none does. Inside another batch it is part of that one."""
+        """The calls inside, of this thread or asyncio task, take effect together at the end, as one commit, whose Frame is
+        then in the list that the `with` yields. If the block raises, none takes effect. Inside another batch it becomes part
+        of that one."""
         if self._batched() is not None:
             yield []
             return
@@ -175,10 +176,10 @@ class BaseConnection(Draw[Handle]):
 
     def commit(self, *, present_in: Optional[float] = None, present_at_ns: int = 0, must_show: bool = False,
                durable: bool = False) -> Frame:
-        """Everything drawn since the last one takes effect together. Without anything drawn it tells when all that came
-        before has been shown. `present_in`: seconds from now until it is to be shown; `present_at_ns`: when, by the
-        server's monotonic clock. `must_show`: later commits wait until the displays have shown this one. `durable`:
-        frame.wait_durable() tells when it is on the server's disk."""
+        """Commits everything drawn since the last commit; it takes effect together. If nothing was drawn, the Frame reports
+        when all earlier commits have been shown. `present_in`: seconds from now until it should be shown; `present_at_ns`:
+        when, by the server's monotonic clock. `must_show`: later commits wait until the displays have shown this one.
+        `durable`: frame.wait_durable() then waits until it is on the server's disk."""
         if self._batched() is not None:
             raise InvalidValue("commit() within v.batch(): a batch is committed at its end")
         with self._staging:
@@ -242,7 +243,7 @@ class BaseConnection(Draw[Handle]):
     def _remove(self, layer: str, name: str) -> Optional[Frame]:
         return self._stage(lambda draft: [operations.delete_id(layer, id) for id in draft.remove(layer, name)])
 
-    # ------------------------------------------------------------------------------------------------- what is so
+    # ------------------------------------------------------------------------------------------------------- state
 
     @property
     def connected(self) -> bool:
@@ -250,30 +251,30 @@ class BaseConnection(Draw[Handle]):
 
     @property
     def info(self) -> pb.Opened:
-        """What the server said when the stream was opened: session, displays, limits."""
+        """The server's description from when the stream was opened: session, displays, limits."""
         if self._session.info is None:
             raise VoxelError(f"not connected to {self.server} yet")
         return self._session.info
 
     @property
     def resume_token(self) -> bytes:
-        """By which connect() can take up this session after this process. Each new stream has a new one."""
+        """Token with which connect() can resume this session after this process has ended. Each new stream has a new one."""
         return self._session.resume_token
 
     @property
     def owner_token(self) -> bytes:
-        """By which other connections may share this one's objects."""
+        """Token with which other connections can share this one's objects."""
         return self.info.owner_token
 
     @property
     def issues(self) -> list[Issue]:
-        """The last 100."""
+        """The last 100 issues."""
         return list(self._session.book.recent_issues)
 
     @property
     def counts(self) -> dict[str, int]:
-        """Sums since connect(): commits and what became of them, what was dropped here (client_drops) and there
-        (server_drops), and what waits."""
+        """Totals since connect(): commits and their outcomes, drops by the client (client_drops) and by the server
+        (server_drops), and what is waiting."""
         with self._transport.lock:
             session = self._session
             return {**session.book.counts, "client_drops": session.outbox.dropped_frames,
@@ -282,7 +283,8 @@ class BaseConnection(Draw[Handle]):
                     "resumed": session.resumed, "restored": session.restored}
 
     def server_time_ns(self) -> int:
-        """The server's monotonic clock, now, by the last pings. VoxelError before the first answer."""
+        """Returns the current time of the server's monotonic clock, by the last pings. Raises VoxelError before the first
+        answer."""
         now = time.monotonic_ns()
         with self._transport.lock:
             offset = self._session.clock.offset_ns(now)
@@ -292,12 +294,12 @@ class BaseConnection(Draw[Handle]):
 
     @property
     def clock_error_ns(self) -> Optional[int]:
-        """server_time_ns() is right to ± this; None: not known."""
+        """server_time_ns() is accurate to ± this; None: unknown."""
         with self._transport.lock:
             return self._session.clock.error_ns(time.monotonic_ns())
 
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, Any]:
-        """For notebooks: what the first display shows."""
+        """Shows the first display's volume in notebooks."""
         bundle: dict[str, Any] = {"text/plain": repr(self)}
         try:
             bundle["image/png"] = picture.png(self._queries.capture(timeout=5.0).picture())
@@ -311,7 +313,7 @@ def _all(steps: Sequence[Step], draft: Draft) -> Sequence[operations.Operation]:
 
 
 def _abandon(transport: Transport, queries: Queries) -> None:
-    # On any thread, in the middle of anything; perhaps while the program ends, when all are closed already.
+    # Runs on any thread at any time; perhaps at interpreter exit, when all connections are closed already.
     def closed() -> None:
         queries.close()
         _transports.discard(transport)

@@ -1,4 +1,4 @@
-"""The thread on which users' own functions run, so that whatever they do holds up neither drawing nor the stream."""
+"""The thread that runs users' callbacks, so that they delay neither drawing nor the stream."""
 from __future__ import annotations
 
 import logging
@@ -12,14 +12,14 @@ from .receipts import Frame, Issue, resolve
 
 log = logging.getLogger("voxeld")
 
-# Issues that wait to be told; beyond, the newest are left out, and how many is said.
+# Limit of issues that wait for delivery; beyond it the newest are dropped, and their number is reported.
 MOST_ISSUES = 10_000
-# The thread ends when it has had nothing to do for so long.
+# The thread ends after it has been idle for this long.
 IDLE_S = 2.0
 
 
 class Callbacks:
-    """Of any thread; nothing here waits but drain()."""
+    """Thread-safe; only drain() blocks."""
 
     def __init__(self, on_issue: Callable[[Issue], None]) -> None:
         self._on_issue = on_issue
@@ -44,7 +44,7 @@ class Callbacks:
             self._put(lambda: resolve(future, frame))
 
     def drain(self, timeout: float) -> None:
-        """Until all has been told, within `timeout`; at once on the thread itself."""
+        """Waits at most `timeout` until everything has been delivered; returns at once on the callback thread itself."""
         with self._changed:
             if threading.current_thread() is not self._thread:
                 self._changed.wait_for(lambda: not self._waiting and not self._busy, timeout)

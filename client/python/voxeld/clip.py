@@ -1,4 +1,4 @@
-"""What a layer is cut to: parts of the scene, of which only what lies in all of them is drawn."""
+"""The clip of a layer: parts of the scene; only content inside all of them is drawn."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class ClipBox:
 
 @dataclass(frozen=True)
 class ClipCylinder:
-    """Round, from `start` to `end`, its ends flat; the radius is greater than 0."""
+    """A cylinder from `start` to `end` with flat ends; the radius is greater than 0."""
 
     start: npt.ArrayLike
     end: npt.ArrayLike
@@ -62,7 +62,7 @@ def _add(part: ClipPart, clip: pb.Clip) -> None:
 
 
 def to_wire(parts: Sequence[ClipPart]) -> pb.Clip:
-    """Without parts the layer is cut to nothing any more."""
+    """Returns the parts as a message. Without parts it removes the layer's clip."""
     clip = pb.Clip()
     for part in parts:
         _add(part, clip)

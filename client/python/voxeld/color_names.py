@@ -1,4 +1,4 @@
-"""The names of colours: CSS's 148, and matplotlib's tab: palette with its letters; and of colour maps."""
+"""The names of colours (CSS's 148, and matplotlib's tab: palette with its letters) and of colour maps."""
 from __future__ import annotations
 
 import functools
@@ -45,14 +45,14 @@ NAMES: dict[str, int] = {name: int(value, 16) for name, value in zip(_words[::2]
 
 @functools.cache
 def maps() -> dict[str, tuple[int, ...]]:
-    """The colour maps by name, as the server has them: colours at even distances from 0 to 1; between them they run straight."""
+    """Returns the server's colour maps by name: colours evenly spaced from 0 to 1, with linear interpolation between them."""
     text = importlib.resources.files(__package__).joinpath("colormaps.txt").read_text()
     lines = (line.split() for line in text.splitlines() if line and not line.startswith("#"))
     return {name: tuple(int(color, 16) for color in colors) for name, *colors in lines}
 
 
 def map_named(name: str) -> Optional[tuple[int, ...]]:
-    """A colour map, turned round with "_r" behind its name; None: there is none of that name."""
+    """Returns a colour map, reversed if "_r" is appended to its name; None if the name is unknown."""
     if name.endswith("_r"):
         turned = maps().get(name[:-2])
         return turned[::-1] if turned is not None else None

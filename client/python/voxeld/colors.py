@@ -1,8 +1,8 @@
-"""Colours: one for all, or one each.
+"""Colours: one for all elements, or one for each.
 
 One colour is a name ("orange", "tab:orange"), a hex code ("#f80", "#ff8800"), or three or four numbers: floats from 0 to 1
-or whole numbers from 0 to 255. Many are an (n, 3) or (n, 4) array, uint8 or floats from 0 to 1, or a list of names. With a
-map, n numbers are a colour each. A fourth number is ignored: there is no transparency below a layer's.
+or integers from 0 to 255. Many colours are an (n, 3) or (n, 4) array, uint8 or floats from 0 to 1, or a list of names. A colour
+map turns n numbers into n colours. A fourth number is ignored: only layers have transparency.
 """
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ Rgb = int  # 0xRRGGBB
 
 @dataclass(frozen=True)
 class Gradient:
-    """Colours along a direction, in place of one: how far a place is along it, (p · along) / |along|², from `low` to `high`
-    (by default from the least to the greatest that there are). `cmap`: a map's name, or 2 to 256 colours, evenly apart."""
+    """Colours along a direction, in place of one colour: the position along it, (p · along) / |along|², from `low` to `high`
+    (default: the least and the greatest present). `cmap`: a map's name, or 2 to 256 evenly spaced colours."""
 
     cmap: Union[str, Sequence[Any]] = "viridis"
     along: Sequence[float] = (0, 0, 1)
@@ -43,7 +43,7 @@ class Gradient:
         return scale
 
     def of(self, positions: Array) -> npt.NDArray[np.uint8]:
-        """Of each place."""
+        """Returns a colour for each position."""
         direction = np.array(vector(self.along, "along"), np.float64)
         if not direction.any():
             raise InvalidColor("a gradient's along is 0; give a direction")
@@ -73,7 +73,7 @@ def _from_text(text: str) -> Rgb:
 
 
 def _bytes_of(array: Array, what: str) -> npt.NDArray[np.uint8]:
-    """Channels as uint8, from uint8, other whole numbers from 0 to 255 or floats from 0 to 1."""
+    """Returns channels as uint8, from uint8, other integers from 0 to 255 or floats from 0 to 1."""
     if array.dtype == np.uint8:
         return array
     if array.dtype.kind in "iu":
@@ -91,7 +91,7 @@ def _bytes_of(array: Array, what: str) -> npt.NDArray[np.uint8]:
 
 
 def one(value: Colors, what: str = "color") -> Rgb:
-    """One colour."""
+    """Returns one colour."""
     if isinstance(value, Gradient):
         raise InvalidColor(f"{what} is a gradient; one colour is right here")
     if isinstance(value, str):
@@ -106,20 +106,20 @@ def one(value: Colors, what: str = "color") -> Rgb:
 
 
 def rgb_of(colors: Sequence[Rgb]) -> npt.NDArray[np.uint8]:
-    """(n, 3) of colours as numbers."""
+    """Returns colours, given as numbers, as an (n, 3) array."""
     words = np.array(colors, dtype=np.uint32)
     result: npt.NDArray[np.uint8] = np.stack([words >> 16 & 255, words >> 8 & 255, words & 255], axis=-1).astype(np.uint8)
     return result
 
 
 def along(value: Optional[Colors], positions: Array) -> Optional[Colors]:
-    """What a gradient makes of places; all else as it is."""
+    """Applies a gradient to the positions; returns any other value unchanged."""
     return value.of(positions) if isinstance(value, Gradient) else value
 
 
 def mapped(values: npt.ArrayLike, cmap: Union[str, Sequence[Any]], low: Optional[float] = None,
            high: Optional[float] = None) -> npt.NDArray[np.uint8]:
-    """A colour for each number: `low` (default: the least) is the map's first, `high` its last."""
+    """Returns a colour for each number: `low` (default: the least) maps to the map's first colour, `high` to its last."""
     if isinstance(cmap, str):
         named = map_named(cmap)
         if named is None:
@@ -153,15 +153,15 @@ def _map_hint(wrong: str) -> str:
 
 
 def numbers_each(value: Optional[Colors]) -> bool:
-    """Whether it is one number for each of many vertices, which only a colour map makes colours of."""
+    """Returns whether `value` is one number per vertex, which needs a colour map."""
     if value is None or isinstance(value, (str, Gradient)) or np.ndim(value) != 1:
         return False
     return isinstance(value, np.ndarray) or (len(value) > 4 and not isinstance(value[0], str))
 
 
 def many(value: Optional[Colors], count: int, cmap: Optional[str] = None, of: str = "vertices") -> Union[None, Rgb, Array]:
-    """None (the default colour), one colour, or a C-contiguous (count, 3) or (count, 4) uint8 array. Such an array is
-    taken without a copy. `of`: what they are the colours of."""
+    """Returns None (the default colour), one colour, or a C-contiguous (count, 3) or (count, 4) uint8 array. Such an array is
+    not copied. `of`: what has the colours, for error messages."""
     if value is None:
         if cmap is not None:
             raise InvalidColor(f"cmap is {cmap!r}, but there are no colors to map; give one number for each of {count}")

@@ -1,4 +1,4 @@
-"""connect(), and the calls that wait when asked to."""
+"""connect(), and the calls that can block."""
 from __future__ import annotations
 
 from types import TracebackType
@@ -14,7 +14,7 @@ from .v1 import display_pb2, scene_pb2
 from .volumes import Volume
 
 class Connection(BaseConnection):
-    """Drawing never waits; what is below does."""
+    """Drawing never waits; the calls below do."""
 
     def __enter__(self) -> "Connection":
         return self
@@ -24,19 +24,19 @@ class Connection(BaseConnection):
         self.close()
 
     def wait_connected(self, timeout: Optional[float] = None) -> None:
-        """Raises ConnectionLost if nobody answers within `timeout`."""
+        """Raises ConnectionLost if no server answers within `timeout`."""
         if not self._transport.wait_until(lambda: self._session.open, timeout):
             raise ConnectionLost(self._transport.last_error or f"no voxeld answered at {self.server} in {timeout} s")
 
     def flush(self, timeout: Optional[float] = None) -> None:
-        """Until everything drawn so far has been sent. TimeoutError if it was not. What became of it is not told here: not that
-        the server refused it, nor that it was too large to be sent (max_message_bytes); frame.wait() and wait_shown() raise
-        CommitRefused then."""
+        """Waits until everything drawn so far has been sent; raises TimeoutError otherwise. It does not report outcomes:
+        neither that the server refused a commit, nor that one was too large to be sent (max_message_bytes); frame.wait() and
+        wait_shown() raise CommitRefused then."""
         if not self._transport.wait_until(self._session.idle, timeout):
             raise TimeoutError(f"after {timeout} s {self.counts['waiting_commits']} commits still wait to be sent")
 
     def close(self, timeout: float = 5.0) -> None:
-        """Sends what waits, within `timeout`, and ends the session; what becomes of its layers is `on_disconnect`."""
+        """Sends what is waiting, within `timeout`, and ends the session; `on_disconnect` decides what happens to its layers."""
         self._close(timeout)
 
     def displays(self, timeout: Optional[float] = 5.0) -> list[display_pb2.DisplayDescription]:
@@ -46,27 +46,27 @@ class Connection(BaseConnection):
         return self._queries.stats(timeout)
 
     def capture(self, display: str = "", *, at_least_snapshot: int = 0, timeout: float = 10.0) -> Volume:
-        """The next volume that a display shows (default: the first display), as an eye would see it; with
-        `at_least_snapshot` (Accepted.snapshot) one that has that commit in it."""
+        """Returns the next volume that a display shows (default: the first display), as an eye would see it; with
+        `at_least_snapshot` (Accepted.snapshot) one that contains that commit."""
         return self._queries.capture(display, at_least_snapshot, timeout)
 
     def entities(self, layer: str = "", prefix: str = "", owner: int = 0,
                  timeout: Optional[float] = 5.0) -> list[scene_pb2.EntityInfo]:
-        """What is in the scene, of everybody unless `owner` is given."""
+        """Returns the scene's entities, of all owners unless `owner` is given."""
         return self._queries.entities(layer, prefix, owner, timeout)
 
     def layers(self, owner: int = 0, timeout: Optional[float] = 5.0) -> list[scene_pb2.LayerInfo]:
         return self._queries.layers(owner, timeout)
 
     def upload(self, content: Content, progress: Optional[Callable[[int, int], None]] = None, *, patience: float = 15.0) -> Asset:
-        """Brings a file (its path or its bytes) or an array of samples to the server, unless it has that already; shapes name it
-        from then on. What breaks off goes on, unless nothing more is there after `patience` seconds. `progress(sent, size)` after
-        each piece."""
+        """Uploads a file (its path or its bytes) or an array of samples to the server, unless it is stored already; from then
+        on shapes can name it. An interrupted upload continues, unless there is no progress for `patience` seconds. Calls
+        `progress(sent, size)` after each piece."""
         return self._queries.upload(content, progress, patience)
 
     def watch_scene(self, layer: str = "", owner: int = 0, *, contents: bool = False,
                     timeout: Optional[float] = None) -> Watch:
-        """The scene's changes as they come; the first has all there is. Its close() ends it."""
+        """Returns the scene's changes as they come; the first holds the whole scene. Its close() ends the call."""
         return self._queries.watch(layer, owner, contents, timeout)
 
 
@@ -76,21 +76,21 @@ def connect(server: Optional[str] = None, *, name: Optional[str] = None, timeout
             buffer_bytes: int = 256 << 20, when_full: str = "raise", owner_token: bytes = b"", resume_token: bytes = b"",
             on_issue: Optional[Callable[[Issue], None]] = None,
             credentials: Optional[Credentials] = None) -> Connection:
-    """Connects to voxeld at `server`, HOST:PORT, tls:HOST:PORT or unix:PATH; by default where voxelctl looks.
+    """Connects to voxeld at `server`, HOST:PORT, tls:HOST:PORT or unix:PATH; the default is where voxelctl looks.
 
-    wait           until the server has answered, at most `timeout` seconds; else it is tried in the background
-    flow           which frames are given up when they come faster than they go: "reliable" none, "latest" all but the
-                   newest of each layer, "drop_oldest" all but the `keep_frames` newest. What is retained always waits
-    on_disconnect  what becomes of the layers: "clear", "keep", or for how many seconds they linger
+    wait           wait at most `timeout` seconds for the server's answer; else connect in the background
+    flow           which frames are dropped when they come faster than they can be sent: "reliable" none, "latest" all but
+                   the newest of each layer, "drop_oldest" all but the `keep_frames` newest. Retained operations always wait
+    on_disconnect  what happens to the layers: "clear", "keep", or for how many seconds they linger
     strict         one refused operation refuses its whole commit
-    outcomes       whether displays' outcomes are wanted, beside whether commits were accepted
-    buffer_bytes   how much may wait to be sent, and when_full what a call does when it is too much: "raise" or "wait"
-    owner_token    joins that owner; resume_token takes up that session, if the server knows it still
-    credentials    who you are, and whom you trust; by default what the environment says (voxeld.Credentials)
+    outcomes       whether to receive displays' outcomes, besides whether commits were accepted
+    buffer_bytes   how much may wait to be sent; when_full what a call does when that is exceeded: "raise" or "wait"
+    owner_token    joins that owner; resume_token resumes that session, if the server still has it
+    credentials    your identity, and the authorities that you trust; default: the environment's (voxeld.Credentials)
     on_issue       is called with each refused operation, on a thread of its own; by default it is logged ("voxeld")
 
-    A lost connection is tried again for ever, at growing intervals; the session is resumed, or the scene sent anew. It is
-    closed by close(), at the end of a `with`, or when nothing holds it or one of its handles any more.
+    A lost connection is reopened without limit, at growing intervals; the session is resumed, or the scene sent again. The
+    connection ends with close(), at the end of a `with`, or when nothing refers to it or one of its handles.
     """
     options = settings(name, flow, keep_frames, on_disconnect, strict, outcomes, buffer_bytes, owner_token, resume_token)
     connection = Connection(server, options, autocommit, when_full, on_issue, credentials)

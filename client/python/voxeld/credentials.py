@@ -1,4 +1,4 @@
-"""How a client shows who it is, and knows whom it talks to."""
+"""How a client authenticates itself, and verifies the server."""
 from __future__ import annotations
 
 import os
@@ -15,13 +15,13 @@ Metadata = tuple[tuple[str, str], ...]
 
 @dataclass(frozen=True)
 class Credentials:
-    """Files are PEM, read when a connection is made.
+    """Files are in PEM format and are read when a connection is made.
 
-    token        a bearer token, sent with every call; `token_file` has it where `token` is empty. Only to addresses of this
-                 machine or over TLS: elsewhere it could be read on its way, which is an error
-    ca           for tls:HOST:PORT: the authorities of the server's certificate (empty: the system's)
-    certificate  this client's, and its `key`: the server asks for them
-    server_name  that the server's certificate must have, where it is not the address's host
+    token        a bearer token, sent with every call; read from `token_file` if `token` is empty. Sent only to addresses of
+                 this machine or over TLS: elsewhere it could be read in transit, which is an error
+    ca           for tls:HOST:PORT: the certificate authorities for the server's certificate (empty: the system's)
+    certificate  this client's certificate, and its `key`, for servers that require them
+    server_name  the name expected in the server's certificate, if it is not the address's host
     """
     token: str = ""
     token_file: str = ""
@@ -32,7 +32,7 @@ class Credentials:
 
     @classmethod
     def from_environment(cls, environment: Optional[Mapping[str, str]] = None) -> "Credentials":
-        """VOXELD_TOKEN or VOXELD_TOKEN_FILE, VOXELD_TLS_CA, VOXELD_TLS_CERT, VOXELD_TLS_KEY, VOXELD_TLS_NAME."""
+        """Reads VOXELD_TOKEN or VOXELD_TOKEN_FILE, VOXELD_TLS_CA, VOXELD_TLS_CERT, VOXELD_TLS_KEY, VOXELD_TLS_NAME."""
         env = os.environ if environment is None else environment
         return cls(env.get("VOXELD_TOKEN", ""), env.get("VOXELD_TOKEN_FILE", ""), env.get("VOXELD_TLS_CA", ""),
                    env.get("VOXELD_TLS_CERT", ""), env.get("VOXELD_TLS_KEY", ""), env.get("VOXELD_TLS_NAME", ""))
@@ -49,7 +49,7 @@ def _read(what: str, path: str) -> Optional[bytes]:
 
 
 def metadata(server: str, credentials: Credentials) -> Metadata:
-    """What every call carries."""
+    """Returns the metadata of every call."""
     token = credentials.token or (_read("token_file", credentials.token_file) or b"").decode("utf-8", "replace").strip()
     if not token:
         return ()
@@ -62,7 +62,7 @@ def metadata(server: str, credentials: Credentials) -> Metadata:
 
 
 def open_channel(server: str, credentials: Credentials, options: Sequence[tuple[str, int]]) -> grpc.Channel:
-    """A channel to the address; the caller closes it."""
+    """Opens a channel to the address; the caller closes it."""
     target = address.target(server)
     if not address.is_tls(server):
         return grpc.insecure_channel(target, options=list(options))

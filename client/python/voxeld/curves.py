@@ -1,4 +1,4 @@
-"""Lines that bend, surfaces of Bézier patches, arrows and text, as wire bytes."""
+"""Encodes curves, surfaces of Bézier patches, arrows and text as wire bytes."""
 from __future__ import annotations
 
 from typing import Any, Optional
@@ -88,7 +88,7 @@ def helix(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, turns: float,
 
 def bezier_surface(patches: npt.ArrayLike, *, colors: Color = None, rule: str = "thin",
                    fill: str = "surface", shell: Optional[float] = None, unit: str = "voxels") -> list[wire.Packed]:
-    """`patches`: (4, 4, 3), or (n, 4, 4, 3)."""
+    """`patches` has the shape (4, 4, 3) or (n, 4, 4, 3)."""
     field = as_array(patches, "patches")
     if field.ndim not in (3, 4) or field.shape[-3:] != (4, 4, 3):
         raise InvalidArray(f"patches must be of shape (4, 4, 3) or (n, 4, 4, 3), got {field.shape}")

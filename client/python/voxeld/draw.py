@@ -1,4 +1,4 @@
-"""The drawing calls, alike wherever something can be drawn: the connection, a layer, a frame, an object."""
+"""The drawing calls, the same for a connection, a layer, a frame and an object."""
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Optional
@@ -25,12 +25,12 @@ def checked_name(name: str, what: str) -> str:
 
 @named
 class Draw(DrawCurves[Drawn]):
-    """Each call puts up one thing under a name; the same name again replaces it. All take `transform` (4×4 or 3×4),
-    `priority` (0 to 126, the higher wins within its layer), `erase` (takes away what is of lower or equal priority),
-    `lifetime` in seconds and `label`, a text for people. Arguments are checked before anything is sent; arrays may be
-    changed again as soon as the call is back."""
+    """Each call draws one thing under a name; another call with that name replaces it. All take `transform` (4×4 or 3×4),
+    `priority` (0 to 126, the higher wins within its layer), `erase` (removes content of lower or equal priority), `lifetime`
+    in seconds and `label`, a text for people. Arguments are checked before anything is sent; arrays may be changed again as
+    soon as the call returns."""
 
-    if not TYPE_CHECKING:  # a checker is to see what is not there
+    if not TYPE_CHECKING:  # hide the fallback from type checkers, so that they report unknown names
         def __getattr__(self, name: str) -> Any:
             raise no_call(self, name)
 
@@ -38,8 +38,8 @@ class Draw(DrawCurves[Drawn]):
                width: Optional[float] = None, unit: str = "voxels", splat: str = "ball",
                transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
                lifetime: Optional[float] = None, label: str = "") -> Drawn:
-        """A cloud, (n, 3). `width`: each point's diameter, in "voxels" or "units"; by default one voxel. Thick points are a
-        "ball", a "soft" one, which fades out, or a "cube"; a "cell" is what `voxels` draws."""
+        """Draws a cloud, (n, 3). `width`: each point's diameter, in "voxels" or "units"; by default one voxel. Thick points
+        are a "ball", a "soft" one, which fades out, or a "cube"; "cell" draws as `voxels` does."""
         return self._draw(name, shapes.points, (positions,),
                           dict(colors=colors, cmap=cmap, width=width, unit=unit, splat=splat),
                           Look.of(transform, priority, erase, lifetime, label))
@@ -47,8 +47,8 @@ class Draw(DrawCurves[Drawn]):
     def voxels(self, name: str, cells: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[str] = None,
                transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
                lifetime: Optional[float] = None, label: str = "") -> Drawn:
-        """A sparse list of voxels with a lattice of their own, (n, 3) whole numbers: each is the cube of 1 unit from (x, y, z)
-        on, under `transform`; side by side they leave no gaps."""
+        """Draws a sparse list of voxels on a lattice of its own, (n, 3) integers: each is the cube of 1 unit from (x, y, z)
+        on, under `transform`; neighbouring cells leave no gaps."""
         return self._draw(name, shapes.points, (cells,), dict(colors=colors, cmap=cmap, splat="cell"),
                           Look.of(transform, priority, erase, lifetime, label))
 
@@ -56,8 +56,8 @@ class Draw(DrawCurves[Drawn]):
               segment_colors: Optional[Colors] = None, mode: Optional[str] = None, width: Optional[float] = None, unit: str = "voxels", sampling: str = "thin",
               transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
               lifetime: Optional[float] = None, label: str = "") -> Drawn:
-        """(n, 3): a "strip", a "loop" or "pairs"; or (m, k, 3): m strips (or loops) of k vertices each. Colours run from
-        vertex to vertex; or each segment has its own, `segment_colors`."""
+        """Draws (n, 3) as a "strip", a "loop" or "pairs"; or (m, k, 3) as m strips (or loops) of k vertices each. Colours are
+        interpolated between vertices; or each segment has its own, `segment_colors`."""
         return self._draw(name, shapes.lines, (positions,),
                           dict(colors=colors, cmap=cmap, segment_colors=segment_colors, mode=mode, width=width, unit=unit, sampling=sampling),
                           Look.of(transform, priority, erase, lifetime, label))
@@ -68,11 +68,11 @@ class Draw(DrawCurves[Drawn]):
              shell: Optional[float] = None, unit: str = "voxels",
              transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
              lifetime: Optional[float] = None, label: str = "") -> Drawn:
-        """Triangles: `faces` are (m, 3) indices; without them vertices count three by three. `rule`: "thin" or "cover".
-        `fill`: "surface", "lines", "dots" or "solid": what a closed mesh encloses, in one colour. `texture` is a PNG or
-        JPEG file's path or bytes, which multiplies colours, `uv` (n, 2) where vertices are on it: from (0, 0), its upper
-        left corner, to (1, 1); beyond it repeats. `face_colors`, in place of `colors`: of each triangle.
-        `shell`: how thick the surface is, in "voxels" or "units"."""
+        """Draws triangles: `faces` are (m, 3) indices; without them, vertices are used three by three. `rule`: "thin" or
+        "cover". `fill`: "surface", "lines", "dots" or "solid": the inside of a closed mesh, in one colour. `texture` is a PNG
+        or JPEG file's path or bytes, which multiplies colours; `uv` (n, 2) are the vertices' places on it: from (0, 0), its
+        upper left corner, to (1, 1); beyond it repeats. `face_colors`, in place of `colors`: one per triangle. `shell`:
+        thickness of the surface, in "voxels" or "units"."""
         return self._draw(name, shapes.mesh, (vertices, faces),
                           dict(colors=colors, cmap=cmap, face_colors=face_colors, texture=texture, uv=uv, rule=rule, fill=fill,
                                shell=shell, unit=unit), Look.of(transform, priority, erase, lifetime, label))
@@ -81,7 +81,8 @@ class Draw(DrawCurves[Drawn]):
             fill: str = "surface", rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels",
             transform: Optional[npt.ArrayLike] = None, priority: int = 0,
             erase: bool = False, lifetime: Optional[float] = None, label: str = "") -> Drawn:
-        """`size`: three edge lengths or one. `fill`: "surface", "solid", "lines" or "dots". `shell`: its thickness."""
+        """Draws a box. `size`: three edge lengths or one. `fill`: "surface", "solid", "lines" or "dots". `shell`: the
+        surface's thickness."""
         return self._draw(name, shapes.box, (center, size), dict(color=color, fill=fill, rule=rule, shell=shell, unit=unit),
                           Look.of(transform, priority, erase, lifetime, label))
 
@@ -89,7 +90,8 @@ class Draw(DrawCurves[Drawn]):
                fill: str = "surface", rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels",
             transform: Optional[npt.ArrayLike] = None, priority: int = 0,
                erase: bool = False, lifetime: Optional[float] = None, label: str = "") -> Drawn:
-        """An ellipsoid under a transform. `fill`: "surface", "solid", "lines" or "dots". `shell`: its thickness."""
+        """Draws a sphere; under a transform, an ellipsoid. `fill`: "surface", "solid", "lines" or "dots". `shell`: the
+        surface's thickness."""
         return self._draw(name, shapes.sphere, (center, radius), dict(color=color, fill=fill, rule=rule, shell=shell, unit=unit),
                           Look.of(transform, priority, erase, lifetime, label))
 
@@ -97,7 +99,7 @@ class Draw(DrawCurves[Drawn]):
                  color: Optional[Colors] = None, fill: str = "surface", rule: str = "thin",
                  shell: Optional[float] = None, unit: str = "voxels", transform: Optional[npt.ArrayLike] = None, priority: int = 0, erase: bool = False,
                  lifetime: Optional[float] = None, label: str = "") -> Drawn:
-        """Along z, centred. `fill`: "surface", "solid", "lines" or "dots". `shell`: its thickness."""
+        """Draws a cylinder along z, centred. `fill`: "surface", "solid", "lines" or "dots". `shell`: the surface's thickness."""
         return self._draw(name, shapes.cylinder, (center, radius, height), dict(color=color, fill=fill, rule=rule, shell=shell, unit=unit),
                           Look.of(transform, priority, erase, lifetime, label))
 
@@ -105,16 +107,16 @@ class Draw(DrawCurves[Drawn]):
                low: Optional[float] = None, high: Optional[float] = None,
                extent: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None, transform: Optional[npt.ArrayLike] = None,
                priority: int = 0, erase: bool = False, lifetime: Optional[float] = None, label: str = "") -> Drawn:
-        """A field, (nx, ny, nz) of numbers or (nx, ny, nz, 3) of colours, drawn as points at the centres of its cells:
-        those above `threshold` (default: half-way from least to greatest; of colours the brightest channel, 0 to 1).
-        Numbers are coloured by `cmap` from `low` to `high`. `extent`: the field's two corners; by default it fills [-1, 1]
-        on its longest axis. A field coarser than the display leaves gaps between its points."""
+        """Draws a field, (nx, ny, nz) numbers or (nx, ny, nz, 3) colours, as points at the centres of its cells: those above
+        `threshold` (default: half-way from least to greatest; for colours the brightest channel, 0 to 1). Numbers are coloured
+        by `cmap` from `low` to `high`. `extent`: the field's two corners; by default it fills [-1, 1] on its longest axis. A
+        field coarser than the display leaves gaps between its points."""
         return self._draw(name, shapes.volume, (array,),
                           dict(threshold=threshold, cmap=cmap, low=low, high=high, extent=extent),
                           Look.of(transform, priority, erase, lifetime, label))
 
     def instance(self, name: str, of: str, *, color: Optional[Colors] = None, tint: Optional[Colors] = None, transform: Optional[npt.ArrayLike] = None,
                  priority: int = 0, erase: bool = False, lifetime: Optional[float] = None, label: str = "") -> Drawn:
-        """Draws the object `of` here, its colours multiplied by `tint`."""
+        """Draws the object `of`, with its colours multiplied by `tint`."""
         return self._draw(name, shapes.instance, (checked_name(of, "object"),), dict(color=color, tint=tint),
                           Look.of(transform, priority, erase, lifetime, label))

@@ -1,4 +1,4 @@
-"""What can go wrong, as exceptions. Every message says what was wrong, the value, and what would be right."""
+"""The exceptions of this package. Every message says what was wrong, the value, and what is expected."""
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Sequence
@@ -8,19 +8,19 @@ if TYPE_CHECKING:
 
 
 class VoxelError(Exception):
-    """All of the below."""
+    """The base class of all exceptions below."""
 
 
 class InvalidArray(VoxelError, ValueError):
-    """An array's shape, element type or values."""
+    """An invalid shape, element type or value of an array."""
 
 
 class InvalidColor(VoxelError, ValueError):
-    """A colour that is none."""
+    """An invalid colour."""
 
 
 class InvalidValue(VoxelError, ValueError):
-    """Any other argument."""
+    """Any other invalid argument."""
 
 
 class InvalidOption(InvalidValue, TypeError):
@@ -28,11 +28,11 @@ class InvalidOption(InvalidValue, TypeError):
 
 
 class ConnectionLost(VoxelError, ConnectionError):
-    """There is no connection, and none will come; or what was sent on it is lost."""
+    """The connection failed for good, or something sent on it is lost."""
 
 
 class BufferFull(VoxelError, BufferError):
-    """More waits to be sent than may; nothing of this call was taken."""
+    """Too much is waiting to be sent; nothing of this call was accepted."""
 
 
 class CommitRefused(VoxelError):
@@ -44,7 +44,7 @@ class CommitRefused(VoxelError):
 
 
 class NotDurable(VoxelError):
-    """The commit was carried out, and will not be on the server's disk; `issues` says why."""
+    """The commit was carried out, but will not be on the server's disk; `issues` says why."""
 
     def __init__(self, message: str, issues: Sequence[Issue] = ()) -> None:
         super().__init__(message)
@@ -52,4 +52,4 @@ class NotDurable(VoxelError):
 
 
 class CommitDropped(VoxelError):
-    """The flow policy gave up the commit before it was sent; the connection counts it in `client_drops`."""
+    """The flow policy dropped the commit before it was sent; the connection counts it in `client_drops`."""

@@ -1,4 +1,4 @@
-"""Expressions as they are computed with, in place of text: they become the wire's operations.
+"""Expressions built from Python operators in place of text: they become the wire's operations.
 
     from voxeld.expressions import x, y, z, sin, parameter
     v.implicit("wave", surface=z - parameter("k") * sin(x**2 + y**2), parameters={"k": 0.5})
@@ -18,7 +18,7 @@ Tree = pb.Expression.Tree
 
 
 class Expression:
-    """A number as a function of x, y and z. Immutable; made of others by + − * / ** % abs() and this module's functions."""
+    """A number as a function of x, y and z. Immutable; combined by + − * / ** % abs() and this module's functions."""
 
     __slots__ = ("_names", "_ops", "_values")
 
@@ -156,22 +156,22 @@ def floor(a: Number) -> Expression:
 
 
 def min(a: Number, b: Number) -> Expression:  # noqa: A001
-    """Of shapes: union."""
+    """Returns the lesser; on shapes, the union."""
     return _of(Tree.MIN, a, b)
 
 
 def max(a: Number, b: Number) -> Expression:  # noqa: A001
-    """Of shapes: intersection."""
+    """Returns the greater; on shapes, the intersection."""
     return _of(Tree.MAX, a, b)
 
 
 def difference(a: Number, b: Number) -> Expression:
-    """Of shapes: what is in a and not in b."""
+    """On shapes: what is in a but not in b."""
     return _of(Tree.DIFFERENCE, a, b)
 
 
 def smooth_min(a: Number, b: Number, within: Number) -> Expression:
-    """The lesser, rounded off where the two differ by less than `within`."""
+    """Returns the lesser, rounded off where the two differ by less than `within`."""
     return _of(Tree.SMOOTH_MIN, a, b, within)
 
 

@@ -1,4 +1,4 @@
-"""Volumes and isosurfaces, as wire bytes."""
+"""Encodes volumes and isosurfaces as wire bytes."""
 from __future__ import annotations
 
 from typing import Any, Optional, Sequence, Union, cast
@@ -23,7 +23,7 @@ _TYPES = {np.dtype(np.uint8): pb.ELEMENT_TYPE_U8, np.dtype(np.uint16): pb.ELEMEN
 
 
 def _grid(array: Union[npt.ArrayLike, Asset], extent: Extent, filter: str, colors: bool) -> pb.Grid:
-    """`array`: (nx, ny, nz), or, of colours, (nx, ny, nz, 4); or an asset of one."""
+    """`array` has the shape (nx, ny, nz) or, for colours, (nx, ny, nz, 4); or is an asset of one."""
     asset = array if isinstance(array, Asset) else None
     field: Any = asset if asset is not None else as_array(cast(npt.ArrayLike, array), "array")
     if field.shape is None:

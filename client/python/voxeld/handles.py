@@ -1,4 +1,4 @@
-"""What drawing calls give back, and the places to draw in."""
+"""The handles that drawing calls return, and the layers, frames and objects to draw in."""
 from __future__ import annotations
 
 from types import TracebackType
@@ -28,8 +28,8 @@ _BLENDS = {"over": types_pb2.BLEND_MODE_OVER, "add": types_pb2.BLEND_MODE_ADD, "
 
 
 class Handle:
-    """One thing in the scene. Setting `transform`, update() and remove() each send what changed, and nothing else. What it
-    was made of is kept, for update(); arrays are not copied for that."""
+    """One thing in the scene. Setting `transform`, update() and remove() each send only the change. The arguments of its
+    drawing call are kept for update(); arrays are not copied for that."""
 
     def __init__(self, connection: "BaseConnection", layer: str, name: str, make: Make, args: tuple[Any, ...],
                  options: dict[str, Any], look: Look) -> None:
@@ -50,7 +50,7 @@ class Handle:
 
     @property
     def transform(self) -> Matrix:
-        """4×4. Set it whole; changing the array that this gives does nothing."""
+        """The 4×4 matrix. Assign a new one to change it; changing the returned array has no effect."""
         return transforms.identity() if self._look.transform is None else self._look.transform.copy()
 
     @transform.setter
@@ -60,7 +60,7 @@ class Handle:
         self.frame = self._connection._move(self.layer, self.name, self._look.transform)
 
     def update(self, *args: Any, **changes: Any) -> Optional[Frame]:
-        """Puts it up anew with some arguments changed, as they were named when it was made: h.update(positions),
+        """Draws it again with some arguments changed, named as in the drawing call: h.update(positions),
         h.update(colors="red")."""
         call = self._make.__name__
         if len(args) > len(self._args):
@@ -87,7 +87,7 @@ class Handle:
         return self.frame
 
     def remove(self) -> Optional[Frame]:
-        """Takes it out of the scene. update() would bring it back."""
+        """Removes it from the scene. update() would draw it again."""
         self.frame = self._connection._remove(self.layer, self.name)
         return self.frame
 
@@ -96,7 +96,7 @@ class Handle:
 
 
 class Layer(Draw[Handle]):
-    """Layers are drawn over one another, each with an opacity and a way to blend."""
+    """Layers are drawn over one another, each with an opacity and a blend mode."""
 
     def __init__(self, connection: "BaseConnection", name: str) -> None:
         self._connection = connection
@@ -113,9 +113,9 @@ class Layer(Draw[Handle]):
             clip: Optional[Sequence[clips.ClipPart]] = None,
             region: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None, mask: Optional[str] = None) -> Optional[Frame]:
         """Sets what is given. `opacity`: 0 to 1. `order`: the higher is drawn over the lower. `blend`: "over", "add" or
-        "erase". `clip`: planes (a, b, c, d) that keep a·x + b·y + c·z + d ≥ 0, ClipBox, ClipCylinder: what lies in all
-        of them is drawn. `region`: two corners of a box. `mask`: a layer of yours; only where it covers, seen or not, this
-        one is seen; "": none any more."""
+        "erase". `clip`: planes (a, b, c, d) that keep a·x + b·y + c·z + d ≥ 0, ClipBox, ClipCylinder: only what lies inside
+        all of them is drawn. `region`: two corners of a box. `mask`: a layer of yours; only where it covers, visible or not,
+        this one is visible; "" removes the mask."""
         state = pb.LayerState(layer=self.name)
         if visible is not None:
             state.visible = visible
@@ -156,7 +156,7 @@ def _order(order: int) -> int:
 
 
 def put_parts(layer: str, name: str, shape: Sequence[wire.Packed], look: Look, uses: str = "") -> operations.Puts:
-    """A shape under its name; if it is of several pieces, under an id for each. `uses`: the object that it draws."""
+    """Encodes a shape under its name; if it has several pieces, under an id for each. `uses`: the object that it draws."""
     entity = look.to_bytes()
     return operations.Puts([wire.put(layer, id, entity, one, uses, look.lifetime_ns)
                             for id, one in zip(ids(free_name(name), len(shape)), shape)])
@@ -167,8 +167,8 @@ def _uses(make: Make, args: tuple[Any, ...]) -> str:
 
 
 class FrameBlock(Draw[None]):
-    """Immediate mode: what is drawn in the `with` replaces everything that the layer held, at its end and at once. If the
-    block raises, nothing is sent. Afterwards it is that commit's Frame in all but name."""
+    """Immediate mode: when the `with` ends, everything drawn in it replaces the layer's content at once. If the block raises,
+    nothing is sent. Afterwards it behaves as the Frame of its commit."""
 
     def __init__(self, connection: "BaseConnection", layer: str, present_in: Optional[float], must_show: bool) -> None:
         self._connection = connection
@@ -217,8 +217,8 @@ class FrameBlock(Draw[None]):
 
 
 class ObjectBlock(Draw[None]):
-    """A group that draws nothing itself; instances draw it. What is drawn in the `with` defines it whole. Its parts have
-    no looks of their own but a transform."""
+    """A group that draws nothing itself; instances draw it. The drawing calls in the `with` define the whole object. Its parts
+    have no looks of their own except a transform."""
 
     def __init__(self, connection: "BaseConnection", name: str) -> None:
         self._connection = connection

@@ -1,4 +1,4 @@
-"""What every entity has beside its shape."""
+"""The properties that every entity has besides its shape."""
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ from .v1 import scene_pb2 as pb
 
 @dataclass(frozen=True)
 class Look:
-    """What every entity has beside its shape."""
+    """The properties that every entity has besides its shape."""
 
     transform: Optional[Matrix] = None
     priority: int = 0

@@ -1,4 +1,4 @@
-"""Shapes by their measures, and the general method, as wire bytes."""
+"""Encodes shapes that are defined by measures, and implicit shapes, as wire bytes."""
 from __future__ import annotations
 
 from typing import Any, Mapping, Optional, Sequence, Union, cast
@@ -29,7 +29,7 @@ def _rule(rule: str, shell: Optional[float], unit: str) -> dict[str, Any]:
 
 
 def _curves(curves: Union[npt.ArrayLike, Sequence[npt.ArrayLike]], what: str) -> dict[str, Any]:
-    """One closed curve, (n, 3), or several."""
+    """Encodes one closed curve, (n, 3), or several."""
     try:
         whole = [positions(cast(npt.ArrayLike, curves), what)[0]]
     except InvalidArray:
@@ -110,7 +110,8 @@ def height_map(heights: npt.ArrayLike, *, corner: npt.ArrayLike = (-1, -1, 0),
                colors: Color = None, cmap: Optional[str] = None, texture: Optional[PictureFile] = None,
                fill: str = "surface", rule: str = "thin", shell: Optional[float] = None,
                unit: str = "voxels") -> list[wire.Packed]:
-    """`heights`: (rows, columns). `colors`: one, (rows, columns, 3), or with a map (rows, columns) numbers."""
+    """`heights` has the shape (rows, columns). `colors`: one colour, (rows, columns, 3), or with a map (rows, columns)
+    numbers."""
     field = as_array(heights, "heights")
     if field.ndim != 2 or min(field.shape) < 2:
         raise InvalidArray(f"heights must be of shape (rows, columns), 2 of each at least, got {field.shape}")

@@ -1,8 +1,7 @@
-"""The scene as the server has accepted it from this client, as wire bytes: what a server that knows nothing of it any more
-is told again.
+"""The scene as the server has accepted it from this client, as wire bytes, for sending it again to a server that has lost it.
 
-It shares its bytes with what was sent; of each entity, layer and object it keeps the newest alone, and none whose time is
-over.
+It shares its bytes with what was sent. It keeps only the newest state of each entity, layer and object, and no expired
+entities.
 """
 from __future__ import annotations
 
@@ -61,7 +60,7 @@ class Mirror:
                 heapq.heapify(self._ends)
 
     def purge(self, now_ns: int) -> None:
-        """Forgets what has gone by itself."""
+        """Forgets expired entities."""
         while self._ends and self._ends[0][0] <= now_ns:
             at, name, id = heapq.heappop(self._ends)
             layer = self._layers.get(name)
@@ -81,13 +80,13 @@ class Mirror:
             held.entities.pop(id, None)  # type: ignore[union-attr]
 
     def clear_layer(self, layer: str, make: bool = False) -> None:
-        """`make`: a frame makes the layer; a deletion does not."""
+        """`make`: a frame creates the layer; a deletion does not."""
         held = self._layer(layer) if make else self._layers.get(layer)
         if held is not None:
             held.entities.clear()
 
     def clear(self) -> None:
-        """Delete.all_mine takes the layers too, with what they are like."""
+        """Delete.all_mine also removes the layers with their properties."""
         self._layers.clear()
 
     def layer_state(self, state: pb.LayerState) -> None:
@@ -117,13 +116,13 @@ class Mirror:
         return sum(len(layer.entities) for layer in self._layers.values())
 
     def restore(self, now_ns: int) -> Iterator[Union[bytes, wire.Put, None]]:
-        """What makes an empty scene this one: objects before those that use them, then layer after layer in the order of
-        their creation; at last, after None, instances of objects that were not defined here, which may be refused."""
+        """Yields what turns an empty scene into this one: objects before those that use them, then layer after layer in the
+        order of their creation; and last, after None, instances of objects that were not defined here, which may be refused."""
         self.purge(now_ns)
         yield from self._definitions()
         unknown: list[_Entity] = []
         for name, layer in self._layers.items():
-            # Also when it sets nothing: it makes the layer, in its turn.
+            # Emitted even if it sets nothing: it creates the layer in the right order.
             state = pb.LayerState(layer=name) if layer.state is None else layer.state
             yield pb.StreamRequest(layer_state=state).SerializeToString()
             for entity in layer.entities.values():

@@ -1,4 +1,4 @@
-"""Operations as this client keeps them: wire bytes, and what each does to the mirror."""
+"""Operations as this client keeps them: their wire bytes, and their effect on the mirror."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -9,13 +9,13 @@ from .mirror import Mirror
 from .receipts import Frame, Issue
 from .v1 import scene_pb2 as pb
 
-# What a commit weighs beside its operations, here and there.
+# Size of a commit besides its operations, in this process and on the wire.
 COMMIT_BYTES = 64
 
 
 @dataclass
 class Puts:
-    """Entities put up, or replaced."""
+    """Entities that are added or replaced."""
 
     puts: Sequence[wire.Put]
 
@@ -32,7 +32,7 @@ class Puts:
 
 @dataclass
 class Request:
-    """Anything that is one request; the mirror need not know of it, or knows it by a subclass."""
+    """Any single request; the mirror ignores it unless a subclass says how to apply it."""
 
     request: bytes
 
@@ -104,7 +104,7 @@ class Undefine(Request):
 
 
 class Immediate:
-    """A frame: replaces what its layer held. The one kind that a flow policy may give up."""
+    """A frame: replaces the content of its layer. The only operation that a flow policy may drop."""
 
     __slots__ = ("layer", "parts")
 
@@ -128,7 +128,7 @@ Operation = Union[Puts, Request, Immediate]
 
 
 class _Begin(Request):
-    """FrameBegin and FrameEnd of a layer, which know it."""
+    """FrameBegin of a layer, together with the layer's name."""
 
     def __init__(self, layer: str) -> None:
         super().__init__(pb.StreamRequest(frame_begin=pb.FrameBegin(layer=layer)).SerializeToString())
@@ -146,7 +146,7 @@ def weigh(operations: Iterable[Operation]) -> int:
 
 
 class Refused:
-    """Which operations of a commit were refused, as its issues tell."""
+    """The operations of a commit that were refused, from its issues."""
 
     def __init__(self, issues: Iterable[Issue]) -> None:
         self._where = {(issue.sequence, issue.layer, issue.id) for issue in issues}
@@ -156,14 +156,15 @@ class Refused:
         return sequence in self._sequences
 
     def has_put(self, sequence: int, put: wire.Put) -> bool:
-        """Of a batch, each entity may be refused alone; what names none means all, what names a layer alone all of it."""
+        """In a batch, single entities may be refused; an issue without a layer refers to the whole request, one without an id
+        to the whole layer."""
         return sequence in self._sequences and any(
             (sequence, layer, id) in self._where for layer, id in ((put.layer, put.id), (put.layer, ""), ("", "")))
 
 
 class Unit:
-    """A commit and the operations before it. `bytes` is what it weighs in the buffer, `largest` the greatest of its
-    messages that cannot be made smaller."""
+    """A commit and the operations before it. `bytes` is its size in the buffer, `largest` the size of its largest message that
+    cannot be made smaller."""
 
     __slots__ = ("frame", "operations", "commit", "bytes", "largest", "drops", "sequences", "commit_sequence", "issues",
                  "restores", "on_accepted", "_most")
@@ -180,9 +181,9 @@ class Unit:
         self.forget_sending()
 
     def forget_sending(self) -> None:
-        """It will be sent from the beginning."""
+        """Prepares for sending it again from the beginning."""
         self.sequences: list[int] = []  # of its requests, as sent
-        self.commit_sequence = 0        # not 0: it was sent whole
+        self.commit_sequence = 0        # not 0: it was sent completely
         self.issues: list[Issue] = []
         self._most = wire.BATCH_BYTES
 
@@ -196,11 +197,11 @@ class Unit:
 
     @property
     def droppable(self) -> bool:
-        """A flow policy may give up its frames."""
+        """Whether a flow policy may drop its frames."""
         return not self.commit.must_show and not self.commit.durable and not self.timed
 
     def _messages(self) -> Iterator[Union[Sequence[wire.Put], Request]]:
-        """All but the commit. Puts side by side share messages."""
+        """Yields all messages except the commit. Consecutive puts share messages."""
         run: list[wire.Put] = []
         for operation in self.operations:
             if isinstance(operation, Puts):
@@ -217,13 +218,13 @@ class Unit:
         yield from wire.runs(run, self._most)
 
     def requests(self, most_bytes: int = wire.BATCH_BYTES) -> Iterator[bytes]:
-        """All but the commit; batches of at most `most_bytes`."""
+        """Yields all requests except the commit; batches have at most `most_bytes`."""
         self._most = most_bytes
         for message in self._messages():
             yield message.request if isinstance(message, Request) else wire.together(message)
 
     def apply(self, mirror: Mirror, now_ns: int) -> None:
-        """It was accepted; less what its issues say was refused."""
+        """Applies the accepted commit to the mirror, except what its issues say was refused."""
         mirror.purge(now_ns)
         refusals = [issue for issue in self.issues if not issue.applied]
         if not refusals:
@@ -273,7 +274,7 @@ def layer_state(state: pb.LayerState) -> LayerState:
 
 
 def define(name: str, parts: Iterable[wire.Packed], uses: AbstractSet[str] = frozenset()) -> Define:
-    """`parts` are Object.Part messages; `uses`: the objects that some of them are instances of."""
+    """`parts` are Object.Part messages; `uses` are the objects that some of them are instances of."""
     tail: list[wire.Buffer] = []
     for part in parts:
         wrapped = part.inside(wire.Field.PART)
@@ -290,14 +291,14 @@ def undefine(name: str, cascade: bool) -> Undefine:
 
 
 def restoring(mirror: Mirror, now_ns: int) -> Iterator[Optional[Operation]]:
-    """What makes the mirror's scene of whatever is left of it. None: what follows is to be a commit of its own."""
+    """Yields what restores the mirror's scene, whatever the server has left of it. None: a new commit starts here."""
     yield clear_all()
     for one in mirror.restore(now_ns):
         yield one if one is None else Request(one) if isinstance(one, bytes) else Puts([one])
 
 
 def parted(all_of_it: Iterable[Optional[Operation]], most_bytes: int, most_operations: int) -> Iterator[list[Operation]]:
-    """As commits of at most so much each; none of them empty."""
+    """Splits the operations into commits of at most the given sizes; none is empty."""
     commit: list[Operation] = []
     size = 0
     for operation in all_of_it:

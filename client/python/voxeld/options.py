@@ -1,4 +1,4 @@
-"""Arguments that a drawing call does not have: which one was meant."""
+"""Finds which argument was meant when a drawing call does not have the given one."""
 from __future__ import annotations
 
 import difflib
@@ -13,7 +13,7 @@ Drawing = TypeVar("Drawing")
 
 LOOK = tuple(inspect.signature(Look.of).parameters)
 
-# What the wire and `voxelctl draw` call it, and other libraries: what it may be called here, where a call has that.
+# Names used by the wire, `voxelctl draw` and other libraries, and their names here, for calls that have those.
 _ELSEWHERE = {
     "alignment": ("align",), "at": ("transform",), "boundary_points": ("boundary",), "cells": ("array",), "colormap": ("cmap",),
     "edge_a": ("edges",), "edge_b": ("edges",), "edge_c": ("edges",), "grid": ("array",), "indices": ("faces",), "linewidth": ("width",),
@@ -59,12 +59,12 @@ def _checked(method: Callable[..., Any]) -> Callable[..., Any]:
 
 @functools.lru_cache(maxsize=None)
 def leading_names(method: Callable[..., Any], count: int) -> tuple[str, ...]:
-    """Of what a drawing call takes by its place, behind the thing's own name."""
+    """Returns the names of a drawing call's first `count` positional arguments after the name."""
     return tuple(inspect.signature(method).parameters)[2:2 + count]
 
 
 def named(cls: Type[Drawing]) -> Type[Drawing]:
-    """Every public method refuses an option that it does not have in its own name, and says which may have been meant."""
+    """Makes every public method refuse unknown options under its own name, and suggest which may have been meant."""
     for name, method in list(vars(cls).items()):
         if not name.startswith("_") and inspect.isfunction(method):
             setattr(cls, name, _checked(method))
@@ -72,7 +72,7 @@ def named(cls: Type[Drawing]) -> Type[Drawing]:
 
 
 def no_call(where: object, name: str) -> AttributeError:
-    """There is no method or field `name`."""
+    """Returns the error for a missing method or field `name`."""
     meant = _CALLS.get(name)
     if meant is None and not name.startswith("_"):
         meant = next(iter(difflib.get_close_matches(name, [one for one in dir(type(where)) if not one.startswith("_")], 1)), None)

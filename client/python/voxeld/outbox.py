@@ -1,4 +1,4 @@
-"""Commits that wait to be sent, by the flow policy and within bounds. Pure: no threads, no clock."""
+"""The queue of commits to send, subject to the flow policy and to size limits. Pure: no threads, no clock."""
 from __future__ import annotations
 
 from collections import deque
@@ -10,11 +10,11 @@ RELIABLE, LATEST, DROP_OLDEST = "reliable", "latest", "drop_oldest"
 
 
 class Outbox:
-    """First in, first out. Of the immediate frames of one layer that wait here, LATEST keeps the newest and DROP_OLDEST
-    the `keep` newest; RELIABLE keeps all. What is retained always waits.
+    """First in, first out. Of the waiting immediate frames of one layer, LATEST keeps the newest, DROP_OLDEST the `keep`
+    newest, and RELIABLE all. Retained operations always wait.
 
-    A unit that a policy leaves without any operation goes as a whole; one that holds something else keeps its commit. What
-    is to be shown at its time, or in any case (must_show), is not given up.
+    A unit that a policy leaves without any operation is dropped as a whole; one that holds something else keeps its commit.
+    Timed commits and those that must be shown (must_show) are never dropped.
     """
 
     def __init__(self, policy: str = RELIABLE, keep: int = 1, limit_bytes: int = 256 << 20) -> None:
@@ -34,9 +34,9 @@ class Outbox:
         return list(self._units)
 
     def push(self, unit: Unit, newest_only: bool = False) -> Optional[list[Unit]]:
-        """Takes `unit`, and gives back the units that went for it. None: there is no room, and nothing has changed.
-        `newest_only` (there is no connection): if room is wanted, of each layer's frames the newest alone are kept,
-        whatever the policy."""
+        """Adds `unit`, and returns the units dropped for it. None: there was not enough room, and nothing has changed.
+        `newest_only` (set while disconnected): if room is needed, keep only the newest frame of each layer, whatever the
+        policy."""
         room = self._limit - unit.bytes
         keep = {layer: 1 for layer in self._frames} if newest_only and self.bytes > room else {}
         for operation in unit.operations if unit.droppable else ():
@@ -55,12 +55,12 @@ class Outbox:
             if isinstance(operation, Immediate):
                 self._frames.setdefault(operation.layer, deque()).append((unit, operation))
                 if self._keep:
-                    # Several frames of one layer in one unit.
+                    # One unit may hold several frames of one layer.
                     gone += self._leave(operation.layer, self._keep)
         return gone
 
     def pop(self) -> Optional[Unit]:
-        """The oldest; from now on it is on its way and no policy's."""
+        """Removes and returns the oldest unit; from now on it is in flight, and no policy may drop it."""
         if not self._units:
             return None
         unit = self._units.popleft()
@@ -78,7 +78,7 @@ class Outbox:
         return drops
 
     def _given_up(self, keep: dict[str, int]) -> int:
-        """Bytes that go when of each layer's frames so many are kept."""
+        """Returns the bytes that are freed if so many frames of each layer are kept."""
         total = 0
         for layer, most in keep.items():
             waiting = self._frames.get(layer, deque())
@@ -86,7 +86,7 @@ class Outbox:
         return total
 
     def _leave(self, layer: str, keep: int) -> list[Unit]:
-        """Gives up all but the `keep` newest frames of `layer`; the units that have nothing left."""
+        """Drops all but the `keep` newest frames of `layer`; returns the units that have nothing left."""
         waiting = self._frames.get(layer, deque())
         emptied = []
         while len(waiting) > keep:
@@ -110,9 +110,9 @@ class Outbox:
         self.bytes += unit.bytes - before
 
     def _merged(self, newest: Unit) -> list[tuple[Unit, list[Operation]]]:
-        """The units that can do without some retained puts and moves, since something later, `newest` perhaps, replaces
-        those whole; and what is left of each. What the scene comes to is the same. Timed ones take effect elsewhere: they
-        stay as they are, and nothing goes for them; of those that must be shown nothing goes."""
+        """Returns the units that can do without some retained puts and moves, because something later, perhaps `newest`,
+        replaces those completely; and the operations left in each. The resulting scene is the same. Timed commits take effect
+        at another time: they stay unchanged, and replace nothing; units that must be shown lose nothing."""
         result: list[tuple[Unit, list[Operation]]] = []
         seen: set[tuple[str, str]] = set()
         whole_layers: set[str] = set()
@@ -151,7 +151,7 @@ class Outbox:
         return result
 
     def _merge(self, newest: Unit, room: int) -> None:
-        """If that makes enough room."""
+        """Merges if that frees enough room."""
         merged = self._merged(newest)
         weight = sum(weigh(operations) - unit.bytes for unit, operations in merged if unit is not newest)
         if self.bytes + weight > room:

@@ -1,4 +1,4 @@
-"""Pictures of points of light, and PNG files; NumPy and zlib are all they need."""
+"""Renders points of light, and writes PNG files; needs only NumPy and zlib."""
 from __future__ import annotations
 
 import struct
@@ -15,7 +15,7 @@ _EDGES = [(0, 1), (0, 2), (0, 4), (1, 3), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5)
 
 
 def axes(azimuth: float, elevation: float) -> tuple[Floats, Floats, Floats]:
-    """Right, up and away of an eye that looks at the middle, in degrees: 0, 0 is from −y with z up."""
+    """Returns the right, up and away vectors of an eye that looks at the middle; angles in degrees, 0, 0 is from −y with z up."""
     a, e = np.radians(azimuth), np.radians(elevation)
     right = np.array([np.cos(a), np.sin(a), 0])
     away = np.array([-np.sin(a) * np.cos(e), np.cos(a) * np.cos(e), -np.sin(e)])
@@ -24,9 +24,9 @@ def axes(azimuth: float, elevation: float) -> tuple[Floats, Floats, Floats]:
 
 def splat(at: Floats, colors: Bytes, corners: Floats, pitch: float, width: int, height: int, azimuth: float,
           elevation: float) -> Bytes:
-    """Points as discs of the size of their pitch, without perspective. What lies behind something is added at half its
-    light for every point before it on the same spot; so a picture keeps the glow of a volume and its front stands out.
-    What is far is dimmer."""
+    """Renders points as discs of the size of their pitch, without perspective. A point is added with half its light for every
+    point in front of it on the same spot; so the image keeps the glow of a volume and its front stands out. Distant points are
+    dimmer."""
     right, up, away = axes(azimuth, elevation)
     middle = corners.mean(axis=0)
     flat = np.stack([(corners - middle) @ right, (corners - middle) @ up], axis=1)
@@ -58,7 +58,7 @@ def splat(at: Floats, colors: Bytes, corners: Floats, pitch: float, width: int, 
                 if dx * dx + dy * dy > radius * radius + 0.5:
                     continue
                 _add(glow, left, np.floor(x).astype(int) + dx, np.floor(y).astype(int) + dy, light, width, height)
-        # Where much light meets, its strength is pressed below 255 and its hue kept.
+        # Where much light accumulates, compress its strength below 255 and keep its hue.
         peak = np.maximum(glow.max(axis=1), 1e-9)
         pressed = np.where(peak > KNEE, KNEE + (255 - KNEE) * (1 - np.exp((KNEE - peak) / (255 - KNEE))), peak)
         picture = np.maximum(picture, glow * (pressed / peak)[:, None])
@@ -72,7 +72,7 @@ def _add(glow: Floats, left: Floats, x: npt.NDArray[np.int_], y: npt.NDArray[np.
     spot, light = y[inside] * width + x[inside], light[inside]
     if not len(spot):
         return
-    # Of those on one spot the nth from the front counts 2⁻ⁿ.
+    # On one spot, the nth point from the front is weighted by 2⁻ⁿ.
     order = np.argsort(spot, kind="stable")
     spot, light = spot[order], light[order]
     first = np.r_[True, spot[1:] != spot[:-1]]
@@ -85,7 +85,7 @@ def _add(glow: Floats, left: Floats, x: npt.NDArray[np.int_], y: npt.NDArray[np.
 
 
 def png(rgb: Bytes) -> bytes:
-    """A PNG file of (height, width, 3)."""
+    """Encodes a (height, width, 3) image as a PNG file."""
     height, width = rgb.shape[:2]
 
     def chunk(kind: bytes, data: bytes) -> bytes:

@@ -1,4 +1,4 @@
-"""What names stand for: a large array goes out as several entities, and stays one thing."""
+"""Maps names to entities: a large array is sent as several entities, and remains one thing to the caller."""
 from __future__ import annotations
 
 import re
@@ -6,13 +6,13 @@ from typing import Callable, Iterator, Optional
 
 from .errors import InvalidValue
 
-# Between a name and a piece's number. Names that end so are refused: they could be another's pieces.
+# Separates a name from a piece's number. Names that end this way are refused: they could be another name's pieces.
 MARK = "\u00a7"  # §
 _TAKEN = re.compile(f"{MARK}[0-9]+$")
 
 
 def free_name(name: str) -> str:
-    """`name`, if no piece of another name can be called so."""
+    """Returns `name` if no piece of another name can have it."""
     if _TAKEN.search(name):
         raise InvalidValue(f"the name {name!r} ends as pieces of large arrays do ({MARK} and a number); give another")
     return name
@@ -23,8 +23,8 @@ def ids(name: str, pieces: int) -> list[str]:
 
 
 class _Name:
-    """`pieces`: how many it is now, as far as was asked for. There may be up to `most`, `single` the one without a number:
-    what was taken out counts until the server has accepted that."""
+    """`pieces` is the number of pieces now, as requested so far. Up to `most` may exist, and `single` says whether the one
+    without a number may: removed pieces count until the server has accepted the removal."""
 
     __slots__ = ("pieces", "most", "single", "version")
 
@@ -50,7 +50,7 @@ _Key = tuple[str, str]
 
 
 class Pieces:
-    """Of every (layer, name). Changes are made by a Draft, all at once or not at all. Of one thread at a time."""
+    """The pieces of every (layer, name). A Draft changes them, all at once or not at all. For one thread at a time."""
 
     def __init__(self) -> None:
         self._names: dict[_Key, _Name] = {}
@@ -65,7 +65,7 @@ class Pieces:
 
 
 class Draft:
-    """What one commit makes of them."""
+    """The changes that one commit makes to the pieces."""
 
     def __init__(self, base: Pieces, version: int) -> None:
         self._base = base
@@ -86,11 +86,11 @@ class Draft:
         return held
 
     def now(self, layer: str, name: str) -> list[str]:
-        """Its ids."""
+        """Returns the name's current ids."""
         return ids(name, self._of(layer, name).pieces)
 
     def put(self, layer: str, name: str, pieces: int) -> list[str]:
-        """It is to be so many. The ids to delete."""
+        """Sets the number of pieces. Returns the ids to delete."""
         held = self._of(layer, name)
         if pieces == 1 and held.usual():
             return []
@@ -105,7 +105,7 @@ class Draft:
         return gone
 
     def remove(self, layer: str, name: str) -> list[str]:
-        """The ids to delete."""
+        """Removes the name. Returns the ids to delete."""
         held = self._of(layer, name)
         if held.usual():
             return [name]
@@ -114,13 +114,13 @@ class Draft:
         return [*([name] if held.single else []), *(f"{name}{MARK}{i}" for i in range(held.most))]
 
     def clear(self, layer: Optional[str]) -> None:
-        """All of a layer, or of all, are deleted otherwise."""
+        """Notes that all entities of a layer, or of all layers, are deleted by another operation."""
         for key in {*self._base._names, *self._changed}:
             if layer is None or key[0] == layer:
                 self._change(*key).pieces = 1
 
     def keep(self) -> Callable[[], None]:
-        """Makes it so; what is given back is to be called when the server has accepted it."""
+        """Applies the changes; call the returned function when the server has accepted the commit."""
         names = self._base._names
         for key, held in self._changed.items():
             names[key] = held
@@ -135,7 +135,7 @@ class Draft:
         return accepted
 
     def _keys(self) -> Iterator[_Key]:
-        """Those that no later commit has changed."""
+        """Yields the names that no later commit has changed."""
         for key in self._changed:
             held = self._base._names.get(key)
             if held is not None and held.version == self._version:

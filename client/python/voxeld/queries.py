@@ -1,4 +1,4 @@
-"""Calls beside the stream: displays, statistics, pictures, what is in the scene. They block."""
+"""Calls beside the stream: displays, statistics, captures, scene contents. They block."""
 from __future__ import annotations
 
 import time
@@ -25,13 +25,14 @@ def _failed(error: grpc.RpcError) -> VoxelError:
 
 
 class Queries:
-    """On a channel of their own, so that they neither wait for the stream's bulk nor end with it."""
+    """Uses a channel of its own, so that calls neither wait for the stream's bulk data nor end with it."""
 
     def __init__(self, server: str, who: Credentials) -> None:
         self._metadata = credentials.metadata(server, who)
         self._channel = credentials.open_channel(server, who, [
             ("grpc.max_receive_message_length", -1), ("grpc.use_local_subchannel_pool", 1),
-            # The least is also what an attempt may take, on slow networks and busy machines too; one that is refused ends at once.
+            # The minimum is also the limit of one attempt, on slow networks and busy machines too; a refused attempt ends at
+            # once.
             ("grpc.initial_reconnect_backoff_ms", 100), ("grpc.min_reconnect_backoff_ms", 10_000),
             ("grpc.max_reconnect_backoff_ms", 1000)])
         self._closed = False
@@ -155,7 +156,7 @@ def _upload_pieces(data: bytes, asset: Asset, start: int, size: int,
 
 
 class Watch(Iterator["ChangeSet"]):
-    """Change sets as they come. close() ends the call, from any thread, and with it who waits for the next."""
+    """Change sets as they come. close() ends the call from any thread, and also a wait for the next one."""
 
     def __init__(self, call: Any) -> None:
         self._call = call
@@ -174,7 +175,7 @@ class Watch(Iterator["ChangeSet"]):
         raise StopIteration
 
     def next(self) -> Optional["ChangeSet"]:
-        """None at the end."""
+        """Returns the next change set, or None at the end."""
         return next(self, None)
 
     def close(self) -> None:
@@ -186,7 +187,7 @@ class Watch(Iterator["ChangeSet"]):
 
 
 class ChangeSet:
-    """What is new or gone in the scene, from one snapshot to another; the first has all there is."""
+    """The additions and removals in the scene from one snapshot to another; the first holds the whole scene."""
 
     def __init__(self, parts: Sequence[scene_pb2.WatchSceneResponse]) -> None:
         self.snapshot = parts[-1].in_sync

@@ -1,4 +1,4 @@
-"""What becomes of commits: a Frame for each, and the book that the answers are entered into."""
+"""The progress of commits: a Frame for each, and the book that records the answers."""
 from __future__ import annotations
 
 import threading
@@ -12,17 +12,17 @@ from .errors import CommitDropped, CommitRefused, ConnectionLost, NotDurable
 from .v1 import scene_pb2 as pb
 from .v1 import types_pb2
 
-# Accepted commits whose outcomes are waited for. A server owes fewer (Limits.max_riding_commits); beyond, the oldest are
+# Limit of accepted commits whose outcomes are pending. A server has fewer (Limits.max_riding_commits); beyond it the oldest are
 # given up.
 MAX_OWED = 65536
 
-# An outcome that nobody tells, and one of a kind that this client does not know.
+# An outcome that will never be reported, and one of a kind that this client does not know.
 UNTOLD = "untold"
 
 
 @dataclass(frozen=True)
 class Stages:
-    """When a commit passed what, in ns of the server's monotonic clock; 0: not known."""
+    """When a commit passed each stage, in ns of the server's monotonic clock; 0: unknown."""
 
     sent_ns: int = 0
     received_ns: int = 0
@@ -39,7 +39,7 @@ class Stages:
         return Stages(*(getattr(stages, name) for name in _STAGES))
 
     def durations_ms(self) -> dict[str, float]:
-        """How long each stage took, from the stage before that is known: {"received": 0.1, …}."""
+        """How long each stage took, since the previous known stage: {"received": 0.1, …}."""
         result: dict[str, float] = {}
         last = 0
         for name in _STAGES:
@@ -50,7 +50,7 @@ class Stages:
         return result
 
     def total_ms(self) -> Optional[float]:
-        """From the first stage known to the last; None if fewer than two are."""
+        """Time from the first known stage to the last; None if fewer than two are known."""
         known = [at for at in (int(getattr(self, name)) for name in _STAGES) if at]
         return (known[-1] - known[0]) / 1e6 if len(known) > 1 else None
 
@@ -60,7 +60,7 @@ _STAGES = tuple(field.name for field in fields(Stages))
 
 @dataclass(frozen=True)
 class Accepted:
-    """The commit is in the scene. `displays`: those that will say what became of it."""
+    """The commit is in the scene. `displays`: those that will report its outcome."""
 
     snapshot: int
     refused_operations: int
@@ -74,8 +74,8 @@ class Accepted:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a commit on one display. `kind`: "presented", "unchanged", "superseded", "lost" or "not_shown"; or
-    "untold", when that is not known and will not be."""
+    """The outcome of a commit on one display. `kind`: "presented", "unchanged", "superseded", "lost" or "not_shown"; or
+    "untold" if it is unknown and will remain so."""
 
     display: str
     kind: str
@@ -92,7 +92,7 @@ class Outcome:
 
     @property
     def seen(self) -> bool:
-        """The display shows what the commit asked for."""
+        """Whether the display shows what the commit requested."""
         return self.kind in ("presented", "unchanged")
 
     @staticmethod
@@ -122,8 +122,8 @@ def _why(why: int) -> str:
 
 @dataclass(frozen=True)
 class Issue:
-    """A refused operation, or one that was carried out otherwise than asked (`applied`): which, what was wrong, what would be
-    right."""
+    """A refused operation, or one that was carried out in another way than requested (`applied`): which one, what was wrong,
+    and what is expected."""
 
     layer: str
     id: str
@@ -139,8 +139,8 @@ class Issue:
         return f"{where or 'commit'}: {what} ({self.reason.lower()})"
 
     def is_told_in(self, refusal: str) -> bool:
-        """Whether a refusal's text has this issue: it tells the first as "layer/id, field: message", the commit's own by its
-        message alone."""
+        """Whether a refusal's text contains this issue: it quotes the first as "layer/id, field: message", the commit's own by
+        its message alone."""
         if not self.message:
             return False
         whose = "/".join(part for part in (self.layer, self.id) if part)
@@ -158,7 +158,7 @@ class Issue:
 
 Done = Callable[["Future[Frame]", "Frame"], None]
 
-# Of all frames' lists of who waits; held for a few instructions.
+# Guards the lists of waiters of all frames; held for a few instructions.
 _waiting = threading.Lock()
 
 
@@ -168,8 +168,8 @@ def resolve(future: "Future[Frame]", frame: "Frame") -> None:
 
 
 class Frame:
-    """One commit on its way. Its fields fill as answers come; nothing here blocks but the methods that wait. `done` resolves
-    the futures that others have."""
+    """One commit in progress. Its fields are filled as answers come; only the methods that wait block. `done` resolves the
+    futures of waiters."""
 
     def __init__(self, frame_id: int, wants_outcomes: bool = True, done: Done = resolve) -> None:
         self.id = frame_id
@@ -194,21 +194,21 @@ class Frame:
 
     @property
     def answered(self) -> bool:
-        """It is known whether the scene has it."""
+        """Whether it is known if the scene contains the commit."""
         return self.state not in ("waiting", "sent")
 
     @property
     def complete(self) -> bool:
-        """Nothing more will be told."""
+        """Whether no more answers will come."""
         return self._done
 
     @property
     def seen(self) -> bool:
-        """A display shows it, or something that looks the same."""
+        """Whether a display shows it, or something that looks the same."""
         return any(o.seen for o in self.outcomes.values())
 
     def latency_ms(self) -> dict[str, float]:
-        """Each stage's duration in ms, of the first display that presented it, or as far as it has come."""
+        """Returns each stage's duration in ms, on the first display that presented it, or as far as it has come."""
         for outcome in self.outcomes.values():
             if outcome.kind == "presented":
                 return outcome.stages.durations_ms()
@@ -225,8 +225,8 @@ class Frame:
         return self
 
     def future(self, *, shown: bool = False) -> "Future[Frame]":
-        """Is done when the commit is answered, or with `shown` when every display has said what became of it. Its callbacks
-        run on a thread of the connection's that does nothing else; they may draw and wait."""
+        """Returns a future that is done when the commit is answered, or with `shown` when every display has reported its
+        outcome. Its callbacks run on a thread of the connection that does nothing else; they may draw and wait."""
         return self._future(shown, self._resolve)
 
     def _future(self, shown: bool, done: Done) -> "Future[Frame]":
@@ -240,17 +240,17 @@ class Frame:
         return future
 
     def wait(self, timeout: Optional[float] = None) -> "Frame":
-        """Until it is answered. Raises CommitRefused, CommitDropped, ConnectionLost, or TimeoutError."""
+        """Waits until the commit is answered. Raises CommitRefused, CommitDropped, ConnectionLost, or TimeoutError."""
         return self._wait(timeout, False).raise_if_failed()
 
     def wait_shown(self, timeout: Optional[float] = None) -> dict[str, Outcome]:
-        """Until every display has said what became of it: that, by the display's name. Raises as wait() does."""
+        """Waits until every display has reported the outcome; returns the outcomes by display name. Raises as wait() does."""
         return self._wait(timeout, True).raise_if_failed().outcomes
 
     def wait_durable(self, timeout: Optional[float] = None) -> "Frame":
-        """Until it is on the server's disk, as commit(durable=True) asked. Raises as wait() does, and NotDurable if it was carried
-        out and will not be there: the server keeps nothing (it has no --state-dir), or the session's layers go with it
-        (on_disconnect)."""
+        """Waits until the commit is on the server's disk, as commit(durable=True) requested. Raises as wait() does, and
+        NotDurable if it was carried out but will not be stored: the server stores nothing (it has no --state-dir), or the
+        session's layers end with it (on_disconnect)."""
         frame = self.wait(timeout)
         if frame.accepted is not None and not frame.accepted.durable:
             why = [issue for issue in frame.issues if issue.field == "commit.durable"]
@@ -269,7 +269,7 @@ class Frame:
             raise TimeoutError(f"frame {self.id} is {self.state} and {missing} has not come in {timeout} s") from None
 
     def _tell(self) -> None:
-        """Something has changed."""
+        """Wakes waiters after a change."""
         with _waiting:
             ready = [one for one in self._futures if self._done or not one[0] and self.answered]
             self._futures = [one for one in self._futures if one not in ready]
@@ -278,7 +278,7 @@ class Frame:
 
 
 class Book:
-    """Every frame that something is still owed to, and the sums. Of one thread at a time."""
+    """All frames with pending answers, and the totals. For one thread at a time."""
 
     def __init__(self) -> None:
         self._open: OrderedDict[int, Frame] = OrderedDict()
@@ -307,11 +307,11 @@ class Book:
         frame._tell()
 
     def drop(self, frame: Frame, reason: str) -> None:
-        """The flow policy gave it up unsent."""
+        """The flow policy dropped the commit before it was sent."""
         self._end(frame, "dropped", reason, "dropped")
 
     def unknown(self, frame: Frame, reason: str) -> None:
-        """It may have been applied or not."""
+        """It is unknown whether the commit was applied."""
         self._end(frame, "unknown", reason, "unknown")
 
     def refuse(self, frame: Frame, reason: str, issues: Iterable[Issue] = (), operations: int = 0) -> None:
@@ -320,7 +320,7 @@ class Book:
         self._end(frame, "refused", reason, "refused")
 
     def give_up(self, frames: Iterable[Frame], reason: str) -> None:
-        """No more will be known of these. One that was accepted stays so, and its outcomes are untold."""
+        """Ends the waiting for these frames. An accepted one stays accepted, and its missing outcomes are "untold"."""
         for frame in list(frames):
             if not frame.answered:
                 self._end(frame, "lost", reason, "given_up")
@@ -337,11 +337,11 @@ class Book:
         return list(self._open.values())
 
     def owed(self) -> list[Frame]:
-        """Those accepted that have not all their outcomes."""
+        """Returns the accepted frames that lack some of their outcomes."""
         return list(self._owed.values())
 
     def applied_unseen(self, frame: Frame, displays: Iterable[str]) -> None:
-        """It was applied, though its receipt was lost with a connection."""
+        """The commit was applied, though its receipt was lost with a connection."""
         self.accept(frame, Accepted(0, 0, 0, tuple(displays), False, 0, Stages()))
 
     def accept(self, frame: Frame, accepted: Accepted, issues: Iterable[Issue] = ()) -> None:
@@ -368,7 +368,7 @@ class Book:
         return not frame._wants_outcomes or all(d in frame.outcomes for d in a.displays)
 
     def receipt(self, receipt: pb.Receipt, issues: Iterable[Issue] = ()) -> Optional[Frame]:
-        """Enters it, with the issues of its commit. The frame it belongs to, if that is open."""
+        """Records a receipt, with the issues of its commit. Returns the frame that it belongs to, if that is open."""
         frame = self._open.get(receipt.frame_id)
         if frame is None:
             return None

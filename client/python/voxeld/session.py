@@ -1,10 +1,10 @@
-"""The client's side of a stream as a state machine: what to send next, and what answers mean. Pure: no threads, no sockets;
+"""The client's side of a stream as a state machine: what to send next, and how to handle answers. Pure: no threads, no sockets;
 time is an argument, in ns of any steady clock. The transport calls it under one lock.
 
-A connection outlives its streams. When one ends, the next takes its session up, or at least its owner. Where the server kept
-the session's layers (KEEP), what was sent and not applied is sent again. Where they went with the stream, or the server does
-not know the session any more, the scene as it had been accepted (the mirror) comes first, in commits of its own; then all that
-had no answer, once more.
+A connection outlives its streams. When a stream ends, the next one resumes its session, or at least joins its owner. If the
+server kept the session's layers (KEEP), what was sent but not applied is sent again. If they were removed with the stream, or
+the server no longer knows the session, the scene as it had been accepted (the mirror) is sent first, in commits of its own;
+then everything that had no answer, once more.
 """
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from .v1 import scene_pb2 as pb
 from .v1 import types_pb2
 
 SECOND_NS = 1_000_000_000
-# The first pings come close together, for a clock that is soon known well; then now and then, against drift.
+# The first pings are sent at short intervals, for a good clock estimate soon; later ones only correct for drift.
 _QUICK_PINGS, _QUICK_NS, _SLOW_NS = 8, SECOND_NS // 20, 10 * SECOND_NS
-# A server sends what it owes to a session taken up for 10 s.
+# A server sends the pending outcomes of a resumed session for 10 s.
 OWED_NS = 12 * SECOND_NS
-# Of a commit that sends the scene anew.
+# Size limit of a commit that restores the scene.
 _RESTORE_BYTES = 4 << 20
-_MOST_ISSUES = 10_000  # kept of a commit
+_MOST_ISSUES = 10_000  # limit of issues kept per commit
 
 FLOWS = {RELIABLE: pb.FLOW_POLICY_RELIABLE, LATEST: pb.FLOW_POLICY_LATEST, DROP_OLDEST: pb.FLOW_POLICY_DROP_OLDEST}
 
@@ -87,7 +87,7 @@ class Session:
         self._begun: list[tuple[int, Unit]] = []  # with their first sequences; some that are not on their way any more
         self._must_show: dict[int, Frame] = {}    # accepted, by their commits' sequences
 
-    # ------------------------------------------------------------------------------------------------ what is sent
+    # ----------------------------------------------------------------------------------------------------- sending
 
     def new_frame(self) -> Frame:
         frame = Frame(self._next_frame, self._settings.outcomes, self._done)
@@ -98,7 +98,7 @@ class Session:
         self.done(future, frame)
 
     def submit(self, unit: Unit) -> bool:
-        """Takes a commit for sending. False: there is no room, and nothing was taken."""
+        """Queues a commit for sending. False: there was not enough room, and nothing was queued."""
         too_large = self._too_large(unit)
         if too_large:
             self.book.add(unit.frame)
@@ -114,23 +114,24 @@ class Session:
 
     @property
     def most_bytes(self) -> int:
-        """Of a message. What the last server said, or no limit."""
+        """Size limit of a message: the last server's, or none."""
         return (self.info.limits.max_message_bytes if self.info is not None else 0) or 1 << 62
 
     def _too_large(self, unit: Unit) -> str:
-        """Why the server would end the stream at it; empty: it would not."""
+        """Returns why the server would end the stream because of this unit; empty: it would not."""
         if unit.largest <= self.most_bytes:
             return ""
         return (f"an operation of the commit has {unit.largest} bytes and the server takes messages of at most "
                 f"{self.most_bytes} (max_message_bytes); nothing of the commit was sent; make several things of it")
 
     def _refuse(self, unit: Unit, reason: str) -> None:
-        """A commit that the server is not even asked about; told as what the server refuses is."""
+        """Refuses a commit that would exceed the server's limits without sending it; it is reported like the server's
+        refusals."""
         self.book.refuse(unit.frame, reason)
         self.on_issue(Issue("", "", "", "QUOTA_EXCEEDED", reason))
 
     def open_request(self) -> bytes:
-        """The first message of a stream."""
+        """Returns the first message of a stream."""
         s = self._settings
         request = pb.StreamRequest(open=pb.Open(
             client_name=s.client_name, strict=s.strict, resume_token=self._resume_token, flow=FLOWS[s.flow],
@@ -146,7 +147,7 @@ class Session:
         return self._count(request.SerializeToString())
 
     def forget_token(self) -> bool:
-        """The server does not know the token that the last Open gave. True: opening with less may go well."""
+        """Call when the server does not know the token of the last Open. True: opening with less may succeed."""
         if self._resume_token:
             self._resume_token = b""
             return True
@@ -157,7 +158,7 @@ class Session:
 
     def _count(self, message: bytes) -> bytes:
         self._sent += len(message)
-        # Pings and commits are sent with their numbers; from there the server counts for itself, which spares bulk a copy.
+        # Pings and commits are sent with their numbers; in between the server counts by itself, which saves a copy of bulk data.
         self._sequence += 1
         return message
 
@@ -165,7 +166,7 @@ class Session:
         return self._credit == 0 or self._sent < self._credit
 
     def next_request(self, now_ns: int) -> Optional[bytes]:
-        """The next message, if there is one and it may be sent now."""
+        """Returns the next message, if one is waiting and may be sent now."""
         self._give_up_owed(now_ns)
         if not self.open or not self._has_credit():
             return None
@@ -198,7 +199,7 @@ class Session:
         return message
 
     def _next_unit(self) -> Optional[Unit]:
-        """That can be sent: what the server would end the stream at is refused here."""
+        """Returns the next unit that can be sent; units for which the server would end the stream are refused here."""
         while True:
             unit = self._again.popleft() if self._again else self.outbox.pop()
             if unit is None:
@@ -212,17 +213,17 @@ class Session:
             self._refuse(unit, too_large)
 
     def next_due_ns(self) -> Optional[int]:
-        """When to ask again even if nothing else happens."""
+        """Returns when to call again even if nothing else happens."""
         due = [self._next_ping_ns] if self.open and self._pings_known else []
         if self._owed:
             due.append(self._owed_until_ns)
         return min(due, default=None)
 
     def idle(self) -> bool:
-        """All that was submitted has been sent, and all that had to be sent again."""
+        """Whether everything that was submitted, or had to be sent again, has been sent."""
         return self._current is None and not self._again and not len(self.outbox)
 
-    # -------------------------------------------------------------------------------------------------- what comes
+    # --------------------------------------------------------------------------------------------------- receiving
 
     def answer(self, response: pb.StreamResponse, now_ns: int) -> None:
         if response.HasField("opened"):
@@ -239,7 +240,7 @@ class Session:
         self._give_up_owed(now_ns)
 
     def _issue(self, issue: Issue) -> None:
-        """Its sequence says whose it is: of a commit without an answer yet, or of one that must be shown and was not."""
+        """Assigns an issue by its sequence: to a commit without an answer yet, or to one that must be shown and was not."""
         at = bisect_right(self._begun, issue.sequence, key=lambda one: one[0]) - 1
         unit = self._begun[at][1] if at >= 0 else None
         frame = self._must_show.get(issue.sequence)
@@ -276,7 +277,7 @@ class Session:
         self.on_issue(issue)
 
     def _answered(self, sequence: int) -> Optional[Unit]:
-        # Mostly the oldest; timed commits are answered when they are due, and others pass them.
+        # Usually the oldest; timed commits are answered when they are due, and others overtake them.
         for unit in self._on_way:
             if unit.commit_sequence == sequence:
                 self._on_way.remove(unit)
@@ -313,18 +314,19 @@ class Session:
 
     def _after_resume(self, units: Iterable[Unit], applied: int, opened: pb.Opened, kept: bool,
                       now_ns: int) -> Iterator[Unit]:
-        """Those to be sent again, of what had no answer when the stream ended. `applied`: the last one that was."""
+        """Yields the units to send again, of those without an answer when the stream ended. `applied`: the last one that was
+        applied."""
         for unit in units:
             frame = unit.frame
             if not unit.commit_sequence or frame.id > applied:
                 yield unit
             elif not kept:
-                # Its drops were counted, if it was applied at all; what it did went with the layers.
+                # If it was applied, its drops were counted; its effects were lost with the layers.
                 if frame.id == applied or not unit.timed and not self._settings.strict:
                     unit.drops = 0
                 yield unit
             elif frame.id != applied and unit.timed:
-                # It waited for its time when the stream ended, and was dropped; or it was applied before that.
+                # It was waiting for its time when the stream ended, and was dropped; or it was applied before that.
                 if unit.commit.present_at_ns > opened.server_time_ns:
                     yield unit
                 else:
@@ -369,13 +371,13 @@ class Session:
         units = [*self._on_way, *([self._current] if self._current is not None else []), *self._again]
         self._on_way.clear()
         self._current = None
-        # Of the scene that was being sent anew the next stream makes its own.
+        # The next stream makes its own restore of the scene.
         self._restore_due = self._restore_due or any(unit.restores for unit in units)
-        # In the order in which they were sent: those on their way are older than what is sent again after them.
+        # Keep the order of sending: units in flight are older than those that are sent again after them.
         self._again = deque(unit for unit in units if not unit.restores)
 
     def fail(self, reason: str) -> None:
-        """There will be no other stream."""
+        """Ends the session: no other stream will follow."""
         self.open = False
         while self.outbox.pop() is not None:
             pass

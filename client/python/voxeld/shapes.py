@@ -1,6 +1,6 @@
-"""What can be drawn, as wire bytes: each function checks its arguments and gives the primitives that stand for them.
+"""Encodes shapes as wire bytes: each function checks its arguments and returns the primitives that represent them.
 
-Clouds, lines and meshes beyond PIECE_BYTES come as several primitives, so that no message is large; who draws them gives
+Clouds, lines and meshes beyond PIECE_BYTES are split into several primitives, so that no message is large; the caller gives
 each an id.
 """
 from __future__ import annotations
@@ -19,10 +19,10 @@ from .texture import PictureFile, to_texture
 from .v1 import primitives_pb2 as pb
 from .v1 import types_pb2
 
-# A piece's payload at most; with its head a message stays below 1 MiB.
+# Limit of a piece's payload; with its head a message stays below 1 MiB.
 PIECE_BYTES = (1 << 20) - (2 << 10)
-# Of what cannot come in pieces: what protobuf has room for. A session says before it sends anything if that is more than its
-# server's max_message_bytes, 16 MiB unless the server is told otherwise.
+# Limit of shapes that cannot be split: protobuf's. A session raises an error before sending one that exceeds its server's
+# max_message_bytes, which is 16 MiB by default.
 WHOLE_BYTES = 1 << 30
 
 _MODES = {"strip": pb.Segments.STRIP, "loop": pb.Segments.LOOP, "pairs": pb.Segments.LIST}
@@ -45,7 +45,7 @@ def thickness(value: Optional[float], unit: str, what: str = "width") -> Optiona
 
 
 def packed(kind: str, head: bytes, vertices: wire.Packed, color: Optional[int]) -> wire.Packed:
-    """The primitive of that kind, its fields but for the vertices in `head`."""
+    """Returns a primitive of that kind; `head` has its fields except the vertices."""
     before = b"" if color is None else pb.Primitive(color=pb.Color(rgb=color)).SerializeToString()
     return vertices.inside(wire.Field.VERTICES[kind], head).inside(wire.Field.KINDS[kind], before)
 
@@ -55,7 +55,7 @@ def split_colors(color: object) -> tuple[Optional[int], Optional[Array]]:
 
 
 def _pieces(count: int, vertex_bytes: int, whole: int = 1, overlap: int = 0) -> Iterator[slice]:
-    """Ranges of vertices, each a multiple of `whole`, `overlap` of them in common with the next."""
+    """Yields ranges of vertices, each a multiple of `whole`, with `overlap` of them in common with the next."""
     most = PIECE_BYTES // vertex_bytes // whole * whole
     begin = 0
     while begin + overlap < count:
@@ -76,7 +76,7 @@ def points(at: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional
 
 
 def _each_element(colors: Optional[Colors], cmap: Optional[str], count: int, what: str) -> Optional[Array]:
-    """(count, 3): of each segment or face its own."""
+    """Returns (count, 3) colours, one per segment or face."""
     found = colors_.many(colors, count, cmap, "segments" if what == "segment_colors" else "faces")
     if found is None:
         return None
@@ -90,7 +90,8 @@ def _each_element(colors: Optional[Colors], cmap: Optional[str], count: int, wha
 def lines(at: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[str] = None,
           segment_colors: Optional[Colors] = None, mode: Optional[str] = None, width: Optional[float] = None,
           unit: str = "voxels", sampling: str = "thin") -> list[wire.Packed]:
-    """`at`: (n, 3), by default a strip; or (m, k, 3), m strips of k vertices each. `segment_colors`: of each segment."""
+    """`at` has the shape (n, 3), by default a strip; or (m, k, 3), m strips of k vertices each. `segment_colors`: one per
+    segment."""
     if colors is not None and segment_colors is not None:
         raise InvalidValue("colors and segment_colors are given; give one of them")
     array = as_array(at, "lines")
@@ -102,7 +103,7 @@ def lines(at: npt.ArrayLike, *, colors: Optional[Colors] = None, cmap: Optional[
     topology = choice(_MODES, mode or ("strip"), "mode")
     color, each = split_colors(colors_.many(colors_.along(colors, array), len(array), cmap if segment_colors is None else None))
     if many and each_strip > 2 or many and topology == pb.Segments.LOOP:
-        # Strips side by side, as pairs.
+        # Convert several strips to pairs.
         start = np.arange(len(array)).reshape(strips, each_strip)
         end = np.roll(start, -1, axis=1)
         if topology != pb.Segments.LOOP:
@@ -140,7 +141,7 @@ def mesh(at: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *, colors: Op
          cmap: Optional[str] = None, face_colors: Optional[Colors] = None, texture: Optional[PictureFile] = None,
          uv: Optional[npt.ArrayLike] = None, rule: str = "thin", fill: str = "surface", shell: Optional[float] = None,
          unit: str = "voxels") -> list[wire.Packed]:
-    """Triangles: of `faces`, or of the vertices three by three. `face_colors`: of each triangle."""
+    """Triangles from `faces`, or from the vertices three by three. `face_colors`: one per triangle."""
     if face_colors is not None and (colors is not None or texture is not None):
         raise InvalidValue(f"face_colors are given, and so is {'colors' if colors is not None else 'a texture'}; give one of them")
     array, element = positions(at, "vertices")
@@ -157,7 +158,7 @@ def mesh(at: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *, colors: Op
         own = _each_element(face_colors, cmap, len(array) // 3 if index is None else len(index), "face_colors")
     size = array.itemsize * 3 + (0 if each is None else each.shape[1])
     face = 0 if own is None else own.shape[1]
-    together = fill == "solid" or texture is not None  # a part of it is no solid, and each would have the texture
+    together = fill == "solid" or texture is not None  # a part of it is not a solid, and each would have the texture
     whole = len(head) + len(array) * size + (0 if index is None else (12 + face) * len(index))
     if together and whole > WHOLE_BYTES:
         raise InvalidArray(f"the mesh takes {whole} bytes, more than the {WHOLE_BYTES} that a solid, or one with a texture, may "
@@ -175,7 +176,7 @@ def mesh(at: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *, colors: Op
                 for r in _pieces(len(array), size + face, 3)]
     if together or index.nbytes + len(array) * size + len(index) * face <= PIECE_BYTES:
         return [one(array, each, index)]
-    # Each piece has the vertices of its own faces, at most three each.
+    # Each piece has only the vertices of its own faces, at most three each.
     result = []
     for r in _pieces(len(index), 12 + face + 3 * size):
         used, corners = np.unique(index[r], return_inverse=True)
@@ -184,7 +185,7 @@ def mesh(at: npt.ArrayLike, faces: Optional[npt.ArrayLike] = None, *, colors: Op
 
 
 def solid(color: Optional[Colors], **kind: Any) -> list[wire.Packed]:
-    """The one primitive of that kind."""
+    """Returns the single primitive of that kind."""
     if isinstance(color, colors_.Gradient):
         return [wire.message(pb.Primitive(color_scale=color.to_wire(), **kind))]
     rgb = None if color is None else pb.Color(rgb=colors_.one(color))
@@ -198,7 +199,7 @@ def vec(values: npt.ArrayLike, what: str) -> types_pb2.Vec3:
 
 def box(center: npt.ArrayLike, size: npt.ArrayLike, *, color: Optional[Colors] = None, fill: str = "surface",
         rule: str = "thin", shell: Optional[float] = None, unit: str = "voxels") -> list[wire.Packed]:
-    """`size`: three edge lengths, or one for all."""
+    """`size` is three edge lengths, or one for all."""
     edges = np.broadcast_to(as_array(size, "size"), (3,)) if np.ndim(size) == 0 else size
     for edge, axis in zip(vector(edges, "size"), "xyz"):
         number(edge, f"the size along {axis}", above=0)
@@ -231,9 +232,9 @@ def instance(of: str, *, color: Optional[Colors] = None, tint: Optional[Colors] 
 def volume(array: npt.ArrayLike, *, threshold: Optional[float] = None, cmap: str = "viridis",
            low: Optional[float] = None, high: Optional[float] = None,
            extent: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None) -> list[wire.Packed]:
-    """A field of numbers, (nx, ny, nz), or of colours, (nx, ny, nz, 3), as points at the cells' centres: those whose
-    number, or whose brightest channel from 0 to 1, is above `threshold` (default: half-way between least and greatest).
-    Points, not voxels: a field coarser than the display has gaps. `extent`: the field's corners; by default it fills
+    """Encodes a field of numbers, (nx, ny, nz), or of colours, (nx, ny, nz, 3), as points at the centres of its cells: those
+    whose number, or whose brightest channel from 0 to 1, is above `threshold` (default: half-way between least and greatest).
+    These are points, not voxels: a field coarser than the display has gaps. `extent`: the field's corners; by default it fills
     [-1, 1] on its longest axis."""
     field = as_array(array, "volume")
     colored = field.ndim == 4 and field.shape[3] in (3, 4)

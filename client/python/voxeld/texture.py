@@ -1,4 +1,4 @@
-"""Pictures on surfaces."""
+"""Images on surfaces."""
 from __future__ import annotations
 
 import os
@@ -17,7 +17,7 @@ PictureFile = Union[str, "os.PathLike[str]", bytes, bytearray, memoryview, Asset
 
 
 def picture_fields(texture: PictureFile) -> dict[str, Any]:
-    """A message's picture, or what stands in its place; OSError if the file cannot be read."""
+    """Returns a message's picture, or the range in its place. Raises OSError if the file cannot be read."""
     if isinstance(texture, Asset):
         return {"picture_in": texture.range()}
     return {"picture": _picture_bytes(texture)}
@@ -33,7 +33,7 @@ def _picture_bytes(texture: Union[str, "os.PathLike[str]", bytes, bytearray, mem
 
 
 def to_texture(texture: Optional[PictureFile], uv: Optional[npt.ArrayLike], count: int) -> Optional[pb.Texture]:
-    """With the places of `count` vertices; neither, or both."""
+    """Returns the texture with the places of `count` vertices. Give neither argument, or both."""
     if texture is None and uv is None:
         return None
     if texture is None or uv is None:

@@ -1,4 +1,4 @@
-"""Affine maps as 4×4 matrices; they compose with `@`, the right one first."""
+"""Affine maps as 4×4 matrices; they compose with `@`, and the right one is applied first."""
 from __future__ import annotations
 
 import math
@@ -19,7 +19,7 @@ def identity() -> Matrix:
 
 
 def translate(x: float | npt.ArrayLike, y: Optional[float] = None, z: Optional[float] = None) -> Matrix:
-    """By three numbers, or one array of three."""
+    """Returns a translation by three numbers, or by one array of three."""
     if (y is None) != (z is None) or y is None and np.ndim(x) == 0:
         raise InvalidArray(f"the translation is {', '.join(str(one) for one in (x, y, z) if one is not None)}; give x, y and z")
     by: Any = x if y is None else (x, y, z)
@@ -29,13 +29,13 @@ def translate(x: float | npt.ArrayLike, y: Optional[float] = None, z: Optional[f
 
 
 def scale(x: float | npt.ArrayLike, y: Optional[float] = None, z: Optional[float] = None) -> Matrix:
-    """One factor for all, or three, as numbers or as one array."""
+    """Returns a scaling by one factor for all axes, or by three, as numbers or as one array."""
     factors: Any = x if y is None and z is None and np.ndim(x) > 0 else (x, x if y is None else y, x if z is None else z)
     return np.diag([*vector(factors, "scale"), 1.0])
 
 
 def rotate(axis: str | npt.ArrayLike, degrees: float) -> Matrix:
-    """About "x", "y", "z" or any direction, counter-clockwise seen from its tip."""
+    """Returns a rotation about "x", "y", "z" or any direction, counter-clockwise as seen from its tip."""
     if isinstance(axis, str):
         if axis not in ("x", "y", "z"):
             raise InvalidArray(f"the axis is {axis!r}; give 'x', 'y', 'z' or a direction of three numbers")
@@ -55,7 +55,7 @@ def rotate(axis: str | npt.ArrayLike, degrees: float) -> Matrix:
 
 
 def as_matrix(values: npt.ArrayLike) -> Matrix:
-    """A 4×4 or 3×4 array as a checked 4×4 matrix."""
+    """Returns a 4×4 or 3×4 array as a checked 4×4 matrix."""
     array = as_array(values, "transform")
     if array.shape == (3, 4):
         array = np.vstack([array, [0, 0, 0, 1]])

@@ -1,9 +1,9 @@
-"""Streams over gRPC: connecting, connecting again, and the two threads that feed and read a stream.
+"""Streams over gRPC: connecting, reconnecting, and the two threads that write and read a stream.
 
-The caller's threads only put commits into the session's outbox and wake whoever sends. gRPC takes requests from an iterator
-of ours on a thread of its own, as bytes that go out as they are; another thread reads answers, and users' functions are called
-on a third. A stream that ends is begun anew after a pause that grows from BACKOFF_FIRST_S to BACKOFF_MOST_S, drawn at random
-from its upper half; it is short again once a commit was answered, or a stream has stood for as long as the longest pause.
+The caller's threads only put commits into the session's outbox and wake the sender. gRPC takes requests from an iterator
+of ours on a thread of its own, as bytes that are sent unchanged; a second thread reads answers, and users' callbacks run
+on a third. A stream that ends is reopened after a pause that grows from BACKOFF_FIRST_S to BACKOFF_MOST_S, drawn at random
+from its upper half; it is reset once a commit was answered, or a stream has lasted for as long as the longest pause.
 """
 from __future__ import annotations
 
@@ -28,45 +28,45 @@ log = logging.getLogger("voxeld")
 
 STREAM = "/voxeld.v1.SceneService/Stream"
 BACKOFF_FIRST_S, BACKOFF_MOST_S = 0.1, 5.0
-# How long what waits may still be sent when nobody holds the connection any more.
+# How long waiting commits may still be sent after the last reference to the connection is gone.
 ABANDONED_S = 2.0
 
 CHANNEL_OPTIONS = [
     ("grpc.max_send_message_length", -1),
     ("grpc.max_receive_message_length", -1),
-    # A new channel must not wait out the pauses of the one before.
+    # A new channel must not wait for the previous channel's backoff.
     ("grpc.use_local_subchannel_pool", 1),
     ("grpc.keepalive_time_ms", 20_000),
     ("grpc.keepalive_timeout_ms", 10_000),
     ("grpc.http2.write_buffer_size", 1 << 20),
 ]
 
-# To begin again would bring the same answer.
+# Retrying would bring the same answer.
 _FINAL = (grpc.StatusCode.INVALID_ARGUMENT, grpc.StatusCode.PERMISSION_DENIED, grpc.StatusCode.UNAUTHENTICATED,
           grpc.StatusCode.UNIMPLEMENTED, grpc.StatusCode.FAILED_PRECONDITION, grpc.StatusCode.NOT_FOUND,
           grpc.StatusCode.ABORTED)  # another stream has taken the session up
 
 
 def backoff_s(attempt: int, draw: Callable[[], float]) -> float:
-    """The pause before attempt number `attempt` (0 is the first after a loss); `draw` gives 0 to 1."""
+    """Returns the pause before attempt number `attempt` (0 is the first after a loss); `draw` returns 0 to 1."""
     most = min(BACKOFF_FIRST_S * 2.0 ** min(attempt, 16), BACKOFF_MOST_S)
     return most * (0.5 + 0.5 * draw())
 
 
 class Transport:
-    """`on_issue` is called on a thread that does nothing else, without any lock; it may draw and wait."""
+    """`on_issue` is called on a thread that does nothing else, without any lock held; it may draw and wait."""
 
     def __init__(self, server: str, who: Credentials, session: Session, on_issue: Callable[[Issue], None]) -> None:
         self.server = server
         self.last_error = ""
         self._credentials = who
         self._metadata = credentials.metadata(server, who)
-        # What is wrong with a file is said at once. Each stream reads it anew.
+        # Report errors of the credential files at once. Each stream reads them again.
         credentials.open_channel(server, who, CHANNEL_OPTIONS).close()
         self._session = session
         self._callbacks = Callbacks(on_issue)
         session.on_issue, session.done = self._callbacks.issue, self._callbacks.done
-        # Reentrant: a signal handler or a finaliser may draw in the middle of anything.
+        # Reentrant: a signal handler or a finaliser may draw at any time.
         self._lock = threading.RLock()
         self._changed = threading.Condition(self._lock)
         self._closing = False   # send what is there, then half-close
@@ -80,17 +80,17 @@ class Transport:
 
     @property
     def lock(self) -> threading.RLock:
-        """Of the session."""
+        """The session's lock."""
         return self._lock
 
     @property
     def stopped(self) -> bool:
-        """Nothing more will be sent."""
+        """Whether nothing more will be sent."""
         return self._stopped
 
     def submit(self, make: Callable[[Frame], tuple[Unit, Callable[[], None]]], wait_for_room: bool) -> Frame:
-        """`make` is called under the lock with the commit's frame, and gives the commit and what is to be done, under the
-        lock too, once it was taken. BufferFull unless `wait_for_room`."""
+        """Calls `make` under the lock with the commit's frame; it returns the commit, and a function to call, also under the
+        lock, once the commit was queued. Raises BufferFull if it does not fit, unless `wait_for_room`."""
         with self._changed:
             while True:
                 if self._stopped:
@@ -107,7 +107,8 @@ class Transport:
                 self._changed.wait()
 
     def wait_until(self, ready: Callable[[], bool], timeout: Optional[float]) -> bool:
-        """Until `ready`, which is asked under the lock. Raises ConnectionLost when there is no hope."""
+        """Waits until `ready`, which is called under the lock, returns true. Raises ConnectionLost when the connection has
+        failed for good."""
         with self._changed:
             self._changed.wait_for(lambda: self._stopped or ready(), timeout)
             if ready():
@@ -117,10 +118,10 @@ class Transport:
             return False
 
     def close(self, timeout: float) -> None:
-        """Sends what waits and half-closes, within `timeout`; then ends whatever is left. May be called again."""
+        """Sends what is waiting and half-closes, within `timeout`; then ends whatever is left. May be called again."""
         end = time.monotonic() + timeout
         with self._changed:
-            # What waits for a connection to come back may still go.
+            # Commits that wait for a reconnect may still be sent.
             self._changed.wait_for(lambda: self._stopped or self._session.open or self._session.idle(), timeout)
             self._closing = True
             if not self._session.open:
@@ -133,8 +134,7 @@ class Transport:
         self._callbacks.drain(max(end - time.monotonic(), 1.0))
 
     def abandon(self, closed: Callable[[], None]) -> None:
-        """Nobody draws any more: as close(), and then `closed`, without waiting for it. For finalisers: no lock is taken
-        here."""
+        """Closes without waiting, as close() does, and then calls `closed`. For finalisers: it takes no lock itself."""
 
         def close() -> None:
             self.close(ABANDONED_S)
@@ -151,10 +151,10 @@ class Transport:
                 self._call.cancel()
         self._changed.notify_all()
 
-    # ------------------------------------------------------------------------------------------------ our threads
+    # ------------------------------------------------------------------------------------------------- own threads
 
     def _requests(self, stream: int) -> Iterator[bytes]:
-        """On gRPC's thread: what to send, as it may be sent. Nothing after Open before its answer."""
+        """Yields what to send, when it may be sent, on gRPC's thread. Sends nothing after Open before its answer."""
         with self._changed:
             first = self._session.open_request()
         yield first
@@ -216,7 +216,7 @@ class Transport:
                     return
 
     def _one_stream(self) -> Optional[Exception]:
-        """Reads one stream to its end."""
+        """Reads one stream until it ends."""
         try:
             channel = credentials.open_channel(self.server, self._credentials, CHANNEL_OPTIONS)
             self._metadata = credentials.metadata(self.server, self._credentials)

@@ -1,4 +1,4 @@
-"""A volume that a display shows, rebuilt: slices of colours, and where their pixels are."""
+"""A volume that a display shows, reconstructed: slices of colours, and the positions of their pixels."""
 from __future__ import annotations
 
 from typing import Iterable, Optional
@@ -16,7 +16,7 @@ Places = npt.NDArray[np.intp]
 
 
 def _row(count: int, pitch_mm: float, middle_mm: float, mirror: bool) -> Floats:
-    """The centres of the pixels of one picture axis."""
+    """Returns the centres of the pixels along one axis of the slice images."""
     centres = (np.arange(count) + 0.5 - count / 2) * pitch_mm + middle_mm
     return centres[::-1] if mirror else centres
 
@@ -52,11 +52,11 @@ class Volume:
 
     @property
     def lit(self) -> int:
-        """Pixels that are not black."""
+        """The number of pixels that are not black."""
         return int(np.count_nonzero(self.rgb.any(axis=3)))
 
     def points(self) -> tuple[Floats, Bytes]:
-        """Where the lit pixels are, in mm, (n, 3), and their colours, (n, 3)."""
+        """Returns the positions of the lit pixels in mm, (n, 3), and their colours, (n, 3)."""
         s, v, u = np.nonzero(self.rgb.any(axis=3))
         colors = self.rgb[s, v, u]
         geometry = self.header.geometry
@@ -77,7 +77,7 @@ class Volume:
         return self._corrected(at), colors
 
     def _picture(self, s: Places, across: Floats, up: Floats) -> tuple[Floats, Floats]:
-        """Where pictures' places are by their homographies."""
+        """Applies the homographies to positions in the slice images."""
         numbers = self.header.geometry.correction.homographies
         if not numbers:
             return across, up
@@ -87,7 +87,7 @@ class Volume:
         return x / w, y / w
 
     def _corrected(self, at: Floats) -> Floats:
-        """True places of nominal ones."""
+        """Returns the true positions of nominal ones."""
         correction = self.header.geometry.correction
         result = at
         if correction.affine:
@@ -147,7 +147,7 @@ class Volume:
         return result
 
     def corners(self) -> Floats:
-        """The corners of the voxel grid, in mm, (8, 3)."""
+        """Returns the corners of the voxel grid in mm, (8, 3)."""
         grid = self.header.geometry.grid
         low = np.array([grid.origin_mm.x, grid.origin_mm.y, grid.origin_mm.z])
         size = np.array([grid.nx * grid.pitch_mm.x, grid.ny * grid.pitch_mm.y, grid.nz * grid.pitch_mm.z])
@@ -156,14 +156,14 @@ class Volume:
         return result
 
     def picture(self, width: int = 512, height: int = 512, azimuth: float = 30.0, elevation: float = 25.0) -> Bytes:
-        """As seen from outside, (height, width, 3): lights add up; the grid's edges are drawn in grey."""
+        """Renders the volume as seen from outside, (height, width, 3): lights add up; the grid's edges are drawn in grey."""
         at, colors = self.points()
         grid = self.header.geometry.grid
         pitch = max(grid.pitch_mm.x, grid.pitch_mm.y, grid.pitch_mm.z)
         return picture_.splat(at, colors, self.corners(), pitch, width, height, azimuth, elevation)
 
     def save_png(self, path: str, width: int = 512, height: int = 512, azimuth: float = 30.0, elevation: float = 25.0) -> None:
-        """picture(), as a file."""
+        """Writes picture() to a PNG file."""
         with open(path, "wb") as file:
             file.write(picture_.png(self.picture(width, height, azimuth, elevation)))
 

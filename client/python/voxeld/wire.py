@@ -1,9 +1,9 @@
-"""Wire bytes of bulk content without protobuf's copies.
+"""Encodes bulk content as wire bytes without protobuf's copies.
 
-A message whose payloads lie last at every level is a short head, known once the sizes are, and then the arrays
+A message whose payloads are last at every level consists of a short head, known once the sizes are, followed by the arrays
 themselves: `Packed`. Wrapping it into the next outer message only makes the head longer; one join at the end copies
-everything once. Heads are made of generated messages, so the field numbers of what is inside them stand in the .proto
-files alone; those that wrap are below.
+everything once. Heads are made of generated messages, so the field numbers of their content are only in the .proto
+files; the numbers of the wrapping fields are below.
 """
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _key(number: int) -> bytes:
 
 
 class Field:
-    """Keys of the fields that wrap payloads, by the generated messages' own numbers."""
+    """Keys of the fields that wrap payloads, from the generated messages' own numbers."""
 
     UPSERT = _key(scene_pb2.StreamRequest.UPSERT_FIELD_NUMBER)
     BATCH = _key(scene_pb2.StreamRequest.BATCH_FIELD_NUMBER)
@@ -65,7 +65,7 @@ class Field:
 
 
 class Packed:
-    """A message: `head`, then `tail` as it lies in memory. Of no use once an array in the tail has changed."""
+    """A message: `head`, then `tail` as it lies in memory. It becomes invalid once an array in the tail has changed."""
 
     __slots__ = ("head", "tail", "tail_size")
 
@@ -78,22 +78,22 @@ class Packed:
         return len(self.head) + self.tail_size
 
     def inside(self, key: bytes, before: bytes = b"") -> "Packed":
-        """The message that has this one as its field `key`, after the fields in `before`."""
+        """Returns the message that has this one as its field `key`, after the fields in `before`."""
         return Packed(before + key + varint(len(self)) + self.head, self.tail, self.tail_size)
 
     def to_bytes(self) -> bytes:
-        """The one copy."""
+        """Returns the bytes; this is the only copy."""
         return b"".join((self.head, *self.tail)) if self.tail else self.head
 
 
 def payload(array: Array) -> memoryview:
-    """The bytes of a C-contiguous array, without a copy."""
+    """Returns the bytes of a C-contiguous array, without a copy."""
     return np.ravel(array).view(np.uint8).data
 
 
 def vertices(positions: Array, position_type: primitives_pb2.ElementType,
              colors: Optional[Array] = None, indices: Optional[Array] = None, *, of_elements: bool = False) -> Packed:
-    """Vertices. `colors` is (n, 3) or (n, 4) uint8, of segments or triangles if `of_elements`; `indices` uint32."""
+    """Encodes vertices. `colors` is (n, 3) or (n, 4) uint8, one per segment or triangle if `of_elements`; `indices` is uint32."""
     head = primitives_pb2.Vertices(count=len(positions), position_type=position_type)
     parts: list[tuple[bytes, memoryview]] = []
     if indices is not None:
@@ -121,8 +121,8 @@ def message(content: Message) -> Packed:
 
 
 class Put:
-    """An upsert as a whole StreamRequest; its Upsert begins at `start`. `uses`: the object that it is an instance of.
-    `lifetime_ns`: how long it stays, as the request says; 0: for ever."""
+    """An upsert as a complete StreamRequest; its Upsert begins at `start`. `uses`: the object that it is an instance of.
+    `lifetime_ns`: how long it stays, as the request says; 0: without limit."""
 
     __slots__ = ("layer", "id", "request", "start", "uses", "lifetime_ns")
 
@@ -135,7 +135,7 @@ class Put:
         self.lifetime_ns = lifetime_ns
 
     def with_lifetime(self, lifetime_ns: int) -> "Put":
-        """The same, but for how long it stays."""
+        """Returns the same with another lifetime."""
         request = scene_pb2.StreamRequest.FromString(self.request)
         request.upsert.entity.lifetime_ns = lifetime_ns
         content = Packed(request.upsert.SerializeToString())
@@ -144,20 +144,20 @@ class Put:
 
 
 def put(layer: str, id: str, entity: bytes, primitive: Packed, uses: str = "", lifetime_ns: int = 0) -> Put:
-    """Upsert of `primitive` under (layer, id). `entity`: an Entity's other fields, serialised."""
+    """Encodes an upsert of `primitive` under (layer, id). `entity`: an Entity's other fields, serialised."""
     upsert = primitive.inside(Field.PRIMITIVE, entity).inside(
         Field.ENTITY, scene_pb2.Upsert(layer=layer, id=id).SerializeToString())
     request = upsert.inside(Field.UPSERT)
     return Put(layer, id, request.to_bytes(), len(request) - len(upsert), uses, lifetime_ns)
 
 
-# Upserts of at least this size travel alone, as they are; smaller ones side by side fill a batch up to the other.
+# Upserts of at least this size are sent alone, unchanged; consecutive smaller ones fill a batch up to the second limit.
 ALONE_BYTES = 64 << 10
 BATCH_BYTES = 1 << 20
 
 
 def runs(puts: Sequence[Put], most_bytes: int = BATCH_BYTES) -> Iterator[Sequence[Put]]:
-    """`puts` in their order, parted as messages: none above `most_bytes` but a put that is so by itself."""
+    """Splits `puts`, in their order, into messages: none above `most_bytes` except a single put that is larger."""
     waiting: list[Put] = []
     size = 0
     for one in puts:
@@ -175,7 +175,7 @@ def runs(puts: Sequence[Put], most_bytes: int = BATCH_BYTES) -> Iterator[Sequenc
 
 
 def together(puts: Sequence[Put]) -> bytes:
-    """One request that puts them up."""
+    """Returns one request that adds all of them."""
     if len(puts) == 1:
         return puts[0].request
     tail: list[Buffer] = []
