@@ -163,8 +163,8 @@ absl::Status Display::SetBlank(bool blank) {
   }
   blanked_ = blank;
   if (blank) {
-    // The verdict falls now; the driver may still finish what it sends,
-    // and that is what light brings back.
+    // The outcome is decided now; the driver may still finish sending, and the volume it sends is
+    // what is shown when the display is unblanked.
     if (in_flight_ != nullptr && owed_) {
       owed_ = false;
       ReportLost(in_flight_->volume, "blanked", 0);
@@ -259,7 +259,7 @@ void Display::DeviceLost(const std::string& reason, uint64_t bytes) {
   full_next_ = true;
   resend_at_ = sync::kNever;
   LoseInFlight(reason, bytes);
-  if (holding_) LoseWaiting(reason);  // of a round that goes on without this display
+  if (holding_) LoseWaiting(reason);  // of a genlock round that continues without this display
   FinishCaptures(absl::UnavailableError(absl::StrCat("the display was lost: ", reason)));
 }
 
@@ -291,7 +291,8 @@ void Display::FrameDone(sync::TimeNs shown_ns, Evidence evidence, sync::TimeNs l
   in_flight_ = nullptr;
   resend_.Reset();
   if (owed_ && due_ != 0 && shown_ns > due_ + due_period_ / 2) ++stats_.volumes_late;
-  full_next_ = frame->volume == 0;  // a black one of our own is no base for what the engine counts
+  // our own black volume is not a base for the volumes that the engine counts
+  full_next_ = frame->volume == 0;
   if (owed_) {
     owed_ = false;
     presented_ = frame;
@@ -385,7 +386,7 @@ void Display::LoseWaiting(const std::string& reason) {
 }
 
 void Display::SendNext() {
-  if (sending_) return;  // a driver that ends a volume inside DoSend comes back to the loop below
+  if (sending_) return;  // a driver that ends a volume inside DoSend returns to the loop below
   sending_ = true;
   while (state_ == DisplayState::kShowing && in_flight_ == nullptr) {
     const bool owed = waiting_ != nullptr;
@@ -399,7 +400,7 @@ void Display::SendNext() {
       const bool due = resend_at_ == sync::kNever ? asked : resend_at_ <= clock_.Now();
       if (!due || (newest_ == nullptr && !asked)) break;
     }
-    // Nothing that was not ordered shown is shown for a capture.
+    // A capture must not show a volume that was not ordered shown.
     const SliceFramePtr& next = holding_ && !owed ? presented_ : newest_;
     in_flight_ = next != nullptr ? next : BlackFrame(info_.layout);
     owed_ = owed;
@@ -410,7 +411,7 @@ void Display::SendNext() {
       if (coming.size() == 2) due_ = coming[0], due_period_ = coming[1] - coming[0];
     }
     resend_at_ = sync::kNever;
-    // Who watches has the volume before as the base of the next; a capture begins by itself.
+    // A watcher has the previous volume as the base of the next; a capture starts without one.
     const bool begins = !captures_.empty() || (watcher_ && decoder_ == nullptr);
     if (begins || !watcher_) {
       decoder_status_ = absl::OkStatus();

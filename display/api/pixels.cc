@@ -9,7 +9,7 @@ namespace {
 
 uint8_t Expand(int value, int max) { return static_cast<uint8_t>((value * 510 + max) / (2 * max)); }
 
-// A pixel's three levels out of one picture.
+// A pixel's three levels in one slice image.
 struct Levels {
   int rgb[3] = {};
 };
@@ -60,7 +60,7 @@ Levels LevelsAt(const FrameLayout& layout, std::span<const std::byte> picture, s
   return levels;
 }
 
-// One picture as 8-bit light into `rgb`.
+// Converts one slice image to 8-bit light in `rgb`.
 void PictureToRgb(const FrameLayout& layout, std::span<const std::byte> picture,
                   std::span<uint8_t> rgb) {
   if (layout.format == PixelFormat::kRgb888 && layout.bits_per_channel() == 8) {
@@ -138,7 +138,8 @@ double LightOf(const FrameLayout& layout, std::span<const std::byte> picture) {
     }
     case PixelFormat::kBitPlanes:
     case PixelFormat::kHub75: {
-      // Planes of one weight lie together, the highest first; of HUB75 six bits of a byte are lights.
+      // Planes of one weight lie together, the highest first; in HUB75, six bits of a byte are
+      // lights.
       const uint64_t mask =
           layout.format == PixelFormat::kHub75 ? 0x3F3F3F3F3F3F3F3F : ~uint64_t{0};
       const size_t size = picture.size() / bits;

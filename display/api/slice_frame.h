@@ -1,4 +1,4 @@
-// The pixels of one volume, packed as the display wants them. Words only.
+// The pixels of one volume, packed in the display's format.
 #pragma once
 
 #include <cstddef>
@@ -10,17 +10,17 @@
 
 namespace voxeld::display {
 
-// One picture's bytes, layout.bytes_per_slice() of them;
-// shared between volumes that have it in common.
+// The bytes of one slice image, layout.bytes_per_slice() of them; shared between volumes that have
+// it in common.
 using Picture = std::shared_ptr<const std::vector<std::byte>>;
 
 // One volume. Immutable once handed over.
 struct SliceFrame {
-  // Numbers ascend from 1; those of volumes that came out unchanged, or to nothing, are left out.
+  // Numbers ascend from 1; volumes that came out unchanged, or failed, are skipped.
   uint64_t volume = 0;
   FrameLayout layout;
-  std::vector<std::byte> bytes;  // layout.bytes(): picture after picture
-  // layout.pictures(): the volume in which each picture last changed.
+  std::vector<std::byte> bytes;  // layout.bytes(): image after image
+  // layout.pictures(): the volume in which each slice image last changed.
   std::vector<uint64_t> changed_in;
 };
 

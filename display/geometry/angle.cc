@@ -54,10 +54,11 @@ constexpr int64_t kArcTangents[] = {340304653033718298,
                                     1335088,
                                     667544};
 
-// Π 1/√(1 + 4⁻ⁱ) over the same steps, in 2⁻⁶⁰: undoes what the steps add to the length.
+// Π 1/√(1 + 4⁻ⁱ) over the same steps, in 2⁻⁶⁰: compensates for the growth of the length in the
+// steps.
 constexpr int64_t kUnitLength = 990112082269311855;
 
-// Of an angle of at most an eighth turn.
+// Returns the direction of an angle of at most an eighth turn.
 Direction OctantDirection(Turn turn) {
   int64_t x = kUnitLength, y = 0, rest = static_cast<int64_t>(turn) << 30;
   int shift = 1;
@@ -74,9 +75,9 @@ Direction OctantDirection(Turn turn) {
   return {static_cast<int32_t>((x + kHalf) >> 30), static_cast<int32_t>((y + kHalf) >> 30)};
 }
 
-// Of 0 ≤ y ≤ x, x > 0.
+// Returns the angle of (x, y). Requires: 0 ≤ y ≤ x, x > 0.
 Turn OctantTurn(int64_t x, int64_t y) {
-  // As many bits as leave room for the growth by 1/0.86.
+  // Scale to as many bits as leave room for the growth by 1/0.86.
   const int scale = std::countl_zero(static_cast<uint64_t>(x)) - 4;
   x = scale >= 0 ? x << scale : x >> -scale;
   y = scale >= 0 ? y << scale : y >> -scale;
@@ -128,7 +129,7 @@ Direction DirectionOf(Turn turn) {
 }
 
 Turn TurnOf(int64_t x, int64_t y) {
-  // Turned back by whole quarters until x > 0 and y ≥ 0.
+  // Turn back by whole quarters until x > 0 and y ≥ 0.
   Turn quarters = 0;
   while (x <= 0 || y < 0) {
     const int64_t turned = y;

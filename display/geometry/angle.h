@@ -1,4 +1,4 @@
-// Angles, sines, cosines and arc tangents in integers: the same bits on every machine.
+// Integer angles, sines, cosines and arc tangents: the same bits on every machine.
 #pragma once
 
 #include <cstdint>
@@ -8,10 +8,10 @@ namespace voxeld::display {
 // An angle in units of 2⁻³² turn, counter-clockwise; sums and differences wrap around as turns do.
 using Turn = uint32_t;
 
-// `turns` in [0, 1), rounded half up.
+// Returns `turns`, in [0, 1), as an angle, rounded half up.
 Turn TurnFromFraction(double turns);
 
-// part/whole of a turn, rounded half up. 0 ≤ part < whole.
+// Returns part/whole of a turn, rounded half up. Requires: 0 ≤ part < whole.
 Turn TurnFromRatio(uint32_t part, uint32_t whole);
 
 // In units of 2⁻³⁰, rounded to nearest (within 0.51 units of the true value). Quarter turns are
@@ -21,11 +21,11 @@ struct Direction {
 };
 Direction DirectionOf(Turn turn);
 
-// The angle of (x, y), within 0.51·2⁻³² turn; symmetric under quarter turns.
-// |x|, |y| < 2⁶²; not both 0.
+// Returns the angle of (x, y), within 0.51·2⁻³² turn; symmetric under quarter turns. Requires: |x|,
+// |y| < 2⁶²; not both 0.
 Turn TurnOf(int64_t x, int64_t y);
 
-// ⌊√n⌋, exact. n < 2⁶².
+// Returns ⌊√n⌋, exactly. Requires: n < 2⁶².
 int64_t FloorSqrt(int64_t n);
 
 }  // namespace voxeld::display

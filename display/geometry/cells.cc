@@ -5,7 +5,7 @@
 namespace voxeld::display {
 namespace {
 
-// The first cell whose centre is at twice_low / 2 or beyond, within [0, cells].
+// Returns the first cell whose centre is at twice_low / 2 or beyond, within [0, cells].
 int32_t FirstCell(Fixed twice_low, int32_t cells) {
   constexpr Fixed kTwo = 2 * kFixedOne;
   const Fixed first = (twice_low - kFixedOne + (kTwo - 1)) >> (kFixedBits + 1);

@@ -12,9 +12,10 @@
 namespace voxeld::display {
 namespace {
 
-constexpr double kMostScale = 8;  // of a determinant, of a homography's w; and its inverse
+// for a determinant and for a homography's w; and for their inverses
+constexpr double kMostScale = 8;
 constexpr double kMostStretch = 16;
-constexpr double kMostContraction = 0.9;  // of ToNominal's iteration
+constexpr double kMostContraction = 0.9;  // contraction factor of ToNominal's iteration
 constexpr int kMostIterations = 400;      // 0.9^400 < 2⁻⁶⁰
 constexpr double kClose = 1.0 / (1 << 30);
 
@@ -42,7 +43,7 @@ std::array<double, 12> Inverse(const std::array<double, 12>& a) {
   return out;
 }
 
-// Frobenius', of the linear part.
+// Returns the Frobenius norm of the linear part.
 double NormOf(const std::array<double, 12>& a) {
   double sum = 0;
   for (size_t i = 0; i < a.size(); ++i) sum += i % 4 == 3 ? 0 : a[i] * a[i];
@@ -81,7 +82,7 @@ absl::Status CheckAffine(const std::array<double, 12>& affine) {
                absl::StrCat("at most ", kMostStretch, ": it keeps roughly sizes"));
 }
 
-// How much the displacement may change from place to place, at most, for a contraction.
+// Checks that the displacement changes little enough from place to place for a contraction.
 absl::Status CheckDisplacement(const Correction& correction) {
   const DisplacementGrid& grid = *correction.displacement;
   const int32_t n[3] = {grid.nx, grid.ny, grid.nz};
@@ -109,7 +110,8 @@ absl::Status CheckDisplacement(const Correction& correction) {
                  absl::StrCat(count, ", nx·ny·nz"));
   }
   const double norm = NormOf(Inverse(correction.affine));
-  // Trilinear between: its gradient's three columns are no longer than the steepest edges.
+  // With trilinear interpolation the gradient's three columns do not exceed the steepest
+  // edges.
   double steepest[3] = {};
   const size_t stride[3] = {1, static_cast<size_t>(n[0]),
                             static_cast<size_t>(n[0]) * static_cast<size_t>(n[1])};

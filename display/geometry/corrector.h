@@ -1,4 +1,4 @@
-// A display's correction as maps: the nominal place of what its shape says, the true one of its
+// A display's correction as maps between the nominal places of its shape and the true places of its
 // light.
 #pragma once
 
@@ -13,17 +13,18 @@
 
 namespace voxeld::display {
 
-// Immutable, so thread-safe. IEEE operations in one order: the same places on every machine.
+// Immutable, so thread-safe. Uses IEEE operations in a fixed order: the same places on every
+// machine.
 class Corrector {
  public:
-  // Valid (CheckCorrection), or none: then every place is where it is.
+  // `correction` must be valid (CheckCorrection), or empty: then every place maps to itself.
   explicit Corrector(const std::optional<Correction>& correction);
 
   Vec3 ToTrue(const Vec3& nominal) const;
-  // The inverse, within 2⁻³⁰ mm, by iteration: the displacement is a contraction.
+  // Inverts ToTrue, within 2⁻³⁰ mm, by iteration: the displacement is a contraction.
   Vec3 ToNominal(const Vec3& place) const;
 
-  // Of a slice's picture, mm from its middle.
+  // Map places in a slice image, mm from its middle.
   PicturePlace PictureToTrue(int32_t slice, PicturePlace place) const;
   PicturePlace PictureToNominal(int32_t slice, PicturePlace place) const;
   bool moves_pictures() const { return !homographies_.empty(); }
@@ -40,10 +41,11 @@ class Corrector {
   std::vector<Homography> homographies_, inverse_homographies_;
 };
 
-// Half the sides of a shape's pictures, mm; none: it has no projected pictures.
+// Returns half the sides of a shape's slice images, mm; nothing if it has no projected images.
 std::optional<PicturePlace> HalfPicture(const Geometry& geometry);
 
-// InvalidArgument with the first field of a geometry's correction that is wrong. Its shape is valid.
+// Errors: InvalidArgument with the first wrong field of a geometry's correction. Requires a valid
+// shape.
 absl::Status CheckCorrection(const Geometry& geometry);
 
 }  // namespace voxeld::display

@@ -18,7 +18,7 @@ namespace {
 constexpr int64_t kMostUnevenCells = 4096;
 constexpr double kEven = 1e-6;  // relative
 
-// The least count of cells that cover `length`, give or take what doubles leave over.
+// Returns the smallest number of cells that cover `length_mm`, up to rounding errors of doubles.
 int32_t CellsOver(double length_mm, double pitch_mm) {
   const double cells = length_mm / pitch_mm;
   const int64_t rounded = RoundHalfUp(cells);
@@ -45,7 +45,7 @@ DepthCells CellsAlong(const PlanarStack& stack) {
   }
   int64_t count = static_cast<int64_t>(p.size()) / stack.strokes;
   if (count > 1 && greatest - least > kEven * greatest) {
-    // Past the limit the quotient itself may be past any integer.
+    // Limit it before the cast: the quotient may exceed any integer.
     const double wanted = std::min(depth / least, static_cast<double>(kMostUnevenCells));
     count = std::max<int64_t>(RoundHalfUp(wanted), 1);
   }

@@ -14,11 +14,11 @@ constexpr int kRounds = 24;
 constexpr int kRoundsBeforeKeepers = 6;
 constexpr int32_t kCube = kDensityCube;
 constexpr uint32_t kNoRow = UINT32_MAX;
-constexpr size_t kSparseShare = 50;  // one cube of so many may be darker than the rest
+constexpr size_t kSparseShare = 50;  // one in this many cubes may be darker than the rest
 constexpr float kNearlyFull = 0.995F;
 
-// The outer voxels of footprints (the inner axis, along which all is alike, is one voxel here), with a margin so that cubes
-// may reach over the edges.
+// The outer voxels of footprints (the inner axis, along which all is alike, is one voxel here),
+// with a margin so that cubes may extend over the edges.
 class Field {
  public:
   Field(const FootprintTable& table, const VoxelGrid& grid) {
@@ -33,7 +33,7 @@ class Field {
   }
 
   size_t count() const { return size_[0] * size_[1] * size_[2]; }
-  float cube() const { return cube_; }  // voxels of one
+  float cube() const { return cube_; }  // voxels in a cube
   size_t At(const FootprintEntry& e) const {
     const auto along = [&](size_t a, uint16_t i) {
       return margin_[a] == 0 ? 0 : static_cast<size_t>(i + margin_[a]);
@@ -41,7 +41,8 @@ class Field {
     return (along(2, e.z) * size_[1] + along(1, e.y)) * size_[0] + along(0, e.x);
   }
 
-  // Sums over the cubes that begin (forward) or end at each voxel, as far as these lie in the field.
+  // Computes sums over the cubes that begin (forward) or end at each voxel, as far as they lie in
+  // the field.
   void Sum(std::vector<float>& of, bool forward) const {
     size_t step = 1;
     for (size_t a = 0; a < 3; step *= size_[a], ++a) {
@@ -105,12 +106,13 @@ class Evener {
     target_ = *sparse / field_.cube();
   }
 
-  // Whether any cube lies within reach whole.
+  // Returns whether any cube lies completely within reach.
   bool has_target() const { return target_ > 0; }
   const std::vector<float>& factors() const { return factors_; }
   bool kept(size_t row) const { return floors_[row] > 0; }
 
-  // Towards the light of the sparsest cube, by as much as the cubes of a row's voxels have too much or too little.
+  // Moves each row towards the light of the sparsest cube, by the surplus or deficit of the cubes
+  // of its voxels.
   void Round() {
     for (size_t i = 0; i < light_.size(); ++i) {
       light_[i] = light_[i] > 0 ? target_ * reach_[i] / light_[i] * reach_[i] : 0;
@@ -125,8 +127,9 @@ class Evener {
     light_ = LightOfCubes();
   }
 
-  // Rows that between them have every voxel whole, in each set of inner lists; few of them: a voxel that no row yet has takes
-  // the one of its rows that has most such voxels, of these the one with most light.
+  // Chooses few rows that together contain every voxel, in each set of inner lists: a voxel that no
+  // chosen row has takes the one of its rows that has most such voxels, and among these the
+  // brightest.
   void Keep(float least) {
     for (int32_t set = 0; set < table_.inner_sets; ++set) KeepOf(set, least);
     light_ = LightOfCubes();
@@ -134,7 +137,7 @@ class Evener {
 
  private:
   void KeepOf(int32_t set, float least) {
-    // Rows by voxel.
+    // Index rows by voxel.
     std::vector<uint32_t> begin(field_.count() + 1);
     const auto each = [&](auto call) {
       for (int32_t slice = set; slice < table_.slices; slice += table_.inner_sets) {
@@ -187,7 +190,7 @@ class Evener {
     return light;
   }
 
-  // A voxel of a row, and how much of the row's light is its.
+  // A voxel of a row, and its share of the row's light.
   struct Entry {
     uint32_t at;
     float share;
@@ -199,12 +202,12 @@ class Evener {
 
   const FootprintTable& table_;
   const Field field_;
-  std::vector<Entry> entries_;  // as the table's outer ones
+  std::vector<Entry> entries_;  // corresponds to the table's outer entries
   std::vector<float> factors_, floors_;
-  std::vector<float> reach_;  // voxels within reach of the cube that begins at each
-  std::vector<float> about_;  // sums of these over the cubes that have a voxel
-  std::vector<float> light_;  // of these cubes
-  float target_ = 0;          // a voxel
+  std::vector<float> reach_;  // voxels within reach of the cube that begins at each voxel
+  std::vector<float> about_;  // sums of reach_ over the cubes that contain a voxel
+  std::vector<float> light_;  // light of these cubes
+  float target_ = 0;          // target light per voxel
 };
 
 }  // namespace

@@ -20,7 +20,8 @@
 namespace voxeld::display {
 namespace {
 
-// Each has ForEachAt(place, each): each(slice, u, v, weight) of the pixels that pass a nominal place.
+// Each class has ForEachAt(place, each), which calls each(slice, u, v, weight) for the pixels that
+// pass a nominal place.
 
 class StackPasses {
  public:
@@ -90,7 +91,7 @@ class RotorPasses {
 
   template <typename Each>
   void ForEachAt(const Vec3& place, Each&& each) const {
-    // A correction may take places far beyond all panels.
+    // A correction may move places far beyond all panels.
     const double most = kMaxRotorReach * unit_mm_;
     if (!(std::abs(place.x) <= most && std::abs(place.y) <= most)) return;
     const Fixed x = ToFixed(place.x, unit_mm_), y = ToFixed(place.y, unit_mm_);
@@ -153,7 +154,7 @@ class HelixPasses {
                                near_y = ToFixedNear(place.y, unit_mm_);
     if (!near_x || !near_y) return;
     const Fixed x = *near_x, y = *near_y;
-    if (x == 0 && y == 0) {  // the axis is a blade's edge all the time
+    if (x == 0 && y == 0) {  // the axis is always at a blade's edge
       for (uint32_t step = 0; step < steps; ++step) at(step, kFullWeight);
       return;
     }
@@ -181,7 +182,7 @@ FootprintEntry EntryAt(int32_t i, int32_t j, int32_t k, uint16_t weight) {
   return {static_cast<uint16_t>(i), static_cast<uint16_t>(j), static_cast<uint16_t>(k), weight};
 }
 
-// −1: none; NaN is nowhere.
+// Returns the cell at a position; −1 outside the axis, also for NaN.
 int32_t CellAt(double mm, double pitch_mm, int32_t cells) {
   const double at = mm / pitch_mm;
   if (!(at > -1 && at < cells + 1)) return -1;
@@ -221,7 +222,7 @@ class FlatScatter {
     }
   }
 
-  // The voxel that holds a pixel's centre.
+  // Adds, for each pixel, the voxel that contains its centre.
   void AddCentres() {
     const uint16_t weight = sampling_ == Sampling::kWeighted ? kOwnWeight : kFullWeight;
     for (int32_t slice = 0; slice < slices_; ++slice) {

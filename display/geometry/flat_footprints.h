@@ -1,5 +1,5 @@
-// Footprints that are no products, pixel by pixel: of a helix, of panels that are tilted, and with a correction. Callers use
-// display/geometry/footprint.h, where the contracts are.
+// Footprints that are not products but lists per pixel: for a helix, tilted panels, and
+// corrections. Callers use display/geometry/footprint.h, which has the contracts.
 #pragma once
 
 #include "display/api/geometry.h"
@@ -8,13 +8,13 @@
 
 namespace voxeld::display {
 
-// Whether a geometry's footprints are kept pixel by pixel.
+// Returns whether a geometry's footprints are stored per pixel.
 bool IsFlat(const Geometry& geometry);
 
-// Pixels in a row of a flat table, those that fill it up to whole bytes of bits included.
+// Returns the pixels in a row of a flat table, padded to whole bytes of bits.
 inline int32_t FlatRow(int32_t width_px) { return (width_px + 7) / 8 * 8; }
 
-// `geometry` is valid, and no lattice.
+// Requires: `geometry` is valid, and not a lattice.
 FootprintTable BuildFlatFootprints(const Geometry& geometry, Sampling sampling);
 
 }  // namespace voxeld::display

@@ -1,4 +1,4 @@
-// A voxel of a footprint (footprint.h), as engines keep it in their own memory.
+// A voxel of a footprint (footprint.h), as engines store it in their own memory.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,8 @@
 namespace voxeld::display {
 
 inline constexpr uint16_t kFullWeight = 255;
-inline constexpr uint16_t kOwnWeight = 128;  // at least, of the voxel that holds a pixel's centre
+// least weight of the voxel that contains a pixel's centre
+inline constexpr uint16_t kOwnWeight = 128;
 
 struct FootprintEntry {
   uint16_t x = 0, y = 0, z = 0;

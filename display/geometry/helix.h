@@ -1,4 +1,4 @@
-// Helices. Callers use display/geometry/footprint.h, where the contracts are.
+// Helices. Callers use display/geometry/footprint.h, which has the contracts.
 #pragma once
 
 #include <cstdint>
@@ -9,14 +9,15 @@
 
 namespace voxeld::display {
 
-// The picture's axes.
+// The axes of the slice image.
 PixelRow HelixRowU(const Helix& helix);
 PixelRow HelixRowV(const Helix& helix);
 
-// The middle of step `step`'s part of a turn, from where the blades begin.
+// Returns the middle of step `step`'s part of a turn, from where the blades begin.
 Turn HelixTurn(const Helix& helix, int32_t step);
 
-// Which part of a blade's height, 0 to 1, is at azimuth `turn` as blade 0 begins at `begin`; below 0: there is none.
+// Returns the fraction of a blade's height, 0 to 1, at azimuth `turn` if blade 0 begins at `begin`;
+// below 0: no blade is there.
 double BladeShare(const Helix& helix, Turn turn, Turn begin);
 
 }  // namespace voxeld::display

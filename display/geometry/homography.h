@@ -21,7 +21,7 @@ struct Homography {
     return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
            m[2] * (m[3] * m[7] - m[4] * m[6]);
   }
-  // Of one with a determinant above 0.
+  // Requires: the determinant is above 0.
   Homography Inverse() const {
     const double d = Determinant();
     return {{(m[4] * m[8] - m[5] * m[7]) / d, (m[2] * m[7] - m[1] * m[8]) / d,

@@ -4,8 +4,8 @@
 
 namespace voxeld::display {
 
-// From the unit square first (Heckbert, Fundamentals of Texture Mapping and Image Warping, 1989, §2.2.3), whose corners are those of
-// the picture by a scale and a shift.
+// Computed from the unit square first (Heckbert, Fundamentals of Texture Mapping and Image Warping,
+// 1989, §2.2.3), which a scale and a shift map to the image's corners.
 std::optional<Homography> HomographyOfCorners(PicturePlace half,
                                               const std::array<PicturePlace, 4>& to) {
   const auto& [a, b, c, d] = to;
@@ -30,7 +30,7 @@ std::optional<Homography> HomographyOfCorners(PicturePlace half,
     out.m[3 * row + 1] = m[1] / (2 * half.v);
     out.m[3 * row + 2] = m[0] / 2 + m[1] / 2 + m[2];
   }
-  // w is 1 in the middle.
+  // Normalise w to 1 in the middle.
   const double w = out.m[8];
   for (double& m : out.m) m /= w;
   if (!std::isfinite(out.m[0]) || !(out.Determinant() != 0)) return std::nullopt;

@@ -1,4 +1,4 @@
-// A homography from where a picture's corners are.
+// Computes a homography from the places of an image's corners.
 #pragma once
 
 #include <array>
@@ -8,7 +8,8 @@
 
 namespace voxeld::display {
 
-// The one that takes the corners (−u, −v), (u, −v), (u, v), (−u, v) of `half` to `to`. Nothing if three of these lie in a line.
+// Returns the homography that maps the corners (−u, −v), (u, −v), (u, v), (−u, v) of `half` to
+// `to`. Returns nothing if three of these lie on a line.
 std::optional<Homography> HomographyOfCorners(PicturePlace half,
                                               const std::array<PicturePlace, 4>& to);
 

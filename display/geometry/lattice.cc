@@ -12,10 +12,10 @@
 namespace voxeld::display {
 namespace {
 
-// Of a light on one axis of the grid.
+// The cells of a light on one axis of the grid.
 struct LightCells {
-  CellRange box;  // whose centres lie in its box
-  int32_t own;    // that holds it; −1: it lies beside the grid
+  CellRange box;  // cells whose centres lie in its box
+  int32_t own;    // the cell that contains it; −1: it lies outside the grid
 };
 
 class CellAxis {
@@ -36,7 +36,7 @@ class CellAxis {
  private:
   const int32_t cells_;
   const double pitch_mm_, origin_mm_;
-  const Fixed extent_;  // of a light's box
+  const Fixed extent_;  // size of a light's box
 };
 
 FootprintEntry EntryAt(int32_t x, int32_t y, int32_t z) {

@@ -1,4 +1,4 @@
-// Lattices. Callers use display/geometry/footprint.h, where the contracts are.
+// Lattices. Callers use display/geometry/footprint.h, which has the contracts.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@ namespace voxeld::display {
 
 int32_t LatticeSlices(const Lattice& lattice);
 
-// The ends, on each axis, of all lights together.
+// The bounds, on each axis, of all lights' boxes.
 struct LightBounds {
   Vec3 low_mm, high_mm;
 };

@@ -1,5 +1,5 @@
-// What ValidateGeometry allows.
-// Together they keep every integer of display/geometry within 64 bits.
+// The limits of ValidateGeometry. Together they keep every integer of display/geometry within 64
+// bits.
 #pragma once
 
 #include <cstdint>
@@ -12,12 +12,12 @@ inline constexpr int64_t kMaxPanels = 16;
 inline constexpr int64_t kMaxCellsPerAxis = 16384;       // nx, ny, nz; coordinates fit 16 bits
 inline constexpr int64_t kMaxCells = int64_t{1} << 36;   // nx·ny·nz
 inline constexpr int64_t kMaxPixels = int64_t{1} << 34;  // slices·width·height
-// Entries of a footprint table as bounded before it is built: 8 bytes each.
+// Upper bound of a footprint table's entries, checked before it is built: 8 bytes each.
 inline constexpr int64_t kMaxFootprintEntries = int64_t{1} << 28;
-// slices·width_px of a lattice, each of which has its place in memory (32 bytes), light or no light.
+// slices·width_px of a lattice, each of which takes 32 bytes of memory, with or without a light.
 inline constexpr int64_t kMaxLatticePixels = int64_t{1} << 24;
-// slices·width·height where footprints are kept pixel by pixel: of a helix, of a panel that is tilted,
-// and with a correction.
+// slices·width·height if footprints are stored per pixel: for a helix, a tilted panel, and with a
+// correction.
 inline constexpr int64_t kMaxFlatPixels = int64_t{1} << 27;
 inline constexpr int32_t kMaxDisplacements = 64;  // along an axis
 inline constexpr double kMaxTiltDeg = 60;
@@ -25,8 +25,8 @@ inline constexpr double kMinSpanTurns = 0.1;
 inline constexpr int64_t kMaxBlades = 10;
 inline constexpr double kMinPitchMm = 1e-4, kMaxPitchMm = 1e4;
 inline constexpr double kMaxPositionMm = 1e6;  // either side of the middle
-// A rotor's grid and panels lie within this many of the grid's
-// smaller horizontal pitch of the axis.
+// A rotor's grid and panels lie within this many of the grid's smaller horizontal pitch from the
+// axis.
 inline constexpr int64_t kMaxRotorReach = 16384;
 // Neighbouring slices of a stack are at least this fraction of a voxel apart.
 inline constexpr double kMinSpacingVoxels = 1.0 / 1024;

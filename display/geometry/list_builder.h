@@ -1,4 +1,4 @@
-// Collects footprint entries in any order and makes them into compressed rows.
+// Collects footprint entries in any order and converts them to compressed rows.
 #pragma once
 
 #include <cstddef>
@@ -11,14 +11,14 @@ namespace voxeld::display {
 
 class ListBuilder {
  public:
-  // `lists` < 2³².
+  // Requires: `lists` < 2³².
   explicit ListBuilder(size_t lists) : lists_(lists) {}
 
   void Add(size_t list, const FootprintEntry& entry) {
     records_.push_back({static_cast<uint32_t>(list), entry});
   }
 
-  // Sorted; of a voxel added several times to a list the greatest weight stays.
+  // Returns the sorted lists; a voxel added several times to a list keeps the greatest weight.
   // Empties the builder.
   FootprintLists Build();
 

@@ -13,7 +13,7 @@ std::vector<double> PositionsOf(const Motion& motion) {
       positions.push_back((s - (motion.slices - 1) / 2.0) * motion.slice_pitch_mm);
     } else {
       const double at = motion.dead_begin + (s + 0.5) / motion.slices * time;
-      // Half a turn of the crank.
+      // Position after half a turn of the crank.
       const double way =
           motion.kind == Motion::Kind::kSine
               ? 0.5 - 0.5 * (DirectionOf(TurnFromFraction(at / 2)).cos / 1073741824.0)

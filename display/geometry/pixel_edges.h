@@ -1,4 +1,4 @@
-// Which pixel of a row holds a place along it.
+// Finds the pixel of a row that contains a place along it.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@ class PixelEdges {
       edges_.push_back(ToFixed(row.PositionMm(2 * place) - origin_mm, unit_mm));
     }
   }
-  // The pixel with edge ≤ at < next edge; none beyond the row's ends, and of no place.
+  // Returns the pixel with edge ≤ at < next edge; nothing beyond the row's ends, or for no place.
   std::optional<int32_t> PixelAt(Fixed at) const {
     const auto above = std::upper_bound(edges_.begin(), edges_.end(), at);
     if (above == edges_.begin() || above == edges_.end()) return std::nullopt;

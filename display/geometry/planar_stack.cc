@@ -66,7 +66,7 @@ FootprintTable BuildStackFootprints(const PlanarStack& stack, const VoxelGrid& g
 
   const std::vector<CellRange> columns =
       CellsOfPixels(StackRowU(stack), x.cells, x.pitch_mm, x.origin_mm);
-  std::vector<std::vector<WeightedCell>> depths(stack.positions_mm.size());  // of each slice
+  std::vector<std::vector<WeightedCell>> depths(stack.positions_mm.size());  // per slice
   for (int32_t stroke = 0; stroke < stack.strokes; ++stroke) {
     const Slabs slabs(stack, stroke, along);
     const std::vector<int32_t> slices = SlicesOfStroke(stack, stroke);

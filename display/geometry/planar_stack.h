@@ -1,4 +1,4 @@
-// Planar stacks. Callers use display/geometry/footprint.h, where the contracts are.
+// Planar stacks. Callers use display/geometry/footprint.h, which has the contracts.
 #pragma once
 
 #include <cstdint>
@@ -10,11 +10,11 @@
 
 namespace voxeld::display {
 
-// The pictures' axes: u along x; v along y or z.
+// The axes of the slice images: u along x; v along y or z.
 PixelRow StackRowU(const PlanarStack& stack);
 PixelRow StackRowV(const PlanarStack& stack);
 
-// The ends, along the normal, of all slabs together.
+// The bounds, along the normal, of all slabs.
 struct StackDepth {
   double low_mm, high_mm;
 };

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kDirectionBits = 30;
 
-// The centres of `cells` cells along x or y, from the axis, in units of 2⁻¹⁶ `unit_mm`.
+// Returns the centres of `cells` cells along x or y, from the axis, in units of 2⁻¹⁶ `unit_mm`.
 std::vector<Fixed> Centres(int32_t cells, double pitch_mm, double origin_mm, double unit_mm) {
   std::vector<Fixed> centres;
   centres.reserve(static_cast<size_t>(cells));
@@ -53,7 +53,7 @@ class ColumnScatter {
     lists_.Add(list, {static_cast<uint16_t>(i), static_cast<uint16_t>(j), 0, weight});
   }
 
-  // The column that holds a pixel's centre at the middle of its step.
+  // Adds the column that contains a pixel's centre at the middle of its step.
   void AddCentres() {
     const PixelRow row = PanelRowU(rotor_, panel());
     const double pitch_x = grid_.pitch_mm.x, pitch_y = grid_.pitch_mm.y;
@@ -98,7 +98,7 @@ class ColumnScatter {
   const Rotor& rotor_;
   const VoxelGrid& grid_;
   const Sampling sampling_;
-  const double unit_mm_;  // of x_, y_ and everything compared with them
+  const double unit_mm_;  // the unit of x_, y_ and everything compared with them
   const std::vector<Fixed> x_, y_;
   size_t panel_ = 0;
   ListBuilder lists_;

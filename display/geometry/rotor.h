@@ -1,4 +1,4 @@
-// Rotors. Callers use display/geometry/footprint.h, where the contracts are.
+// Rotors. Callers use display/geometry/footprint.h, which has the contracts.
 #pragma once
 
 #include <cstdint>
@@ -11,22 +11,22 @@
 
 namespace voxeld::display {
 
-// The pictures' axes on a panel: u along its plane, measured from the foot of the perpendicular
-// from the axis; v along z, of a tilted panel along its own v axis.
+// The axes of a panel's slice images: u along its plane, measured from the foot of the
+// perpendicular from the axis; v along z, or along the panel's own v axis if it is tilted.
 PixelRow PanelRowU(const Rotor& rotor, const Rotor::Panel& panel);
 PixelRow PanelRowV(const Rotor& rotor, const Rotor::Panel& panel);
 
-// Where u points at the middle of step `step` (0 to slices_per_turn − 1).
+// Returns the direction of u at the middle of step `step` (0 to slices_per_turn − 1).
 Turn PanelTurn(const Rotor& rotor, const Rotor::Panel& panel, int32_t step);
 
-// Of a panel's v axis: how much of it is along z, and how much away from the axis.
+// The components of a panel's v axis: along z, and away from the axis.
 struct Lean {
   double cos, sin;
 };
 Lean LeanOf(const Rotor::Panel& panel);
 bool IsTilted(const Rotor& rotor);
 
-// The greatest distance from the axis of any point of any panel.
+// Returns the greatest distance from the axis of any point of any panel.
 double RadiusMm(const Rotor& rotor);
 
 FootprintTable BuildRotorFootprints(const Rotor& rotor, const VoxelGrid& grid, Sampling sampling);

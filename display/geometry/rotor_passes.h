@@ -1,4 +1,4 @@
-// When a rotor's panel passes a place, and with which pixel.
+// Computes when a rotor's panel passes a place, and with which pixel.
 #pragma once
 
 #include <cstdint>
@@ -10,15 +10,15 @@
 
 namespace voxeld::display {
 
-// each(step, u, weight) of where a plane at distance `e` from the axis passes (x, y): where the place along u is ±√(ρ² − e²).
-// `row`: of the panel's pixels; all in one unit.
+// Calls each(step, u, weight) where a plane at distance `e` from the axis passes (x, y): where the
+// place along u is ±√(ρ² − e²). `row` has the panel's pixels; all values are in one unit.
 template <typename Each>
 void ForEachPass(const Rotor& rotor, const Rotor::Panel& panel, const PixelEdges& row, Fixed x,
                  Fixed y, Fixed e, Sampling sampling, Each&& each) {
   const Fixed square = x * x + y * y - e * e;
   if (square < 0) return;
   const Fixed root = FloorSqrt(square);
-  // An edge is an integer, so ⌊a⌋ decides as a would.
+  // Edges are integers, so comparing ⌊a⌋ gives the same result as comparing a.
   const auto u_plus = row.PixelAt(root);
   const auto u_minus = row.PixelAt(root * root == square ? -root : -root - 1);
   const auto steps = static_cast<uint32_t>(rotor.slices_per_turn);

@@ -37,7 +37,7 @@ std::vector<WeightedCell> Slabs::Cells(size_t rank, Sampling sampling) const {
   return sampling == Sampling::kWeighted ? Weighted(rank) : Unweighted(rank);
 }
 
-// Slabs are half-open: a place half-way between two slices is the upper one's.
+// Slabs are half-open: a place half-way between two slices belongs to the upper one.
 size_t Slabs::RankAt(Fixed place) const {
   const auto above = std::upper_bound(positions_.begin(), positions_.end(), place);
   const auto rank = static_cast<size_t>(above - positions_.begin());

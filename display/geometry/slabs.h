@@ -1,4 +1,4 @@
-// What the slices of a planar stack stand for along its normal, in fixed point.
+// The slabs that the slices of a planar stack represent along its normal, in fixed point.
 #pragma once
 
 #include <cstddef>
@@ -22,10 +22,10 @@ struct GridAxis {
   double pitch_mm, origin_mm;
 };
 
-// The slices of one stroke, by ascending position.
+// Returns the slices of one stroke, by ascending position.
 std::vector<int32_t> SlicesOfStroke(const PlanarStack& stack, int32_t stroke);
 
-// Of one stroke, whose slices are counted by ascending position here ("ranks").
+// The slabs of one stroke; here slices are counted by ascending position ("ranks").
 class Slabs {
  public:
   Slabs(const PlanarStack& stack, int32_t stroke, const GridAxis& axis);
@@ -33,7 +33,8 @@ class Slabs {
   size_t count() const { return positions_.size(); }
   std::vector<WeightedCell> Cells(size_t rank, Sampling sampling) const;
 
-  // each(rank, weight) of those that stand for a place on the normal; the axis' units.
+  // Calls each(rank, weight) for the slices that represent a place on the normal, in the axis's
+  // units.
   template <typename Each>
   void ForEachAt(Fixed place, Sampling sampling, Each&& each) const {
     if (2 * place < twice_low_ || 2 * place >= twice_high_) return;
@@ -54,12 +55,12 @@ class Slabs {
   size_t RankAt(Fixed place) const;
   std::vector<WeightedCell> Unweighted(size_t rank) const;
   std::vector<WeightedCell> Weighted(size_t rank) const;
-  // 0 for a place beyond the neighbouring slices.
+  // Returns 0 for a place beyond the neighbouring slices.
   uint16_t WeightOf(size_t rank, Fixed place) const;
 
   const GridAxis axis_;
   std::vector<Fixed> positions_;
-  Fixed twice_low_ = 0, twice_high_ = 0;  // the ends of all slabs
+  Fixed twice_low_ = 0, twice_high_ = 0;  // the bounds of all slabs
 };
 
 }  // namespace voxeld::display

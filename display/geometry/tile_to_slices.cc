@@ -10,7 +10,7 @@ int32_t Along(Axis axis, int32_t x, int32_t y, int32_t z) {
   return axis == Axis::kX ? x : axis == Axis::kY ? y : z;
 }
 
-// Inner lists that add nothing: outer entries may lie along all axes.
+// Returns true if inner lists add nothing, so that outer entries may lie along all axes.
 bool InnerIsPoint(const FootprintTable& table) {
   return std::all_of(table.inner.entries.begin(), table.inner.entries.end(),
                      [](const FootprintEntry& e) { return e.x == 0 && e.y == 0 && e.z == 0; });
@@ -25,7 +25,7 @@ TileToSlices::TileToSlices(const FootprintTable& table, const VoxelGrid& grid, i
       tiles_z_((grid.nz + tz - 1) / tz),
       inner_axis_(table.inner_axis),
       inner_sets_(table.inner_sets) {
-  // Row-major, without the inner axis where the outer entries are.
+  // Row-major, without the inner axis unless outer entries lie along it too.
   const bool whole = InnerIsPoint(table);
   const int32_t tiles[3] = {tiles_x_, tiles_y_, tiles_z_};
   size_t places = 1;
@@ -50,7 +50,7 @@ TileToSlices::TileToSlices(const FootprintTable& table, const VoxelGrid& grid, i
     }
   }
 
-  // Slices ascend as they are visited, so a repetition is one of the slice visited last.
+  // Slices are visited in ascending order, so a duplicate can only be the slice visited last.
   std::vector<int32_t> last(places, -1);
   std::vector<std::pair<size_t, int32_t>> seen;
   for (int32_t slice = 0; slice < table.slices; ++slice) {

@@ -23,14 +23,15 @@
 namespace voxeld::display {
 namespace {
 
-// As many as tell it from its neighbours in a configuration: a value just beyond a limit does not look like the limit.
+// Prints as many digits as a configuration needs, so that a value just beyond a limit does not look
+// like the limit.
 template <typename Value>
 std::string Digits(Value value) {
   if constexpr (std::is_floating_point_v<Value>) return absl::StrFormat("%.10g", value);
   return absl::StrCat(value);
 }
 
-// Keeps the first thing that is wrong.
+// Keeps the first error.
 class Checker {
  public:
   bool ok() const { return status_.ok(); }
@@ -46,7 +47,7 @@ class Checker {
   void Count(absl::string_view field, int64_t value, int64_t most) {
     if (value < 1 || value > most) Require(false, field, value, absl::StrCat("from 1 to ", most));
   }
-  // NaN is in no range.
+  // NaN is outside every range.
   void Number(absl::string_view field, double value, double least, double most) {
     if (!(value >= least && value <= most)) {
       Require(false, field, value,
@@ -88,7 +89,7 @@ void CheckStack(Checker& check, const PlanarStack& stack) {
     const std::string field = absl::StrCat("positions_mm[", s, "]");
     check.Position(field, p[s]);
     if (s % of_stroke == 0) continue;
-    // As its stroke begins; the second the other way.
+    // Each slice continues the direction of its stroke; the second stroke runs the other way.
     const bool first_up = p[1] > p[0], up = s < of_stroke ? first_up : !first_up;
     check.Require(up ? p[s] > p[s - 1] : p[s] < p[s - 1], field, p[s],
                   absl::StrCat(up ? "above" : "below", " positions_mm[", s - 1, "], ", p[s - 1],
@@ -218,8 +219,8 @@ void CheckStackInGrid(Checker& check, const PlanarStack& stack, const VoxelGrid&
                   absl::StrCat("at least 1/1024 of the grid's pitch along the normal, ",
                                pitch * kMinSpacingVoxels, " mm"));
   }
-  // A column of voxels is in one list of each slice that sees it; a depth in two slices at the
-  // most. Each pixel and each slice may add the one that holds its centre.
+  // A column of voxels is in one list of each slice that sees it, and a depth in at most two
+  // slices. Each pixel and each slice may add the one that contains its centre.
   const int64_t slices = static_cast<int64_t>(p.size());
   const int64_t depths = 2 * int64_t{flat ? grid.nz : grid.ny} * stack.strokes + slices;
   CheckTable(check, (int64_t{grid.nx} + stack.width_px) * depths);
@@ -237,15 +238,15 @@ void CheckRotorInGrid(Checker& check, const Rotor& rotor, const VoxelGrid& grid)
   within("the grid's far end along x", grid.origin_mm.x + grid.nx * grid.pitch_mm.x);
   within("the grid's far end along y", grid.origin_mm.y + grid.ny * grid.pitch_mm.y);
   within("the panels' greatest distance from the axis", RadiusMm(rotor));
-  // A panel passes a column twice a turn, each pass is in two slices at the most; each pixel may
-  // add the column that holds its centre, and a column on the axis is in every slice.
+  // A panel passes a column twice a turn, and each pass is in at most two slices; each pixel may
+  // add the column that contains its centre, and a column on the axis is in every slice.
   const int64_t panels = static_cast<int64_t>(rotor.panels.size());
   CheckTable(check, panels * (4 * int64_t{grid.nx} * grid.ny +
                               int64_t{rotor.slices_per_turn} * (int64_t{rotor.width_px} + 1)));
 }
 
 void CheckLatticeInGrid(Checker& check, const Lattice& lattice, const VoxelGrid& grid) {
-  // So many centres of voxels lie in a box at the most; and the voxel that holds the light.
+  // Upper bound of the voxel centres in a box, plus the voxel that contains the light.
   const auto centres = [](double cell_mm, double pitch_mm, int32_t cells) {
     const double most = std::min(cell_mm / pitch_mm, static_cast<double>(cells));
     return std::min(static_cast<int64_t>(most) + 1, int64_t{cells});
@@ -259,7 +260,7 @@ void CheckLatticeInGrid(Checker& check, const Lattice& lattice, const VoxelGrid&
   CheckTable(check, lights * (box + 1));
 }
 
-// Lists are kept of each pixel, and a voxel is in two of each time that it is passed.
+// Each pixel has a list, and a voxel is in two of them each time that it is passed.
 void CheckFlatInGrid(Checker& check, const Geometry& geometry) {
   const auto [width, height] = std::visit(
       [](const auto& shape) { return std::pair(shape.width_px, shape.height_px); }, geometry.shape);
@@ -278,7 +279,7 @@ void CheckFlatInGrid(Checker& check, const Geometry& geometry) {
   }
   if (const auto* helix = std::get_if<Helix>(&geometry.shape)) passes = 2 * helix->blades;
   const VoxelGrid& grid = geometry.grid;
-  // A voxel on the axis of what turns is passed in every slice, and so may be the one beside it.
+  // A voxel on the rotation axis is passed in every slice, and so may be the one beside it.
   CheckTable(check, passes * grid.nx * grid.ny * grid.nz + lists +
                         2 * int64_t{grid.nz} * SliceCount(geometry));
 }
