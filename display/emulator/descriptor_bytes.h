@@ -24,7 +24,7 @@ inline void Put32(DescriptorBytes& out, int value) {
   Put16(out, value >> 16);
 }
 
-// Each character as a UTF-16 unit. Requires: `ascii` holds ASCII only.
+// Appends each character as a UTF-16 unit. Requires: `ascii` holds ASCII only.
 inline void PutUtf16(DescriptorBytes& out, std::string_view ascii) {
   for (const char c : ascii) Put8(out, {c, 0});
 }

@@ -12,7 +12,7 @@ using voxlink::kBulkOut;
 using voxlink::kInterruptIn;
 using Bytes = DescriptorBytes;
 
-constexpr uint16_t kVendorId = 0x1209;  // pid.codes: for tests
+constexpr uint16_t kVendorId = 0x1209;  // pid.codes, for testing
 constexpr uint16_t kProductId = 0x0001;
 constexpr uint32_t kWindows81 = 0x06030000;
 constexpr std::string_view kVoxlinkInterfaceGuid = "{8F5C2C1B-6D1E-4B61-9E36-2B0D3C5A7E11}";

@@ -18,8 +18,8 @@ struct DescriptorSet {
   std::vector<std::vector<std::byte>> strings;  // 0: languages
 };
 
-// Super speed: USB 3.0, bulk packets of 1024 bytes and bursts; else USB 2.1 with packets of 512 or, at
-// full speed, 64.
+// Super speed: USB 3.0, bulk packets of 1024 bytes and bursts; else USB 2.1 with packets of 512
+// bytes or, at full speed, 64.
 DescriptorSet MakeDescriptors(UsbSpeed speed, const std::string& serial);
 
 }  // namespace voxeld::display::emulator

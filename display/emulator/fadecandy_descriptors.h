@@ -9,11 +9,11 @@
 
 namespace voxeld::display::emulator {
 
-// For GET_DESCRIPTOR's wValue: type in the high byte, index in the low one.
+// Returns the descriptor for GET_DESCRIPTOR's wValue: type in the high byte, index in the low one.
 std::optional<std::vector<std::byte>> FadecandyDescriptor(uint16_t value,
                                                           const std::string& serial);
 
-// For the vendor request's wIndex.
+// Returns the descriptor for the vendor request's wIndex.
 std::optional<std::vector<std::byte>> FadecandyMsDescriptor(uint16_t index);
 
 }  // namespace voxeld::display::emulator

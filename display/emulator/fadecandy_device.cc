@@ -11,7 +11,7 @@ namespace {
 using fadecandy::kPacketBytes;
 using Bytes = std::vector<std::byte>;
 
-// Of a clock that jumps, the refreshes between are not all done.
+// If the clock jumps farther, the refreshes in between are not all performed.
 constexpr sync::TimeNs kLongestCatchUp = sync::kSecond;
 
 Bytes ListedBytes(std::initializer_list<uint32_t> values) {
@@ -126,7 +126,7 @@ std::optional<Bytes> FadecandyDevice::ReadRequest(const UsbSetup& setup) const {
     case 0x810A:  // GET_INTERFACE
       return ListedBytes({0});
     case fadecandy::kRequestIn << 8 | fadecandy::kMsVendorCode:
-    case 0xC100 | fadecandy::kMsVendorCode:  // properties are asked of the interface
+    case 0xC100 | fadecandy::kMsVendorCode:  // properties are requested from the interface
       return FadecandyMsDescriptor(setup.index);
     case fadecandy::kRequestIn << 8 | fadecandy::kGetCounter: {
       if (setup.index > fadecandy::kFrameCounter) return std::nullopt;

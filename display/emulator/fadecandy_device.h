@@ -1,5 +1,5 @@
 // One Fadecandy board as a USB device model: descriptors, requests, and the endpoint with its flow
-// control; FadecandyLight has what becomes light. It follows docs/protocols/fadecandy.md.
+// control; FadecandyLight computes the light. It follows docs/protocols/fadecandy.md.
 #pragma once
 
 #include <cstddef>
@@ -37,10 +37,11 @@ class FadecandyDevice final : public UsbDeviceModel {
   bool plugged() const override { return plugged_; }
   uint32_t plugs() const override { return plugs_; }
 
-  // The 512 pixels' R, G, B as lit by the last refresh; black without power.
+  // Returns R, G, B of the 512 pixels as lit by the last refresh; black without power.
   std::span<const uint8_t, fadecandy::kFrameBytes> Output() const { return light_.Output(); }
   const FadecandyLight& light() const { return light_; }
-  // Since it was plugged in: packets taken, and those that were shorter than 64 bytes and dropped.
+  // Counted since it was plugged in: packets accepted, and packets shorter than 64 bytes, which are
+  // dropped.
   uint64_t packets() const { return packets_; }
   uint64_t short_packets() const { return short_packets_; }
 
@@ -48,16 +49,16 @@ class FadecandyDevice final : public UsbDeviceModel {
   struct Pending {
     uint64_t id;
     std::span<const std::byte> out;
-    size_t taken;  // bytes of `out`
+    size_t taken;  // consumed bytes of `out`
   };
 
   void Control(const Urb& urb);
   std::optional<std::vector<std::byte>> ReadRequest(const UsbSetup& setup) const;
   std::optional<std::vector<std::byte>> Descriptor(uint16_t value) const;
   bool WriteRequest(const UsbSetup& setup);
-  // Packets of pending transfers, until one has to wait.
+  // Accepts packets of pending transfers, until one has to wait.
   void Accept();
-  // As after power-up; pending URBs end as `status`.
+  // Resets to the state after power-up; pending URBs end as `status`.
   void Forget(TransferStatus status);
 
   const FadecandyDeviceConfig config_;

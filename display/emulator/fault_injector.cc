@@ -21,7 +21,7 @@ struct Kind {
   std::string_view name;
   What what;
   bool has_amount;
-  uint64_t unit;  // an amount's, in ns or bytes
+  uint64_t unit;  // unit of the amount, in ns or bytes
 };
 constexpr uint64_t kMs = sync::kMillisecond;
 constexpr Kind kKinds[] = {
@@ -33,13 +33,14 @@ constexpr Kind kKinds[] = {
 };
 constexpr uint64_t kMostNumber = 1'000'000'000'000;
 
-// Faults that happen to the cable, and need no transfer.
+// Returns true for faults of the cable, which need no transfer.
 bool ActsAlone(What what) {
   return what == What::kStall || what == What::kNak || what == What::kUnplug ||
          what == What::kDelay || what == What::kError || what == What::kBabble;
 }
 
-// In quotes, with what is not printable escaped, and cut to a length fit for a message.
+// Returns the text in quotes, with unprintable characters escaped, cut to a length fit for a
+// message.
 std::string Shown(std::string_view text) {
   constexpr size_t kMost = 64;  // bytes of the text
   return absl::StrCat("\"", absl::CHexEscape(std::string(text.substr(0, kMost))),
@@ -188,7 +189,7 @@ void FaultInjector::Act(const Fault& fault, sync::TimeNs now) {
     case What::kPartial:
     case What::kCorrupt:
     case What::kDrop:
-      return;  // need a transfer: Apply
+      return;  // these need a transfer: Apply
   }
 }
 
@@ -257,7 +258,7 @@ bool FaultInjector::Apply(const Urb& original, Urb& urb, Passing& passing) {
     complete_(urb.id, TransferStatus::kDisconnected, 0, {});
     return false;
   }
-  // A NAK that began with this very transfer, which will come again.
+  // A NAK that began with this very transfer, which will be submitted again.
   if (now < endpoint.nak_until) {
     --endpoint.transfers;
     endpoint.bytes = first_byte;

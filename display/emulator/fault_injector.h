@@ -1,7 +1,7 @@
-// Faults on the cable of a device model, from outside its protocol: any model can be wrapped, and
-// neither it nor the host knows.
+// Injects faults on the cable of a device model, outside its protocol: any model can be wrapped,
+// and neither the model nor the host notices.
 //
-// Deterministic: a plan and a clock decide everything.
+// Deterministic: a plan and a clock determine everything.
 #pragma once
 
 #include <cstddef>
@@ -22,19 +22,19 @@ namespace voxeld::display::emulator {
 struct Fault {
   enum class When : uint8_t {
     kTransfer,  // at the `at`-th transfer on the endpoint, from 1
-    kByte,      // at the transfer that holds byte `at` of the endpoint's stream
-    kTime,  // `at` ns after the injector was made: then, or at the next transfer where it needs one
+    kByte,      // at the transfer that contains byte `at` of the endpoint's stream
+    kTime,  // `at` ns after the injector was made: then, or at the next transfer if it needs one
   };
   enum class What : uint8_t {
     kStall,    // the endpoint halts
     kNak,      // transfers wait for `amount` ns
     kPartial,  // `amount` bytes pass, then the endpoint halts
     kError,    // `amount` transfers end in a protocol error; nothing passes
-    kBabble,   // `amount` transfers end in an overflow, as if the device sent more than was asked
+    kBabble,   // `amount` transfers end in an overflow, as if the device sent more than requested
     kCorrupt,  // the byte `amount` of the transfer is inverted (kByte: the one at `at`)
     kDrop,     // `amount` bytes of the transfer vanish, from its middle (kByte: from `at`);
                // reported as sent
-    kUnplug,   // the cable is out for `amount` ns
+    kUnplug,   // the cable is unplugged for `amount` ns
     kDelay,    // completions are held back for `amount` ns
   };
   When when = When::kTransfer;
@@ -46,22 +46,22 @@ struct Fault {
 
 using FaultPlan = std::vector<Fault>;
 
-// "WHAT[:AMOUNT]@WHEN[/in]", several with ';' between. WHAT: stall, nak:MS, partial:BYTES,
-// error:COUNT, babble:COUNT, corrupt:BYTE, drop:BYTES, unplug:MS, delay:MS. WHEN: tN (transfer N), bN (byte N),
-// Nms. "/in": on the interrupt endpoint. InvalidArgument with what is wrong.
+// Parses "WHAT[:AMOUNT]@WHEN[/in]", several separated by ';'. WHAT: stall, nak:MS, partial:BYTES,
+// error:COUNT, babble:COUNT, corrupt:BYTE, drop:BYTES, unplug:MS, delay:MS. WHEN: tN (transfer N),
+// bN (byte N), Nms. "/in": on the interrupt endpoint. Errors: InvalidArgument with what is wrong.
 absl::StatusOr<FaultPlan> ParseFaultPlan(std::string_view text);
 
-// The same as text, as ParseFaultPlan reads it; amounts and times of faults by time in whole ms.
+// Returns the text that ParseFaultPlan reads; amounts and times of timed faults in whole ms.
 std::string ToText(const Fault& fault);
 
 class FaultInjector final : public UsbDeviceModel {
  public:
   FaultInjector(std::unique_ptr<UsbDeviceModel> device, FaultPlan plan, sync::Clock& clock);
 
-  // More faults; transfers, bytes and times count from now on.
+  // Adds a fault; its transfers, bytes and times count from now on.
   void Add(Fault fault);
   size_t faults_left() const { return plan_.size(); }
-  // Takes back all that was planned and all that still lasts, and starts to count anew.
+  // Removes all planned faults and ends all that still last, and starts to count again.
   void Clear();
 
   void SetComplete(Complete complete) override { complete_ = std::move(complete); }
@@ -84,7 +84,7 @@ class FaultInjector final : public UsbDeviceModel {
     sync::TimeNs hold_until = 0;
     std::deque<Urb> waiting;  // while NAKed
   };
-  struct Held {  // a completion that is held back
+  struct Held {  // a delayed completion
     uint64_t id;
     uint8_t endpoint;
     TransferStatus status;
@@ -93,15 +93,15 @@ class FaultInjector final : public UsbDeviceModel {
   };
   struct Passing {  // an URB inside the device
     uint8_t endpoint = 0;
-    std::vector<std::byte> changed;  // bytes that stand in for the host's
-    bool halts = false;              // ends as a stall
-    uint32_t claim = 0;              // bytes to report as sent; 0: what the device says
+    std::vector<std::byte> changed;  // bytes that replace the host's
+    bool halts = false;              // ends in a stall
+    uint32_t claim = 0;              // bytes to report as sent; 0: the device's number
   };
 
   void Pass(const Urb& urb);
-  // Ends what waits or is held back.
+  // Ends everything that waits or is delayed.
   void EndAll(TransferStatus status);
-  // Applies the faults that fall on this URB; false if it does not go to the device now.
+  // Applies the faults for this URB; returns false if it does not go to the device now.
   bool Apply(const Urb& original, Urb& urb, Passing& passing);
   void Act(const Fault& fault, sync::TimeNs now);
   void OnComplete(uint64_t id, TransferStatus status, uint32_t actual,
@@ -112,7 +112,7 @@ class FaultInjector final : public UsbDeviceModel {
   Complete complete_;
   struct Planned {
     Fault fault;
-    sync::TimeNs time;  // of kTime
+    sync::TimeNs time;  // for kTime
   };
   std::vector<Planned> plan_;
   std::map<uint8_t, Endpoint> endpoints_;

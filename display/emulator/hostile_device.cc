@@ -5,7 +5,7 @@
 namespace voxeld::display::emulator {
 namespace {
 
-// One answer in this many is damaged, so that some attempts get far.
+// Damages one answer in this many, so that some attempts get far.
 constexpr uint64_t kLieOneIn = 3;
 constexpr uint64_t kMostFlips = 8;
 
@@ -67,13 +67,13 @@ std::vector<std::byte> HostileDevice::Damaged(std::span<const std::byte> in, siz
       std::fill_n(lie.begin() + static_cast<ptrdiff_t>(Below(lie.size())), 1,
                   Below(2) == 0 ? std::byte{0} : std::byte{0xFF});
       break;
-    case 3:  // cut
+    case 3:  // truncated
       lie.resize(Below(lie.size()));
       break;
-    case 4:  // more than there is
+    case 4:  // longer than the answer
       lie.resize(lie.size() + Below(most - std::min(most, lie.size()) + 1), any());
       break;
-    default:  // nothing of it is true
+    default:  // entirely random
       lie.resize(1 + Below(most));
       for (std::byte& byte : lie) byte = any();
       break;

@@ -1,7 +1,7 @@
-// A device that lies: what it says of itself, and what it reports, is damaged at random: bits, lengths,
-// ends, or all of it. Around any model; the model does not know.
+// A device that lies: its descriptions and reports are damaged at random: bits, lengths, ends, or
+// everything. It wraps any model, which does not notice.
 //
-// Deterministic: the seed and the host's requests decide everything.
+// Deterministic: the seed and the host's requests determine everything.
 #pragma once
 
 #include <cstddef>
@@ -22,9 +22,9 @@ class HostileDevice final : public UsbDeviceModel {
  public:
   explicit HostileDevice(std::unique_ptr<UsbDeviceModel> device) : device_(std::move(device)) {}
 
-  // From the next answer on; nothing: it tells the truth.
+  // Takes effect with the next answer; without a seed the device tells the truth.
   void SetSeed(std::optional<uint64_t> seed);
-  // Answers and reports that were damaged.
+  // Returns how many answers and reports were damaged.
   uint64_t lies() const { return lies_; }
 
   void SetComplete(Complete complete) override;
@@ -41,7 +41,7 @@ class HostileDevice final : public UsbDeviceModel {
  private:
   void OnComplete(uint64_t id, TransferStatus status, uint32_t actual,
                   std::span<const std::byte> in);
-  // Of at most `most` bytes, as many as a host asked for.
+  // Returns damaged bytes, at most `most`, the number that the host asked for.
   std::vector<std::byte> Damaged(std::span<const std::byte> in, size_t most);
   uint64_t Below(uint64_t end) { return random_() % end; }
 
@@ -49,7 +49,7 @@ class HostileDevice final : public UsbDeviceModel {
   Complete complete_;
   bool lying_ = false;
   std::mt19937_64 random_;
-  std::map<uint64_t, uint32_t> asked_;  // bytes, of IN URBs inside the device
+  std::map<uint64_t, uint32_t> asked_;  // bytes requested by IN URBs inside the device
   uint64_t lies_ = 0;
 };
 

@@ -17,8 +17,9 @@ using voxlink::kBulkOut;
 using voxlink::kInterruptIn;
 using voxlink::Request;
 
-constexpr size_t kMostEvents = 1024;  // beyond, the host sees a gap in their numbers
-constexpr size_t kDrainStep = 16384;  // bytes between two looks at the clock, when paced
+constexpr size_t kMostEvents = 1024;  // beyond this, the host sees a gap in their numbers
+// bytes between two reads of the clock, when the rate is limited
+constexpr size_t kDrainStep = 16384;
 constexpr sync::TimeNs kHealthPeriod = sync::kSecond;
 constexpr uint32_t kMaxPowerMw = 60'000;
 
@@ -55,7 +56,7 @@ std::vector<std::byte> MakeCapabilities(const VoxlinkDeviceConfig& config) {
   return voxlink::EncodeCapabilities(device);
 }
 
-// Are an OUT request's wValue and length those of the table of §4?
+// Returns whether an OUT request's wValue and length match the table of §4.
 bool FitsTable(const UsbSetup& setup, size_t length) {
   switch (static_cast<Request>(setup.request)) {
     case Request::kSetMode:
@@ -207,7 +208,7 @@ void VoxlinkDevice::Receive(std::span<const std::byte> bytes) {
 void VoxlinkDevice::DrainBuffer() {
   const sync::TimeNs end = DeviceNow();
   while (buffer_begin_ < buffer_.size()) {
-    // Step by step, so that sweeps begin between the bytes that came before them and after.
+    // Drain step by step, so that a sweep begins between the bytes received before and after it.
     const size_t step = std::min(buffer_.size() - buffer_begin_, kDrainStep);
     const sync::TimeNs at =
         drained_at_ +
@@ -232,7 +233,7 @@ void VoxlinkDevice::DrainBuffer() {
 
 void VoxlinkDevice::Queue(EventType type, uint8_t flags, std::span<const std::byte> body) {
   if (type == EventType::kSweep) {
-    // Only the newest sweep is of use.
+    // Only the newest sweep is useful.
     std::erase_if(events_, [](const Event& event) { return event.type == EventType::kSweep; });
   }
   if (events_.size() >= kMostEvents) {

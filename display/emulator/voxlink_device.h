@@ -1,6 +1,6 @@
 // A voxlink 1.0 display as a USB device model: descriptors, requests, receive buffer and credits,
-// event queue; VoxlinkScreen has what becomes light. It follows docs/protocols/voxlink.md and is
-// the reference for firmware.
+// event queue; VoxlinkScreen computes the light. It follows docs/protocols/voxlink.md and is the
+// reference for firmware.
 #pragma once
 
 #include <cstddef>
@@ -22,15 +22,15 @@
 namespace voxeld::display::emulator {
 
 struct VoxlinkDeviceConfig {
-  Geometry geometry;  // must be valid; the grid does not matter
+  Geometry geometry;  // must be valid; the grid is not used
   double volumes_per_second = 30;
-  uint8_t formats = 0x1F;  // bit n: PixelFormat n; of an odd height without kHub75
+  uint8_t formats = 0x1F;  // bit n: PixelFormat n; with an odd height kHub75 is left out
   uint8_t max_sub_frames = 64;
   uint32_t receive_buffer = 4u << 20;
   uint32_t max_payload = 65536;
-  uint64_t bytes_per_second = 0;  // at which the receive buffer is emptied; 0: at once
+  uint64_t bytes_per_second = 0;  // rate at which the receive buffer is emptied; 0: at once
   bool watchdog = true;
-  bool brightness = true, power_limit = true;  // whether it has them
+  bool brightness = true, power_limit = true;  // whether it supports them
   UsbSpeed speed = UsbSpeed::kSuper;
   int16_t temperature = 300;  // 0.1 °C
   std::string serial = "simulated";
@@ -51,14 +51,14 @@ class VoxlinkDevice final : public UsbDeviceModel {
   bool plugged() const override { return plugged_; }
   uint32_t plugs() const override { return plugs_; }
 
-  // What an eye sees at this moment: nothing while the display is dark.
+  // Returns what an eye sees at this moment: nothing while the display is dark.
   std::optional<DecodedVolume> Seen() const;
   const VoxlinkScreen& screen() const { return screen_; }
   double brightness() const { return brightness_ / 65535.0; }
   uint32_t power_limit_mw() const { return power_limit_mw_; }
   const FrameLayout& layout() const { return layout_; }
   uint64_t bytes_received() const { return received_; }
-  // Bytes that came beyond the credit given: the host's mistake.
+  // Bytes received beyond the credit given: an error of the host.
   uint64_t credit_excess() const { return credit_excess_; }
 
  private:
@@ -77,21 +77,21 @@ class VoxlinkDevice final : public UsbDeviceModel {
   uint64_t CreditLimit() const { return consumed_ + config_.receive_buffer; }
 
   void Control(const Urb& urb);
-  // The reply to an IN request, or nothing to stall it.
+  // Returns the reply to an IN request, or nothing to stall it.
   std::optional<std::vector<std::byte>> ReadRequest(const UsbSetup& setup);
   std::optional<std::vector<std::byte>> Descriptor(uint16_t value) const;
   bool WriteRequest(const UsbSetup& setup, std::span<const std::byte> data);
   void ResetMode();
-  // Ends the session and forgets what was set; pending URBs end as `status`.
+  // Ends the session and resets all settings; pending URBs end as `status`.
   void Forget(TransferStatus status);
   bool SetMode(std::span<const std::byte> data);
   void StartSession();
   void StopSession();
   std::vector<std::byte> StatusBytes();  // announces credit, as an event does
 
-  void AcceptBulk();  // from waiting URBs into the receive buffer
+  void AcceptBulk();  // moves bytes from waiting URBs into the receive buffer
   void Receive(std::span<const std::byte> bytes);
-  void DrainBuffer();  // from the receive buffer to the screen, at the pace
+  void DrainBuffer();  // moves bytes from the receive buffer to the screen, at the limited rate
   void Queue(voxlink::EventType type, uint8_t flags, std::span<const std::byte> body);
   void DeliverEvents();
   void DeliverEvent(const Event& event);
@@ -115,9 +115,9 @@ class VoxlinkDevice final : public UsbDeviceModel {
   uint32_t power_limit_mw_ = 0;
   VoxlinkScreen screen_;
 
-  std::vector<std::byte> buffer_;  // received, not consumed: from buffer_begin_ on
+  std::vector<std::byte> buffer_;  // received but not consumed, from buffer_begin_ on
   size_t buffer_begin_ = 0;
-  sync::TimeNs drained_at_ = 0;  // pace is counted from here
+  sync::TimeNs drained_at_ = 0;  // the rate is counted from here
   uint64_t received_ = 0, consumed_ = 0, announced_ = 0, credit_excess_ = 0;
 
   std::deque<Event> events_;

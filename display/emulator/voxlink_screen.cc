@@ -15,8 +15,7 @@ using voxlink::PacketType;
 using voxlink::PictureRun;
 using voxlink::Reason;
 
-// §6: at most this many runs are listed;
-// neighbours with the smallest gap between them are joined first.
+// §6: lists at most this many runs; neighbours with the smallest gap between them are joined first.
 void JoinRuns(std::vector<PictureRun>& runs) {
   constexpr size_t kMostRuns = voxlink::kRunsPerEvent * voxlink::kMostMissingEvents;
   if (runs.size() <= kMostRuns) return;
@@ -110,7 +109,7 @@ void VoxlinkScreen::Advance(sync::TimeNs now) {
       continue;
     }
     BeginSweep(++sweep_, sweep_start);
-    // After a long pause nothing new can have come for the sweeps in between.
+    // After a long pause nothing new can have come for the skipped sweeps.
     const auto behind = static_cast<uint64_t>((now - sweep_start) / period_);
     if (behind > 64 && !(waiting_ && waiting_->show)) sweep_ += behind - 1;
   }

@@ -1,7 +1,7 @@
-// The light's side of an emulated voxlink display: packets in, volumes shown sweep by sweep, events
-// out. It follows docs/protocols/voxlink.md §5, §6 and §8 and knows nothing of USB.
+// The light of an emulated voxlink display: packets in, volumes shown sweep by sweep, events out.
+// It follows docs/protocols/voxlink.md §5, §6 and §8 and does not depend on USB.
 //
-// Single-threaded; its clock moves only by Advance.
+// Single-threaded; its time advances only by Advance.
 #pragma once
 
 #include <cstddef>
@@ -26,27 +26,28 @@ class VoxlinkScreen final : private voxlink::PacketParser::Sink {
 
   VoxlinkScreen(uint32_t max_payload, bool watchdog, Emit emit);
 
-  // START and STOP (§4.5): everything is forgotten, nothing is shown; the first sweep begins one
-  // period after `now`. Times are the device's.
+  // START and STOP (§4.5): all state is reset, nothing is shown; the first sweep begins one period
+  // after `now`. Times are the device's.
   void Start(const FrameLayout& layout, sync::TimeNs period, sync::TimeNs now);
   void Stop();
   bool running() const { return running_; }
 
-  // Bytes from the receive buffer, in order. Advance(now) comes first.
+  // Consumes bytes from the receive buffer, in order. Call Advance(now) first.
   void Consume(std::span<const std::byte> bytes, sync::TimeNs now);
-  // The receive buffer still holds bytes: the host is not silent.
+  // Notes that the receive buffer still holds bytes, so the host is not silent.
   void HostIsHeard(sync::TimeNs now);
   void SetBlank(bool blank);
 
-  // Sweeps that have begun and darkness that is due, up to and including `now`.
+  // Processes the sweeps that have begun and the darkness that is due, up to and including `now`.
   void Advance(sync::TimeNs now);
   sync::TimeNs NextTimeout() const;
 
   bool blanked() const { return blanked_; }
   bool watchdog_dark() const { return watchdog_dark_; }
-  // How long the host had been silent when it last became dark for that: by the model's turn, which may be late. 0: never.
+  // How long the host had been silent when the display last went dark for that, measured when the
+  // model ran, which may be late. 0: never.
   sync::TimeNs silence() const { return silence_; }
-  // Light comes out: a volume is shown and nothing darkens it.
+  // Returns whether light is emitted: a volume is shown and nothing darkens it.
   bool lit() const { return running_ && shown_ != nullptr && !blanked_ && !watchdog_dark_; }
   const voxlink::VolumePtr& shown() const { return shown_; }
   uint64_t filling() const { return assembler_ ? assembler_->number() : 0; }
@@ -58,7 +59,7 @@ class VoxlinkScreen final : private voxlink::PacketParser::Sink {
   uint64_t errors() const { return errors_; }  // ERROR events
 
  private:
-  // A whole volume that waits for its sweep, or for SHOW.
+  // A complete volume that waits for its sweep, or for SHOW.
   struct Waiting {
     voxlink::VolumePtr volume;
     bool show = false;
@@ -98,10 +99,10 @@ class VoxlinkScreen final : private voxlink::PacketParser::Sink {
   sync::TimeNs shown_start_ = 0;
 
   uint64_t last_begun_ = 0;
-  uint64_t refused_ = 0;  // the volume whose BEGIN was refused: its slices are passed over
+  uint64_t refused_ = 0;  // the volume whose BEGIN was refused: its slices are ignored
   voxlink::Reason refused_reason_ = voxlink::Reason::kMalformed;
-  uint64_t complained_ = 0;  // volume for whose unexpected slices an ERROR went out already
-  uint32_t sequence_ = 0;    // of the next packet
+  uint64_t complained_ = 0;  // volume for whose unexpected slices an ERROR was already sent
+  uint32_t sequence_ = 0;    // expected of the next packet
 
   sync::TimeNs period_ = sync::kSecond;
   sync::TimeNs epoch_ = 0;  // sweep n begins at epoch_ + n·period_

@@ -15,7 +15,7 @@ constexpr int kSocketBytes = 8 << 20;
 
 ByteStream::ByteStream(int fd) : fd_(fd) {
   fcntl(fd_, F_SETFL, fcntl(fd_, F_GETFL) | O_NONBLOCK);
-  // As large as the system allows: throughput only.
+  // As large as the system allows; affects only throughput.
   setsockopt(fd_, SOL_SOCKET, SO_SNDBUF, &kSocketBytes, sizeof(kSocketBytes));
   setsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &kSocketBytes, sizeof(kSocketBytes));
 }

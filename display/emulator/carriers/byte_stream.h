@@ -1,4 +1,4 @@
-// A stream socket as carriers use it: nothing blocks, what cannot be sent yet waits here.
+// A non-blocking stream socket for carriers: bytes that cannot be sent yet wait here.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@ namespace voxeld::display::emulator {
 
 class ByteStream {
  public:
-  // Takes the descriptor, and makes it non-blocking.
+  // Takes ownership of the descriptor, and makes it non-blocking.
   explicit ByteStream(int fd);
   ~ByteStream();
   ByteStream(const ByteStream&) = delete;
@@ -18,24 +18,24 @@ class ByteStream {
   int fd() const { return fd_; }
   bool open() const { return open_; }
   bool wants_to_send() const { return open_ && waiting() > 0; }
-  // Bytes that the other side has not taken yet.
+  // Returns the bytes that the peer has not accepted yet.
   size_t waiting() const { return out_.size() - sent_; }
   void Shutdown();
 
-  // Sends at once what the socket takes.
+  // Sends at once what the socket accepts, and keeps the rest.
   void Send(std::span<const std::byte> bytes);
   void SendWaiting();
-  // Reads into `bytes` what is there; 0 when nothing is, or the other side is gone.
+  // Reads available data into `bytes`; returns 0 if none is available, or the peer is gone.
   size_t Receive(std::span<std::byte> bytes);
 
  private:
-  // How many of them went out.
+  // Returns how many of the bytes were sent.
   size_t Write(std::span<const std::byte> bytes);
 
   const int fd_;
   bool open_ = true;
   std::vector<std::byte> out_;
-  size_t sent_ = 0;  // of out_
+  size_t sent_ = 0;  // bytes of out_
 };
 
 }  // namespace voxeld::display::emulator

@@ -1,4 +1,5 @@
-// How much one connection may let wait: far more than any host does, so that a broken one does not take all memory.
+// Limits of what one connection may have waiting: far more than any host needs, so that a broken
+// host cannot exhaust memory.
 #pragma once
 
 #include <cstddef>
@@ -6,7 +7,7 @@
 namespace voxeld::display::emulator {
 
 inline constexpr size_t kMostPending = 8192;               // transfers
-inline constexpr size_t kMostPendingBytes = 256ull << 20;  // that they carry or ask for
-inline constexpr size_t kMostWaiting = 64ull << 20;  // bytes that the other side has not taken
+inline constexpr size_t kMostPendingBytes = 256ull << 20;  // carried or requested by them
+inline constexpr size_t kMostWaiting = 64ull << 20;        // bytes that the peer has not accepted
 
 }  // namespace voxeld::display::emulator

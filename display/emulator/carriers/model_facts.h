@@ -1,5 +1,5 @@
-// What a carrier has to say of a device before anybody asks the device: read from its descriptors,
-// by requests as a host would send.
+// Facts about a device that a carrier must know before the host asks for them. They are read from
+// its descriptors, by the requests that a host would send.
 #pragma once
 
 #include <array>
@@ -25,10 +25,10 @@ struct ModelFacts {
   std::vector<Endpoint> endpoints;
 };
 
-// Takes over the model's completions: set them anew afterwards.
+// Replaces the model's completion callback: set it again afterwards.
 ModelFacts ReadFacts(UsbDeviceModel& model);
 
-// The eight bytes of a setup packet, as on the wire.
+// Parses the eight bytes of a setup packet, as on the wire.
 UsbSetup ParseSetup(const uint8_t (&bytes)[8]);
 
 }  // namespace voxeld::display::emulator

@@ -25,19 +25,19 @@ namespace {
 constexpr uint32_t kSubmit = 1, kUnlink = 2, kSubmitReply = 3, kUnlinkReply = 4;
 constexpr uint32_t kZeroPacket = 0x40;  // URB_ZERO_PACKET
 constexpr uint32_t kMostBytes = 64u << 20;
-constexpr uint32_t kNotIsochronous = 0xFFFFFFFF;  // of `packets`; older kernels: 0
-constexpr int kMostCommands = 256;                // in one call: others want their turn
+constexpr uint32_t kNotIsochronous = 0xFFFFFFFF;  // in `packets`; older kernels: 0
+constexpr int kMostCommands = 256;                // per call, so that others get their turn
 constexpr uint16_t kVersion = 0x0111;
 constexpr uint16_t kDeviceListRequest = 0x8005, kDeviceListReply = 0x0005;
 constexpr uint16_t kImportRequest = 0x8003, kImportReply = 0x0003;
 constexpr const char* kBusId = "1-1";
 constexpr const char* kController = "/sys/devices/platform/vhci_hcd.0";
 
-// Every field is big-endian, but for setup.
+// All fields are big-endian, except setup.
 struct Header {
   uint32_t command, number, device, direction, endpoint;
-  uint32_t flags;   // or the number to unlink; of replies the status
-  uint32_t length;  // of replies the actual one
+  uint32_t flags;   // or the number to unlink; in replies the status
+  uint32_t length;  // in replies the actual length
   uint32_t start_frame, packets, interval;
   uint8_t setup[8];
 };
@@ -56,7 +56,7 @@ struct __attribute__((packed)) DeviceRecord {
 };
 static_assert(sizeof(DeviceRecord) == 312);
 
-// enum usb_device_speed of the kernel.
+// Returns the kernel's enum usb_device_speed.
 uint32_t KernelSpeed(UsbSpeed speed) {
   return speed == UsbSpeed::kFull ? 2 : speed == UsbSpeed::kHigh ? 3 : 5;
 }
@@ -72,7 +72,7 @@ uint32_t KernelStatus(TransferStatus status) {
       return static_cast<uint32_t>(-EOVERFLOW);
     case TransferStatus::kCancelled:
       return static_cast<uint32_t>(-ENOENT);
-    case TransferStatus::kDisconnected:  // is not said
+    case TransferStatus::kDisconnected:  // not reported
     case TransferStatus::kTimedOut:
     case TransferStatus::kError:
       break;
@@ -193,8 +193,9 @@ void UsbipSession::OnComplete(uint64_t id, TransferStatus status, uint32_t actua
                               std::span<const std::byte> in) {
   const auto it = submitted_.find(id);
   if (it == submitted_.end()) return;
-  // A cable that was pulled says nothing. (Linux's virtual controller can lose a transfer that is cancelled
-  // while the connection ends, and whoever cancelled waits for ever: so let nobody have cause to.)
+  // An unplugged cable reports nothing. (Linux's virtual controller can lose a transfer that is
+  // cancelled while the connection ends, and the canceller then waits for ever; so give it no
+  // reason to cancel.)
   if (status == TransferStatus::kDisconnected) return Forget(it);
   const bool reads = it->second.in;
   in = in.first(std::min<size_t>(in.size(), it->second.length));
@@ -280,7 +281,7 @@ absl::StatusOr<int> AttachToKernel(UsbSpeed speed) {
     return absl::FailedPreconditionError(absl::StrCat(
         kController, " is not there; the kernel's vhci_hcd is needed: `modprobe vhci-hcd`"));
   }
-  // hub port state …; state 4: free.
+  // Lines read: hub port state …; state 4: free.
   const std::string hub = speed == UsbSpeed::kSuper ? "ss" : "hs";
   int port = -1;
   for (std::string line; port < 0 && std::getline(file, line);) {
@@ -292,7 +293,7 @@ absl::StatusOr<int> AttachToKernel(UsbSpeed speed) {
   if (port < 0) return absl::ResourceExhaustedError(absl::StrCat(kController, " has no free port"));
   int sockets[2];
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, sockets) != 0) return Errno("socketpair");
-  // The kernel's end blocks; its buffers are what bounds the bytes on the way.
+  // The kernel's end blocks; its buffers limit the bytes in flight.
   const int size = 8 << 20;
   setsockopt(sockets[0], SOL_SOCKET, SO_SNDBUFFORCE, &size, sizeof(size));
   setsockopt(sockets[0], SOL_SOCKET, SO_RCVBUFFORCE, &size, sizeof(size));

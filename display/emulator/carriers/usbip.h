@@ -1,5 +1,5 @@
-// The device's side of USB/IP (Linux, Documentation/usb/usbip_protocol.rst): a device model as what
-// the kernel's vhci_hcd, or `usbip attach` on another machine, takes for a real device.
+// The device's side of USB/IP (Linux, Documentation/usb/usbip_protocol.rst): presents a device
+// model as a real device to the kernel's vhci_hcd, or to `usbip attach` on another machine.
 #pragma once
 
 #include <cstdint>
@@ -14,20 +14,20 @@
 
 namespace voxeld::display::emulator {
 
-// The stream of URBs, after the handshake. Single-threaded, as the model is: while it lives the
-// model completes to it.
+// The stream of URBs, after the handshake. Single-threaded, as the model is; during its lifetime it
+// receives the model's completions.
 class UsbipSession {
  public:
-  // Takes the socket.
+  // Takes ownership of the socket.
   UsbipSession(int fd, UsbDeviceModel& model);
   ~UsbipSession();
   UsbipSession(const UsbipSession&) = delete;
   UsbipSession& operator=(const UsbipSession&) = delete;
 
   ByteStream& stream() { return stream_; }
-  // Reads commands and carries them out. Anything but OK ends the session: InvalidArgument for what is not
-  // the protocol, Unimplemented for isochronous transfers, ResourceExhausted for more than any host lets wait,
-  // Unavailable if the other side has gone.
+  // Reads and executes commands. Any error ends the session: InvalidArgument for a protocol
+  // violation, Unimplemented for isochronous transfers, ResourceExhausted if more is pending than
+  // any host needs, Unavailable if the peer is gone.
   absl::Status Receive();
 
  private:
@@ -37,7 +37,7 @@ class UsbipSession {
     std::vector<std::byte> out;
   };
 
-  // True if there was one.
+  // Returns true if there was a command.
   absl::StatusOr<bool> ReceiveOne();
   void Submit(uint32_t number, bool in);
   void OnComplete(uint64_t id, TransferStatus status, uint32_t actual,
@@ -46,20 +46,21 @@ class UsbipSession {
 
   ByteStream stream_;
   UsbDeviceModel& model_;
-  std::vector<std::byte> head_;     // of the command that is coming
-  std::vector<std::byte> payload_;  // and what follows it
-  size_t have_ = 0;                 // of both
+  std::vector<std::byte> head_;     // of the command being received
+  std::vector<std::byte> payload_;  // the data that follow it
+  size_t have_ = 0;                 // bytes received of both
   std::map<uint64_t, Submitted> submitted_;
-  size_t pending_bytes_ = 0;  // of submitted_
+  size_t pending_bytes_ = 0;  // of all submitted_
 };
 
-// Answers the handshake of one connection (OP_REQ_DEVLIST, OP_REQ_IMPORT for bus id "1-1"), which may
-// wait for the other side for at most `limit_ms`. True: the URBs follow; false: it asked only for the
-// list. InvalidArgument for what is not the protocol, NotFound for another device or one that is not
-// plugged in, Unavailable if the other side has gone or keeps silent.
+// Answers the handshake of one connection (OP_REQ_DEVLIST, OP_REQ_IMPORT for bus id "1-1"), waiting
+// at most `limit_ms` for the peer. Returns true if URBs follow, false if the peer only asked for
+// the list. Errors: InvalidArgument for a protocol violation, NotFound for another device or one
+// that is not plugged in, Unavailable if the peer is gone or silent.
 absl::StatusOr<bool> AnswerUsbipHandshake(int fd, UsbDeviceModel& model, int limit_ms);
 
-// Attaches to this kernel's vhci_hcd through sysfs; needs root. The descriptor is the device's end.
+// Attaches to this kernel's vhci_hcd through sysfs; needs root. Returns the device's end of the
+// socket.
 absl::StatusOr<int> AttachToKernel(UsbSpeed speed);
 
 }  // namespace voxeld::display::emulator

@@ -42,7 +42,7 @@ int Speed(UsbSpeed speed) {
                                     : usb_redir_speed_super;
 }
 
-// Place of an endpoint in ep_info's tables.
+// Returns the index of an endpoint in ep_info's tables.
 size_t Place(uint8_t address) { return (address & 0x0Fu) | ((address & 0x80u) >> 3); }
 
 }  // namespace
@@ -182,7 +182,7 @@ struct UsbredirSession::Callbacks {
     status.endpoint = header->endpoint;
     usbredirparser_send_interrupt_receiving_status(self.parser_.get(), id, &status);
   }
-  // Isochronous streams; there is no device that has such endpoints.
+  // Isochronous streams; no device model has such endpoints.
   static void StartStream(void* session, uint64_t id, usb_redir_start_iso_stream_header* header) {
     RefuseStream(session, id, header->endpoint);
   }
@@ -287,7 +287,7 @@ void UsbredirSession::Connect() {
 }
 
 void UsbredirSession::SetPlugged(bool plugged) {
-  // Before the greeting nobody can be told; then Hello looks.
+  // Before the hello the peer cannot be notified; Hello then checks the state.
   if (!greeted_ || plugged == connected_) return;
   if (plugged) return Connect();
   connected_ = false;
@@ -320,7 +320,7 @@ absl::Status UsbredirSession::Receive() {
 }
 
 void UsbredirSession::Submit(Submitted submitted, uint32_t length) {
-  // To a device that is not there any more, as far as the other side can know.
+  // Requests to a device that, as far as the peer knows, is absent are ignored.
   if (!connected_) return;
   if (submitted_.size() >= kMostPending || pending_bytes_ + length > kMostPendingBytes) {
     overrun_ = true;
@@ -416,8 +416,8 @@ void UsbredirSession::AnswerInterrupt(const Submitted& submitted, TransferStatus
                                       uint32_t actual, std::span<const std::byte> in) {
   const bool reads = submitted.kind == Submitted::Kind::kInterruptIn;
   if (reads && reading_.contains(submitted.endpoint)) {
-    // A halted endpoint stalls at once, as often as it is read. QEMU would not look at a status of the receiving
-    // until something else wakes it: the stall goes as a packet.
+    // A halted endpoint stalls at once, every time it is read. QEMU would not notice a receiving
+    // status until something else wakes it: so send the stall as a packet.
     if (status == TransferStatus::kStall) {
       halted_.insert(submitted.endpoint);
     } else {
