@@ -105,7 +105,7 @@ absl::StatusOr<TransferId> FaultyTransport::Reset() {
 
 void FaultyTransport::Take(TransferCompletion completion, std::vector<TransferCompletion>& out) {
   const auto it = in_flight_.find(completion.id);
-  if (it == in_flight_.end()) return;  // ended with the device
+  if (it == in_flight_.end()) return;  // already ended with the device
   const bool in = (it->second.endpoint & 0x80) != 0;
   const TransportFault* const fault = Meet(Where::kCompletion, ++completions_);
   std::deque<Held>& queue = held_[QueueOf(completion.type, completion.endpoint)];
@@ -168,7 +168,7 @@ sync::TimeNs FaultyTransport::Pump() {
   {
     sync::MutexLock lock(mutex_);
     if (next_due_ > clock_.Now()) return next_due_;
-    next_due_ = sync::kNever;  // until Drain has looked
+    next_due_ = sync::kNever;  // until Drain has checked
   }
   sync::MutexLock lock(wake_mutex_);
   if (wake_) wake_();

@@ -1,9 +1,9 @@
-// A transport that fails as real ones do, where a plan says so: refused calls, and completions that
-// are late or tell something else than what happened. What passes below it is real: a transfer whose
-// completion is replaced has done what it did.
+// A transport that fails as real ones do, where a plan says so: it refuses calls, and delays or
+// changes completions. The wrapped transport works normally: a transfer whose completion is
+// replaced has still taken place.
 //
-// Deterministic: the plan, the order of calls and a clock decide everything. Faults of the cable and
-// of the device are for emulator/fault_injector.h.
+// Deterministic: the plan, the order of calls and a clock determine everything. For faults of the
+// cable and of the device see emulator/fault_injector.h.
 #pragma once
 
 #include <cstddef>
@@ -26,34 +26,34 @@ namespace voxeld::display {
 struct TransportFault {
   enum class Where : uint8_t {
     kOpen,
-    kSubmit,      // ClearHalt and Reset count as well
+    kSubmit,      // also counts ClearHalt and Reset
     kCompletion,  // in the order in which they happen
   };
   Where where = Where::kSubmit;
   uint64_t at = 1;     // which of them, from 1, since the transport was made
   uint64_t count = 1;  // so many in a row
-  // kOpen, kSubmit: what they return; the transport below is not called.
+  // kOpen, kSubmit: the error returned; the wrapped transport is not called.
   absl::Status refusal = absl::UnavailableError("a fault was planned here");
-  // kCompletion: what it says instead. An IN transfer keeps actual_length of its bytes, none if that
-  // is not set and `status` is neither kOk nor kShort. kDisconnected takes everything else in flight
-  // with it and lasts until Close.
+  // kCompletion: the status reported instead. An IN transfer keeps actual_length of its bytes, or
+  // none if that is not set and `status` is neither kOk nor kShort. kDisconnected also ends
+  // everything else in flight, and lasts until Close.
   std::optional<TransferStatus> status;
-  std::optional<uint32_t> actual_length;  // what it claims, true or not
-  // kCompletion: it comes so much later, and what follows it on its endpoint not before it.
+  std::optional<uint32_t> actual_length;  // the length reported, true or not
+  // kCompletion: delay of the completion; later ones on its endpoint do not overtake it.
   sync::TimeNs hold = 0;
 };
 
 class FaultyTransport final : public UsbTransport {
  public:
   struct Options {
-    bool own_thread = true;  // to wake for what is held back; false: the owner calls Pump
+    bool own_thread = true;  // wakes for delayed completions; false: the owner calls Pump
   };
 
   FaultyTransport(std::unique_ptr<UsbTransport> inner, std::vector<TransportFault> plan,
                   sync::Clock& clock, Options options);
   ~FaultyTransport() override;
 
-  // How many calls and completions a fault has met.
+  // Returns how many calls and completions had a fault.
   uint64_t hits() const { return hits_; }
 
   absl::Status Open() override;
@@ -71,7 +71,7 @@ class FaultyTransport final : public UsbTransport {
   void SetWake(std::function<void()> wake) override;
   bool TakeArrival() override { return inner_->TakeArrival(); }
 
-  // Wakes if something held back is due, and returns when something will be. Any thread.
+  // Wakes if a delayed completion is due, and returns when the next one will be. Any thread.
   sync::TimeNs Pump();
 
  private:
@@ -85,9 +85,9 @@ class FaultyTransport final : public UsbTransport {
   };
 
   void Run();
-  // The plan's fault for this call or completion, the `count`-th of its kind.
+  // Returns the plan's fault for this call or completion, the `count`-th of its kind; null if none.
   const TransportFault* Meet(TransportFault::Where where, uint64_t count);
-  // The refusal of the next Submit, if there is one.
+  // Returns the error for the next Submit, if one is planned.
   absl::Status Refusal();
   absl::StatusOr<TransferId> Note(const InFlight& in_flight, absl::StatusOr<TransferId> id);
   void Take(TransferCompletion completion, std::vector<TransferCompletion>& out);
@@ -96,7 +96,7 @@ class FaultyTransport final : public UsbTransport {
   const std::vector<TransportFault> plan_;
   sync::Clock& clock_;
 
-  // The owner's.
+  // Used by the owner's thread only.
   uint64_t opens_ = 0, submits_ = 0, completions_ = 0, hits_ = 0;
   bool gone_ = false;
   std::map<TransferId, InFlight> in_flight_;
@@ -109,7 +109,7 @@ class FaultyTransport final : public UsbTransport {
   bool poked_ VOXELD_GUARDED_BY(mutex_) = false;
   bool stop_ VOXELD_GUARDED_BY(mutex_) = false;
 
-  sync::Mutex wake_mutex_;  // held alone
+  sync::Mutex wake_mutex_;  // never held together with another lock
   std::function<void()> wake_ VOXELD_GUARDED_BY(wake_mutex_);
   std::thread thread_;
 };

@@ -20,7 +20,7 @@ constexpr uint8_t kClearFeature = 0x01;
 constexpr size_t kSlabBytes = size_t{256} << 10;
 constexpr size_t kSlabs = 16;
 
-// Slabs of ordinary memory, made at once and touched as they are used.
+// Slabs of ordinary memory, allocated at once and touched as they are used.
 class HeapSlabs final : public SlabMemory {
  public:
   static std::shared_ptr<TransferMemory> Make() {
@@ -46,7 +46,7 @@ InProcessTransport::InProcessTransport(std::unique_ptr<UsbDeviceModel> device, s
       memory_(HeapSlabs::Make()) {
   device_->SetComplete([this](uint64_t id, TransferStatus status, uint32_t actual,
                               std::span<const std::byte> in) VOXELD_NO_THREAD_SAFETY_ANALYSIS {
-    OnComplete(id, status, actual, in);  // inside a call of the model: device_mutex_ is held
+    OnComplete(id, status, actual, in);  // called inside a call of the model: device_mutex_ is held
   });
   if (options_.own_thread) thread_ = std::thread([this] { Run(); });
 }
@@ -76,7 +76,7 @@ absl::Status InProcessTransport::Open() {
 }
 
 void InProcessTransport::Close() {
-  Pump();  // the device answers what it can answer at once
+  Pump();  // let the device answer what it can answer at once
   sync::MutexLock device_lock(device_mutex_);
   for (const auto& [id, pending] : pending_) device_->Unlink(id);
   pending_.clear();

@@ -1,6 +1,6 @@
 // A USB transport whose device is a model in this process. It is as asynchronous as a real one:
 // Submit only queues, and everything that the device does happens on the transport's own event
-// thread, or, for tests and simulations of whole systems in one thread, when Pump is called.
+// thread or, for tests and single-threaded simulations of whole systems, when Pump is called.
 #pragma once
 
 #include <cstddef>
@@ -25,7 +25,7 @@ class InProcessTransport final : public UsbTransport {
  public:
   struct Options {
     bool own_thread = true;  // false: the owner calls Pump
-    // As Linux's usbfs has it, which answers with "out of memory" above.
+    // As in Linux's usbfs, which answers "out of memory" beyond.
     size_t max_bytes_in_flight = size_t{16} << 20;
     UsbIdentity identity{.vendor_id = 0x1209,
                          .product_id = 0x0001,
@@ -52,12 +52,12 @@ class InProcessTransport final : public UsbTransport {
   void SetWake(std::function<void()> wake) override;
   bool TakeArrival() override;
 
-  // Gives the device what was submitted, lets it do what is due, and returns when it wants to be
-  // called again. Any thread; the event thread's loop is this.
+  // Passes submitted transfers to the device, lets it do what is due, and returns when to call it
+  // again. Any thread; the event thread runs this in a loop.
   sync::TimeNs Pump();
 
-  // Runs `function` with the device to itself (a test's look at what it shows,
-  // or its hand on the cable).
+  // Runs `function` with exclusive access to the device (for a test to see what it shows, or to
+  // unplug it).
   void WithDevice(const std::function<void(UsbDeviceModel&)>& function);
 
  private:
@@ -82,9 +82,9 @@ class InProcessTransport final : public UsbTransport {
   sync::Clock& clock_;
   const Options options_;
 
-  // Order of locks: device_mutex_ before mutex_. wake_mutex_ is held alone.
+  // Lock order: device_mutex_ before mutex_. wake_mutex_ is never held together with another.
   mutable sync::Mutex device_mutex_;
-  // The pointer is fixed; the model belongs to device_mutex_.
+  // The pointer is constant; the model is guarded by device_mutex_.
   std::unique_ptr<UsbDeviceModel> device_;
   std::map<TransferId, Pending> pending_ VOXELD_GUARDED_BY(device_mutex_);
   bool was_plugged_ VOXELD_GUARDED_BY(device_mutex_) = false;
@@ -93,12 +93,13 @@ class InProcessTransport final : public UsbTransport {
   mutable sync::Mutex mutex_;
   sync::CondVar work_;
   bool open_ VOXELD_GUARDED_BY(mutex_) = false;
-  bool gone_ VOXELD_GUARDED_BY(mutex_) = false;  // the device that was opened is no more
+  bool gone_ VOXELD_GUARDED_BY(mutex_) = false;  // the device that was opened is gone
   bool stop_ VOXELD_GUARDED_BY(mutex_) = false;
-  bool poked_ VOXELD_GUARDED_BY(mutex_) = false;  // the device's next time may have changed
+  bool poked_ VOXELD_GUARDED_BY(mutex_) = false;  // the device's next timeout may have changed
   bool arrived_ VOXELD_GUARDED_BY(mutex_) = false;
   TransferId next_id_ VOXELD_GUARDED_BY(mutex_) = 1;
-  std::deque<std::variant<Request, TransferId>> requests_ VOXELD_GUARDED_BY(mutex_);  // id: cancel
+  // an id means: cancel
+  std::deque<std::variant<Request, TransferId>> requests_ VOXELD_GUARDED_BY(mutex_);
   std::vector<TransferCompletion> completions_ VOXELD_GUARDED_BY(mutex_);
   size_t bytes_in_flight_ VOXELD_GUARDED_BY(mutex_) = 0;
 

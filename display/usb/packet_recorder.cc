@@ -14,7 +14,7 @@ namespace voxeld::display {
 namespace {
 
 constexpr size_t kChunkBytes = size_t{1} << 20;
-constexpr size_t kRoomForStatistics = 512;  // at the end of a file of limited size
+constexpr size_t kRoomForStatistics = 512;  // reserved at the end of a file of limited size
 
 absl::Status SystemError(const char* what, const std::string& path, int error) {
   const std::string message = absl::StrCat(what, " \"", path, "\": ", std::strerror(error));
@@ -39,7 +39,7 @@ class FileSink final : public ByteSink {
         bytes = bytes.subspan(static_cast<size_t>(written));
       } else if (errno != EINTR) {
         const int error = errno;
-        // Where this fails too, the file can be read up to the block that was cut.
+        // If this also fails, the file can be read up to the truncated block.
         [[maybe_unused]] const int cut = ::ftruncate(descriptor_, static_cast<off_t>(size_));
         return SystemError("writing the recording", path_, error);
       }
@@ -57,16 +57,16 @@ class FileSink final : public ByteSink {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<ByteSink>> OpenFileSink(const std::string& path) {
-  constexpr mode_t kMode = 0640;  // it has all that was shown
+  constexpr mode_t kMode = 0640;  // restricted, because it holds everything that was shown
   const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, kMode);
   if (descriptor < 0) return SystemError("opening the recording", path, errno);
-  // Nobody else's that is being written.
+  // Not a recording that another process is writing.
   if (flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
     ::close(descriptor);
     return absl::FailedPreconditionError(
         absl::StrCat("the recording ", path, " is being written already; choose another file"));
   }
-  // What is no file (a pipe, a device) cannot be emptied, and need not be.
+  // A pipe or a device cannot be truncated, and need not be.
   if (ftruncate(descriptor, 0) != 0 && errno != EINVAL) {
     const int error = errno;
     ::close(descriptor);

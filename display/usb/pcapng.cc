@@ -30,7 +30,7 @@ constexpr uint16_t kIsbStartTime = 2, kIsbEndTime = 3, kIsbReceived = 4, kIsbDro
 
 constexpr uint8_t kNanoseconds = 9;
 constexpr size_t kBlockFrame = 12;    // type and both lengths
-constexpr size_t kPacketFields = 20;  // of an enhanced packet, before its data
+constexpr size_t kPacketFields = 20;  // fields of an enhanced packet before its data
 constexpr size_t kMostText = 60'000;  // an option's length has 16 bits
 
 constexpr size_t Padded(size_t size) { return (size + 3) & ~size_t{3}; }
@@ -68,7 +68,7 @@ void PutText(Bytes& out, uint16_t code, std::string_view text) {
   PutOption(out, code, std::as_bytes(std::span(text.data(), text.size())));
 }
 
-// Begins a block and ends it, which puts its length at both ends.
+// Begin and end a block; ending it writes its length at both ends.
 size_t BeginBlock(Bytes& out, uint32_t type) {
   const size_t begin = out.size();
   Put(out, type);
@@ -94,7 +94,7 @@ void AppendRecordingStart(const RecordingInfo& info, Bytes& out) {
   Put(out, kByteOrder);
   Put(out, uint16_t{1});  // major
   Put(out, uint16_t{0});  // minor
-  Put(out, int64_t{-1});  // length of the section: not said
+  Put(out, int64_t{-1});  // length of the section: unspecified
   PutText(out, kShbUserApplication, info.application);
   Put(out, uint32_t{kOptEnd});
   EndBlock(out, section);
@@ -102,7 +102,7 @@ void AppendRecordingStart(const RecordingInfo& info, Bytes& out) {
   const size_t interface = BeginBlock(out, kInterfaceDescription);
   Put(out, kLinkTypeUsbLinuxMmapped);
   Put(out, uint16_t{0});
-  Put(out, uint32_t{0});  // packets are not cut
+  Put(out, uint32_t{0});  // packets are not truncated
   PutText(out, kIfName, info.interface_name);
   PutOptionOf(out, kIfTsResolution, kNanoseconds);
   Put(out, uint32_t{kOptEnd});
@@ -127,7 +127,7 @@ void AppendUsbPacket(const UsbPacket& packet, Bytes& out) {
   Put(out, uint32_t{0});  // the interface
   Put(out, HighLow(time_ns));
   Put(out, size);  // captured
-  Put(out, size);  // in full
+  Put(out, size);  // original length
   Put(out, header);
   PutPadded(out, packet.data);
   PutText(out, kOptComment, packet.comment);
@@ -176,7 +176,7 @@ void SwapHeader(UsbmonHeader& header) {
 
 }  // namespace
 
-// `bytes` hold it: callers have looked.
+// Requires: `bytes` hold it, which callers have checked.
 template <typename T>
 T PcapngReader::Get(std::span<const std::byte> bytes, size_t at) const {
   T value;
@@ -199,7 +199,7 @@ absl::StatusOr<PcapngReader::Block> PcapngReader::NextBlock() {
   block.offset = at_;
   block.type = Get<uint32_t>(rest, 0);
   if (block.type == kSectionHeader) {
-    // The same in both byte orders; what follows the length tells which it is.
+    // The type is the same in both byte orders; the field after the length says which it is.
     swapped_ = false;
     const auto order = Get<uint32_t>(rest, 8);
     if (order != kByteOrder && order != Swapped(kByteOrder)) {

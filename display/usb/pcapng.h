@@ -1,6 +1,6 @@
-// Recordings of USB traffic as pcapng files (draft-ietf-opsawg-pcapng) that Wireshark opens: one
-// section, one interface of link type LINKTYPE_USB_LINUX_MMAPPED with times in nanoseconds, a packet
-// for each submission and each completion, statistics at the end.
+// Recordings of USB traffic as pcapng files (draft-ietf-opsawg-pcapng) that Wireshark can open: one
+// section, one interface of link type LINKTYPE_USB_LINUX_MMAPPED with times in nanoseconds, a
+// packet for each submission and each completion, statistics at the end.
 //
 // Bytes only; packet_recorder.h puts them into files.
 #pragma once
@@ -23,49 +23,49 @@ namespace voxeld::display {
 inline constexpr uint16_t kLinkTypeUsbLinuxMmapped = 220;
 
 struct UsbPacket {
-  sync::TimeNs time_ns = 0;  // since 1970; the header's ts_sec and ts_usec are made from it
-  UsbmonHeader header{};     // len_cap is made from `data`
+  sync::TimeNs time_ns = 0;  // since 1970; the header's ts_sec and ts_usec are derived from it
+  UsbmonHeader header{};     // len_cap is derived from `data`
   std::span<const std::byte> data;
-  std::string_view comment;      // UTF-8; none if empty
-  uint64_t left_out_before = 0;  // packets that should stand between the one before and this one
+  std::string_view comment;      // UTF-8; empty: none
+  uint64_t left_out_before = 0;  // packets left out between the previous one and this one
   // Set by the reader:
   uint64_t number = 0;  // from 1, as Wireshark counts
-  uint64_t offset = 0;  // of its block in the file
+  uint64_t offset = 0;  // offset of its block in the file
 };
 
 struct RecordingInfo {
-  std::string application;  // that writes, UTF-8
+  std::string application;  // the writing application, UTF-8
   std::string interface_name;
 };
 
 struct RecordingStatistics {
-  sync::TimeNs first_ns = 0, last_ns = 0;  // of packets that came
+  sync::TimeNs first_ns = 0, last_ns = 0;  // of received packets
   uint64_t received = 0;
   uint64_t left_out = 0;  // of those
-  std::string comment;    // UTF-8; none if empty
+  std::string comment;    // UTF-8; empty: none
 };
 
 // The most bytes of data that a packet may have.
 inline constexpr size_t kMostPacketData = size_t{64} << 20;
 
-// Each appends whole blocks. The beginning of a file is the first, statistics the last.
+// Each appends whole blocks. The start comes first in a file, the statistics last.
 void AppendRecordingStart(const RecordingInfo& info, std::vector<std::byte>& out);
-// `data` of at most kMostPacketData.
+// Requires: `data` has at most kMostPacketData bytes.
 void AppendUsbPacket(const UsbPacket& packet, std::vector<std::byte>& out);
 void AppendStatistics(const RecordingStatistics& statistics, std::vector<std::byte>& out);
-// The size of what AppendUsbPacket appends, at most.
+// Returns an upper bound of the bytes that AppendUsbPacket appends.
 size_t UsbPacketBlockSize(const UsbPacket& packet);
 
-// Reads what is above, and what others write: both byte orders, several sections and interfaces,
-// any time resolution, unknown blocks and options. The file may be hostile. Packets of other link
-// types and blocks that hold packets without a time are errors.
+// Reads the above, and files of other writers: both byte orders, several sections and interfaces,
+// any time resolution, unknown blocks and options. The file is untrusted. Packets of other link
+// types, and blocks that hold packets without a time, are errors.
 class PcapngReader {
  public:
   // `file` must outlive the reader and its packets, which point into it.
   explicit PcapngReader(std::span<const std::byte> file) : file_(file) {}
 
-  // The next packet, or nothing at the end. InvalidArgument says what is wrong at which offset;
-  // after it every call says the same.
+  // Returns the next packet, or nothing at the end. Errors: InvalidArgument with what is wrong and
+  // at which offset; every later call returns the same error.
   absl::StatusOr<std::optional<UsbPacket>> Next();
 
  private:
@@ -91,7 +91,7 @@ class PcapngReader {
   absl::Status ReadSection(const Block& block);
   absl::Status ReadInterface(const Block& block);
   absl::StatusOr<UsbPacket> ReadPacket(const Block& block);
-  // Options from `at` in the block's body on.
+  // Returns the options from `at` in the block's body on.
   absl::StatusOr<std::vector<Option>> ReadOptions(const Block& block, size_t at);
   absl::StatusOr<sync::TimeNs> TimeOf(uint64_t ticks, const Interface& from, uint64_t offset);
 

@@ -1,4 +1,4 @@
-// A recording of one device as what happened between each Open and its Close.
+// Divides a recording of one device into sessions, from each Open to its Close.
 #pragma once
 
 #include <cstddef>
@@ -20,12 +20,12 @@ struct RecordedTransfer {
   TransferType type = TransferType::kBulk;
   uint8_t endpoint = 0;  // 0: control
   UsbSetup setup;
-  uint32_t out_length = 0;         // 0 of IN transfers
-  std::span<const std::byte> out;  // what the capture kept of it
-  uint32_t in_length = 0;          // asked for
+  uint32_t out_length = 0;         // 0 for IN transfers
+  std::span<const std::byte> out;  // the part of it that the capture kept
+  uint32_t in_length = 0;          // requested
   sync::TimeNs submitted_ns = 0;
 
-  bool refused = false;  // with `refusal`; then nothing else follows
+  bool refused = false;  // set with `refusal`; then nothing else follows
   absl::Status refusal;
   TransferStatus status = TransferStatus::kOk;
   uint32_t actual_length = 0;
@@ -34,8 +34,8 @@ struct RecordedTransfer {
 };
 
 struct RecordedStep {
-  size_t transfer = 0;     // of the session's
-  bool completes = false;  // else it was submitted
+  size_t transfer = 0;     // index in the session
+  bool completes = false;  // false: it was submitted
 };
 
 struct RecordedSession {
@@ -45,12 +45,12 @@ struct RecordedSession {
   sync::TimeNs first_ns = 0, last_ns = 0;
 };
 
-// Sessions of a pcapng file; `file` must outlive them. A session is a device address's packets.
-// InvalidArgument with the packet's number if the recording is damaged, incomplete, or has what a
-// UsbTransport does not do.
+// Returns the sessions of a pcapng file, which must outlive them. A session is the packets of one
+// device address. Errors: InvalidArgument with the packet's number if the recording is damaged or
+// incomplete, or contains something that a UsbTransport does not do.
 absl::StatusOr<std::vector<RecordedSession>> ReadSessions(std::span<const std::byte> file);
 
-// "control", "bulk OUT 0x01": what a transfer is called in messages.
+// Returns a transfer's name for messages: "control", "bulk OUT 0x01".
 std::string TransferName(TransferType type, uint8_t endpoint);
 
 }  // namespace voxeld::display

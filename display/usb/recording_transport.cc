@@ -133,7 +133,7 @@ absl::StatusOr<TransferId> RecordingTransport::Answered(const Recorded& recorded
 
 absl::StatusOr<TransferId> RecordingTransport::Submit(Transfer&& transfer) {
   if (!inner_->is_open()) return inner_->Submit(std::move(transfer));
-  // Before it goes: then the bytes are no longer ours.
+  // Record before submitting: afterwards we do not own the bytes.
   const Recorded recorded = RecordSubmission(transfer, "");
   return Answered(recorded, inner_->Submit(std::move(transfer)));
 }

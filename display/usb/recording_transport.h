@@ -1,10 +1,11 @@
-// A transport that records what goes over it, for Wireshark and for ReplayTransport, and otherwise
-// is the one that it wraps.
+// A transport that records its traffic, for Wireshark and for ReplayTransport, and otherwise
+// behaves as the one that it wraps.
 //
-// In the file: every submission with its OUT bytes, every completion, when it was drained, with its
-// IN bytes, refused submissions, ClearHalt and Reset as the requests that they are. Each Open is a
-// device address of its own, as it would be on a bus, and its first packet has the device's identity
-// as a comment. Transfers that Close ended are recorded as cancelled, with a comment.
+// The file contains every submission with its OUT bytes; every completion, at the time it was
+// drained, with its IN bytes; refused submissions; ClearHalt and Reset as the requests that they
+// are. Each Open is a device address of its own, as it would be on a bus, and its first packet has
+// the device's identity as a comment. Transfers that Close ended are recorded as cancelled, with a
+// comment.
 #pragma once
 
 #include <cstdint>
@@ -23,23 +24,23 @@ namespace voxeld::display {
 class RecordingTransport final : public UsbTransport {
  public:
   struct Options {
-    // Added to the clock's time: with the real time of day less the clock's at some moment, times in
-    // the file are times of day.
+    // Added to the clock's time. If it is the time of day minus the clock's time at some moment,
+    // times in the file are times of day.
     int64_t wall_offset_ns = 0;
-    uint16_t bus = 1;  // as the file names it
+    uint16_t bus = 1;  // as written to the file
   };
 
   RecordingTransport(std::unique_ptr<UsbTransport> inner, std::unique_ptr<PacketRecorder> recorder,
                      sync::Clock& clock, Options options);
-  // Begins its recording when a device is opened for the first time; what `make` says is then the
-  // answer of Open.
+  // Starts the recording when a device is opened for the first time; an error of `make` is then
+  // returned by Open.
   using MakeRecorder = std::function<absl::StatusOr<std::unique_ptr<PacketRecorder>>()>;
   RecordingTransport(std::unique_ptr<UsbTransport> inner, MakeRecorder make, sync::Clock& clock,
                      Options options);
   // Finishes the recording, which waits for the disk.
   ~RecordingTransport() override;
 
-  // Whether the recording goes on, and what it lost; once it has begun. Its functions are thread-safe.
+  // Returns the recorder, once recording has started, for its status and counts. It is thread-safe.
   const PacketRecorder& recorder() const { return *recorder_; }
 
   absl::Status Open() override;
@@ -58,7 +59,7 @@ class RecordingTransport final : public UsbTransport {
   bool TakeArrival() override { return inner_->TakeArrival(); }
 
  private:
-  // What a transfer's packets have in common, of a transfer in flight.
+  // The common fields of a transfer's packets, kept while it is in flight.
   struct Recorded {
     uint64_t id = 0;  // in the file
     uint8_t xfer_type = 0;
@@ -67,31 +68,32 @@ class RecordingTransport final : public UsbTransport {
 
   UsbPacket PacketOf(const Recorded& recorded, UsbmonHeader::Type type) const;
   Recorded RecordSubmission(const Transfer& transfer, std::string comment);
-  // Notes that the inner transport took it, or records that it did not.
+  // Notes that the inner transport accepted it, or records that it refused.
   absl::StatusOr<TransferId> Answered(const Recorded& recorded, absl::StatusOr<TransferId> id);
   void RecordCompletion(const TransferCompletion& completion);
 
   const std::unique_ptr<UsbTransport> inner_;
-  MakeRecorder make_recorder_;  // empty once there is one
+  MakeRecorder make_recorder_;  // empty once the recorder exists
   std::unique_ptr<PacketRecorder> recorder_;
   sync::Clock& clock_;
   const Options options_;
 
   uint8_t address_ = 0;
-  std::string opened_;  // comment that the next packet has
+  std::string opened_;  // comment for the next packet
   uint64_t next_id_ = 1;
   std::map<TransferId, Recorded> in_flight_;
 };
 
 struct RecordingFileOptions {
   std::string application = "voxeld";
-  std::string name;                // of the display, as Wireshark's interface
+  std::string name;                // of the display, used as Wireshark's interface
   PacketRecorder::Options limits;  // `info` is made from the two above
   RecordingTransport::Options transport;
 };
 
-// `inner` recorded into the file `path`, which is begun anew when a device is opened for the first
-// time. Errors, then and now (a folder that is not there or cannot be written), name the path.
+// Wraps `inner` so that it is recorded into the file `path`, which is overwritten when a device is
+// opened for the first time. Errors, then and now (a folder that is missing or not writable), name
+// the path.
 absl::StatusOr<std::unique_ptr<RecordingTransport>> RecordToFile(
     const std::string& path, std::unique_ptr<UsbTransport> inner, sync::Clock& clock,
     RecordingFileOptions options = {});

@@ -33,7 +33,7 @@ Transfer ControlOf(const UsbSetup& setup) {
 
 absl::StatusOr<std::unique_ptr<ReplayTransport>> ReplayTransport::Make(
     std::vector<std::byte> recording, sync::Clock& clock, Options options) {
-  // A moved vector's bytes stay where they are.
+  // Moving a vector does not move its bytes.
   absl::StatusOr<std::vector<RecordedSession>> sessions = ReadSessions(recording);
   if (!sessions.ok()) return sessions.status();
   return std::unique_ptr<ReplayTransport>(
@@ -267,7 +267,7 @@ sync::TimeNs ReplayTransport::Play(sync::TimeNs now) {
   for (; step_ < session().steps.size(); ++step_) {
     const RecordedStep& step = session().steps[step_];
     const Played& played = played_[step.transfer];
-    if (!played.submitted) return sync::kNever;  // until it is
+    if (!played.submitted) return sync::kNever;  // wait until it is
     if (!step.completes || played.ended) continue;
     const RecordedTransfer& recorded = session().transfers[step.transfer];
     const sync::TimeNs due = played.submitted_at + (recorded.completed_ns - recorded.submitted_ns);
@@ -297,7 +297,7 @@ sync::TimeNs ReplayTransport::Pump() {
       ExpireTimeouts(now);
       for (const auto& [id, pending] : pending_) next = std::min(next, pending.deadline);
     } else if (!open_ && status_.ok() && session_ > 0 && there_from_ != sync::kNever) {
-      // The first session's device was there from the beginning; another one comes.
+      // The first session's device was present from the beginning; this one arrives later.
       if (now < there_from_) {
         next = there_from_;
       } else if (!told_) {

@@ -20,7 +20,7 @@ SlabMemory::SlabMemory(std::vector<void*> slabs, size_t slab_bytes)
 }
 
 void* SlabMemory::Allocate(size_t bytes) {
-  // A small piece would waste a slab.
+  // A small buffer would waste a slab.
   if (bytes <= slab_bytes_ && bytes > slab_bytes_ / 2) {
     sync::MutexLock lock(mutex_);
     if (!free_.empty()) {

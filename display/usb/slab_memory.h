@@ -1,5 +1,5 @@
-// Memory for transfers: slabs of one size, made once and used again; what is larger than a slab, or
-// comes when all are taken, is ordinary memory.
+// Memory for transfers: slabs of one size, allocated once and reused; buffers that are larger than
+// a slab, or come when all are in use, get ordinary memory.
 #pragma once
 
 #include <cstddef>
@@ -10,16 +10,16 @@
 
 namespace voxeld::display {
 
-// Who made the slabs frees them; an implementation's destructor is called when the last bytes are
-// gone.
+// The creator of the slabs frees them; an implementation's destructor runs when the last bytes are
+// released.
 class SlabMemory : public TransferMemory {
  public:
-  // `slabs` of `slab_bytes` each, which outlive this object.
+  // `slabs` of `slab_bytes` each must outlive this object.
   SlabMemory(std::vector<void*> slabs, size_t slab_bytes);
 
   void* Allocate(size_t bytes) override;
   void Free(void* memory, size_t bytes) noexcept override;
-  // Does `memory` lie in a slab? Any thread.
+  // Returns whether `memory` lies in a slab. Any thread.
   bool Owns(const void* memory) const;
 
  private:

@@ -15,13 +15,13 @@ namespace voxeld::display {
 class TransferMemory {
  public:
   virtual ~TransferMemory() = default;
-  // Never null; throws std::bad_alloc.
+  // Never returns null; throws std::bad_alloc.
   virtual void* Allocate(size_t bytes) = 0;
   virtual void Free(void* memory, size_t bytes) noexcept = 0;
 };
 
-// Grows as a vector does. Its memory moves with it, goes back where it came from, and keeps its
-// owner alive; a copy lies in ordinary memory. A range of bytes: it converts to a span.
+// Grows like a vector. Moving it moves its memory, which is returned to its owner and keeps the
+// owner alive; a copy uses ordinary memory. It is a range of bytes and converts to a span.
 class TransferBytes {
  public:
   TransferBytes() = default;
@@ -64,13 +64,13 @@ class TransferBytes {
     if (size_ > 0) std::memcpy(grown, data_, size_);
     Release(std::exchange(data_, grown), std::exchange(capacity_, capacity));
   }
-  // What is new is 0.
+  // New bytes are 0.
   void resize(size_t size) {
     Grow(size);
     if (size > size_) std::memset(data_ + size_, 0, size - size_);
     size_ = size;
   }
-  // `bytes` lie elsewhere.
+  // Requires: `bytes` lie elsewhere.
   void Append(std::span<const std::byte> bytes) {
     if (bytes.empty()) return;
     Grow(size_ + bytes.size());

@@ -7,7 +7,7 @@
 namespace voxeld::display {
 namespace {
 
-// Linux's numbers, whatever system this is.
+// Linux's numbers, on every system.
 enum Errno : int32_t {
   kEnoent = 2,
   kEio = 5,

@@ -1,5 +1,5 @@
-// What is needed of a device's descriptors, out of the bytes as the device gave them (USB 2.0, §9.6):
-// hostile until read.
+// Extracts what is needed from a device's descriptors, as the device sent the bytes (USB 2.0,
+// §9.6). The bytes are untrusted.
 #pragma once
 
 #include <array>
@@ -17,11 +17,11 @@ struct UsbInterface {
   std::array<uint8_t, 3> triple{};  // class, subclass, protocol
 };
 
-// All interfaces of all configurations, as far as the bytes are sound: a device descriptor, then
-// configurations, as sysfs has them. Never reads beyond them.
+// Returns all interfaces of all configurations, as far as the bytes are valid: a device descriptor,
+// then configurations, as in sysfs. Never reads beyond the bytes.
 std::vector<UsbInterface> FindInterfaces(std::span<const std::byte> descriptors);
 
-// The number of the first interface with that triple; without a triple 0 if there is any.
+// Returns the number of the first interface with that triple; without a triple, 0 if any exists.
 std::optional<uint8_t> ChooseInterface(const std::vector<UsbInterface>& interfaces,
                                        const std::optional<std::array<uint8_t, 3>>& triple);
 

@@ -16,7 +16,8 @@
 namespace voxeld::display {
 namespace {
 
-constexpr size_t kSlabs = 24;  // more than a driver has in flight, so that it fills some meanwhile
+// more than a driver has in flight, so that it can fill some meanwhile
+constexpr size_t kSlabs = 24;
 
 class DeviceSlabs final : public SlabMemory {
  public:
@@ -68,7 +69,7 @@ bool DeviceHandle::gives_memory() const {
 
 std::shared_ptr<SlabMemory> BorrowSlabs(std::shared_ptr<DeviceHandle> handle, UsbfsBudget& budget) {
   std::vector<void*> slabs;
-  // The kernel counts them for as long as they are there.
+  // The kernel counts them as long as they exist.
   while (handle->gives_memory() && slabs.size() < kSlabs && budget.TakeLent(kSlabBytes)) {
     void* const slab = libusb_dev_mem_alloc(handle->get(), kSlabBytes);
     if (slab == nullptr) {

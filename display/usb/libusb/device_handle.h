@@ -1,4 +1,4 @@
-// libusb's context, and its handle of a device with the memory that the kernel lends for its transfers.
+// libusb's context, and its handle of a device with the memory that the kernel lends for transfers.
 #pragma once
 
 #include <cstddef>
@@ -13,8 +13,8 @@ struct libusb_device_handle;
 
 namespace voxeld::display {
 
-// Without libusb's own discovery of devices: it would parse the descriptors of every one that is
-// attached.
+// Does not use libusb's own device discovery, which would parse the descriptors of every attached
+// device.
 class LibusbContext {
  public:
   static absl::StatusOr<std::shared_ptr<LibusbContext>> Make();
@@ -28,7 +28,7 @@ class LibusbContext {
   libusb_context* const context_;
 };
 
-// Closed by its end.
+// Closes the device in its destructor.
 class DeviceHandle {
  public:
   // `node` is the descriptor that `handle` was made from.
@@ -38,7 +38,7 @@ class DeviceHandle {
   DeviceHandle& operator=(const DeviceHandle&) = delete;
 
   libusb_device_handle* get() const { return handle_; }
-  // Whether the kernel lends memory: libusb would map the node without asking.
+  // Returns whether the kernel lends memory: libusb would map the node without checking.
   bool gives_memory() const;
 
  private:
@@ -49,8 +49,8 @@ class DeviceHandle {
 
 inline constexpr size_t kSlabBytes = size_t{256} << 10;
 
-// Slabs of memory that the kernel reads in place, as many as kernel and budget give, the rest ordinary.
-// Keeps the handle; `budget` outlives what comes back.
+// Returns slabs of memory that the kernel reads in place, as many as kernel and budget allow, and
+// ordinary memory for the rest. Keeps the handle; `budget` must outlive the result.
 std::shared_ptr<SlabMemory> BorrowSlabs(std::shared_ptr<DeviceHandle> handle, UsbfsBudget& budget);
 
 }  // namespace voxeld::display

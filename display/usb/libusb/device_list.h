@@ -1,5 +1,5 @@
-// The USB devices that the system has, from udev, and news of those that come and go. Nothing is
-// opened to look.
+// Lists the system's USB devices through udev, and reports those that come and go. It opens no
+// device.
 #pragma once
 
 #include <cstdint>
@@ -19,11 +19,11 @@ namespace voxeld::display {
 
 struct UsbDeviceEntry {
   std::string node;      // "/dev/bus/usb/001/004"; a new one for each plug
-  UsbIdentity identity;  // its path is the place: "1-2.4"
+  UsbIdentity identity;  // its path is the position: "1-2.4"
   std::vector<UsbInterface> interfaces;
 };
 
-// Those of `devices` that `match` means. NotFound, with what there is, if none is.
+// Returns the entries of `devices` that match. Errors: NotFound, listing the devices, if none does.
 absl::StatusOr<std::vector<UsbDeviceEntry>> Matching(const UsbMatch& match,
                                                      std::vector<UsbDeviceEntry> devices);
 
@@ -35,7 +35,7 @@ class DeviceList {
   DeviceList(const DeviceList&) = delete;
   DeviceList& operator=(const DeviceList&) = delete;
 
-  // All devices, ascending by place.
+  // Returns all devices, ascending by position.
   absl::StatusOr<std::vector<UsbDeviceEntry>> Devices();
 
  private:
@@ -43,7 +43,7 @@ class DeviceList {
   udev* const udev_;
 };
 
-// News of devices; one thread's.
+// Reports arrivals and departures of devices; used by one thread.
 class DeviceWatch {
  public:
   static absl::StatusOr<std::unique_ptr<DeviceWatch>> Make();
@@ -51,8 +51,8 @@ class DeviceWatch {
   DeviceWatch(const DeviceWatch&) = delete;
   DeviceWatch& operator=(const DeviceWatch&) = delete;
 
-  int fd() const;  // readable when there is news
-  // Takes all news there is; true if a device came.
+  int fd() const;  // readable when there is an event
+  // Consumes all events; returns true if a device arrived.
   bool TakeArrivals();
 
  private:

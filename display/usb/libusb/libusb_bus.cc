@@ -16,13 +16,13 @@
 namespace voxeld::display {
 namespace {
 
-// Of Close: for requests to go out, and for all that was cancelled to come back. What takes longer
-// ends without its owner.
+// Limits in Close: for requests to be sent, and for all cancelled transfers to end. A device that
+// takes longer ends without its owner.
 constexpr sync::TimeNs kPatience = 100 * sync::kMillisecond;
 constexpr sync::TimeNs kCloseLimit = 500 * sync::kMillisecond;
 constexpr int kGraveIntervalMs = 20;
 enum PollIndex : size_t { kPoke, kNews, kTheirs };
-constexpr sync::TimeNs kGraveLimit = 5 * sync::kSecond;  // of the bus's end
+constexpr sync::TimeNs kGraveLimit = 5 * sync::kSecond;  // in the bus's destructor
 
 }  // namespace
 
@@ -31,7 +31,7 @@ absl::StatusOr<std::unique_ptr<LibusbBus>> LibusbBus::Make(sync::Clock& clock) {
   if (!context.ok()) return context.status();
   absl::StatusOr<std::unique_ptr<DeviceList>> list = DeviceList::Make();
   if (!list.ok()) return list.status();
-  // Without it devices are found all the same, only later: by the next look.
+  // Without a watch devices are still found, only later: by the next scan.
   absl::StatusOr<std::unique_ptr<DeviceWatch>> watch = DeviceWatch::Make();
   const int poke = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   if (poke < 0) {
@@ -51,7 +51,7 @@ LibusbBus::LibusbBus(std::shared_ptr<LibusbContext> context, std::unique_ptr<Dev
       clock_(clock),
       budget_(ReadUsbfsLimit(), [this] { WakeAll(false); }),
       list_(std::move(list)) {
-  // Devices that open and close change what has to be polled.
+  // Opening and closing devices changes the descriptors to poll.
   libusb_set_pollfd_notifiers(
       context_->get(), [](int, short, void* bus) { static_cast<LibusbBus*>(bus)->FdsChanged(); },
       [](int, void* bus) { static_cast<LibusbBus*>(bus)->FdsChanged(); }, this);
@@ -115,7 +115,7 @@ absl::StatusOr<std::unique_ptr<OpenDevice>> LibusbBus::Open(const UsbMatch& matc
   while (true) {
     const absl::StatusOr<UsbDeviceEntry> entry = Reserve(match, tried);
     if (!entry.ok()) return last.ok() ? entry.status() : last;
-    // A device may take its time to answer: nobody else waits for it.
+    // A device may take a long time to answer: nobody else waits for it.
     absl::StatusOr<std::unique_ptr<OpenDevice>> device =
         OpenDevice::Open(context_, *entry, *ChooseInterface(entry->interfaces, match.interface),
                          budget_, clock_, first_id, wake);
@@ -196,7 +196,7 @@ void LibusbBus::Run() {
       if (stop_ && !graves) return;
       if (stop_ && give_up == 0) give_up = clock_.Now() + kGraveLimit;
       if (stop_ && clock_.Now() >= give_up) {
-        // The kernel does not let go of them. They are lost, and their memory with them.
+        // The kernel does not return them. They and their memory are leaked.
         for (std::unique_ptr<OpenDevice>& device : graves_) (void)device.release();
         graves_.clear();
         return;

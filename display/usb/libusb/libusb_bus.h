@@ -23,14 +23,16 @@ class LibusbTransport;
 
 class LibusbBus final : public UsbBus {
  public:
-  // Unavailable where the system has no USB at all. `clock` outlives the bus and is a real one.
+  // Errors: Unavailable if the system has no USB at all. `clock` must outlive the bus and be a real
+  // one.
   static absl::StatusOr<std::unique_ptr<LibusbBus>> Make(sync::Clock& clock);
-  // All transports are gone; ends the event thread when all that they had open has ended.
+  // Requires: all transports are destroyed. Stops the event thread when all their devices have
+  // ended.
   ~LibusbBus() override;
 
   std::unique_ptr<UsbTransport> MakeTransport(UsbMatch match) override;
 
-  // For LibusbTransport.
+  // For use by LibusbTransport.
   absl::StatusOr<std::unique_ptr<OpenDevice>> Open(const UsbMatch& match, TransferId first_id,
                                                    std::function<void(bool)> wake);
   void Close(std::unique_ptr<OpenDevice> device);
@@ -41,30 +43,32 @@ class LibusbBus final : public UsbBus {
   LibusbBus(std::shared_ptr<LibusbContext> context, std::unique_ptr<DeviceList> list,
             std::unique_ptr<DeviceWatch> watch, int poke, sync::Clock& clock);
 
-  // A device that matches, is nobody's, and is not among the nodes `tried`: from now on the caller's.
+  // Reserves for the caller a device that matches, is not in use, and is not among the nodes
+  // `tried`.
   absl::StatusOr<UsbDeviceEntry> Reserve(const UsbMatch& match, const std::set<std::string>& tried);
 
   void Run();
-  // Ours (PollIndex), then libusb's.
+  // Returns our descriptors (PollIndex), then libusb's.
   std::vector<pollfd> PollFds() const;
   void FdsChanged();
   void Poke() const;
   void WakeAll(bool arrival);
-  // Those whose completions came in since.
+  // Wakes the transports whose completions have arrived since.
   void WakeDue();
-  // Destroys what has ended since; true if something is left.
+  // Destroys the devices that have ended since; returns true if some are left.
   bool Bury();
 
   const std::shared_ptr<LibusbContext> context_;
-  const std::unique_ptr<DeviceWatch> watch_;  // the event thread's; null: no news, only looks
-  const int poke_;                            // eventfd
+  // used by the event thread; null: no events, only scans
+  const std::unique_ptr<DeviceWatch> watch_;
+  const int poke_;  // eventfd
   sync::Clock& clock_;
   std::atomic<bool> fds_changed_ = true;  // which descriptors libusb wants polled
   UsbfsBudget budget_;
 
   sync::Mutex list_mutex_;
-  const std::unique_ptr<DeviceList> list_;  // belongs to list_mutex_
-  // And the group that each belongs to (UsbMatch::Member), if any.
+  const std::unique_ptr<DeviceList> list_;  // guarded by list_mutex_
+  // Open nodes, and the group that each belongs to (UsbMatch::Member), if any.
   std::map<std::string, std::string> open_nodes_ VOXELD_GUARDED_BY(list_mutex_);
 
   sync::Mutex transports_mutex_;

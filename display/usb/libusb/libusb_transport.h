@@ -1,4 +1,4 @@
-// One device through libusb. Made by LibusbBus.
+// The transport to one device through libusb. Made by LibusbBus.
 #pragma once
 
 #include <atomic>
@@ -17,7 +17,8 @@ class LibusbTransport final : public UsbTransport {
   LibusbTransport(LibusbBus& bus, UsbMatch match);
   ~LibusbTransport() override;
 
-  // NotFound while no device matches; else as OpenDevice::Open, of the last one that was tried.
+  // Errors: NotFound while no device matches; else as OpenDevice::Open for the last one that was
+  // tried.
   absl::Status Open() override;
   void Close() override;
   bool is_open() const override { return device_ != nullptr; }
@@ -33,15 +34,15 @@ class LibusbTransport final : public UsbTransport {
   void SetWake(std::function<void()> wake) override;
   bool TakeArrival() override;
 
-  // For the bus, from any thread.
+  // Called by the bus, from any thread.
   void Wake(bool arrival);
-  // For its event thread: wakes whoever has completions that were not told yet.
+  // Called by the event thread: wakes the owner if it has unreported completions.
   void WakeIfDue();
 
  private:
   LibusbBus& bus_;
   const UsbMatch match_;
-  std::unique_ptr<OpenDevice> device_;  // the owner's thread's
+  std::unique_ptr<OpenDevice> device_;  // used by the owner's thread only
   TransferId next_id_ = 1;
   std::atomic<bool> due_ = false;
 

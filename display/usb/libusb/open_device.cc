@@ -19,15 +19,15 @@
 namespace voxeld::display {
 namespace {
 
-constexpr size_t kTransfers = 64;  // made at once; more as they are needed
-// Of a reset: what is in flight is waited for this long after its cancellation.
+constexpr size_t kTransfers = 64;  // allocated at once; more as needed
+// How long Reset waits for transfers in flight after their cancellation.
 constexpr sync::TimeNs kCancelLimit = sync::kSecond;
 
 std::string NameOf(const UsbDeviceEntry& entry) {
   return absl::StrCat(entry.node, " (at ", entry.identity.path, ")");
 }
 
-// libusb counts in milliseconds; 0 means for ever.
+// Converts to libusb's milliseconds; 0 means no timeout.
 unsigned Milliseconds(sync::TimeNs timeout) {
   if (timeout <= 0) return 0;
   return static_cast<unsigned>(std::max<sync::TimeNs>(timeout / sync::kMillisecond, 1));
@@ -47,9 +47,9 @@ struct OpenDevice::Pending {
   OpenDevice* device = nullptr;
   TransferId id = 0;
   Transfer asked;
-  std::vector<unsigned char> bytes;  // of requests, and what comes in
-  size_t counted = 0;                // of the budget
-  // While libusb is asked to cancel it, it must not be used again.
+  std::vector<unsigned char> bytes;  // for requests, and incoming data
+  size_t counted = 0;                // bytes counted in the budget
+  // It must not be reused while libusb is asked to cancel it.
   bool cancelling = false, done = false;
 };
 
@@ -234,7 +234,7 @@ void OpenDevice::Complete(Pending& pending, TransferStatus status) {
   completion.status = status;
   completion.actual_length = static_cast<uint32_t>(std::max(done.actual_length, 0));
   if (pending.asked.length > 0 && completion.actual_length == 0) {
-    // Nothing came, or it never went out.
+    // No data came, or the transfer was never sent.
   } else if (pending.asked.length > 0) {
     const size_t head =
         pending.asked.type == TransferType::kControl ? LIBUSB_CONTROL_SETUP_SIZE : 0;
@@ -243,7 +243,7 @@ void OpenDevice::Complete(Pending& pending, TransferStatus status) {
             .subspan(head, std::min<size_t>(completion.actual_length, pending.asked.length)));
   } else {
     completion.data = std::move(pending.asked.data);
-    // What went out before its time was over is not known: host controllers differ.
+    // How much was sent before the timeout is unknown: host controllers differ.
     if (completion.status == TransferStatus::kTimedOut) completion.actual_length = 0;
   }
   const size_t size = std::max<size_t>(pending.asked.length, completion.data.size());
@@ -298,14 +298,14 @@ size_t OpenDevice::bytes_in_flight() const {
 }
 
 TransferBytes OpenDevice::TakeBuffer(size_t capacity) {
-  // Nobody borrows for buffers that would not lie in a slab.
+  // Do not borrow slabs for buffers that would not lie in one.
   if (memory_ == nullptr && capacity > kSlabBytes / 2) memory_ = BorrowSlabs(handle_, budget_);
   TransferBytes buffer(memory_);
   buffer.reserve(capacity);
   return buffer;
 }
 
-// ---- what may wait in the kernel
+// ---- calls that may wait in the kernel
 
 absl::StatusOr<TransferId> OpenDevice::ClearHalt(uint8_t endpoint) {
   return Queue({.what = Job::What::kClearHalt, .endpoint = endpoint});
@@ -404,15 +404,15 @@ void OpenDevice::CancelBefore(TransferId end) {
   for (const TransferId id : ids) CancelOne(id);
 }
 
-// The job that was carried out is taken off the queue in the same breath as the last transfer that
-// waited for it goes out: what is submitted from then on comes after these.
+// Removes the completed job from the queue in the same critical section that sends the last
+// transfer waiting for it, so that transfers submitted later come after these.
 void OpenDevice::SubmitDeferred() {
   std::vector<std::pair<Pending*, TransferStatus>> failed;
   {
     sync::MutexLock lock(mutex_);
     if (jobs_.size() <= 1 || ending_) {
       for (Pending* pending : deferred_) {
-        // The last requests of a device that is closed still go out.
+        // The last requests of a closed device are still sent.
         const bool late = ending_ && pending->asked.type != TransferType::kControl;
         if (!late && SubmitLocked(*pending).ok()) continue;
         failed.emplace_back(pending, ending_ ? TransferStatus::kCancelled
@@ -426,7 +426,7 @@ void OpenDevice::SubmitDeferred() {
   for (const auto& [pending, status] : failed) Complete(*pending, status);
 }
 
-// ---- the end
+// ---- shutdown
 
 bool OpenDevice::End(sync::TimeNs patience, sync::TimeNs limit) {
   {

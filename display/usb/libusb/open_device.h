@@ -1,10 +1,10 @@
-// A device that libusb has open: its transfers, its memory, its way to close.
+// A device opened through libusb: its transfers, its memory, and its shutdown.
 //
-// libusb calls back on the bus's event thread; completions wait here until their owner drains them.
-// Whatever may wait in the kernel for the device (clearing a halt, a reset, cancelling a transfer,
-// giving the interface back) is done by a thread of the device's own: neither its owner nor
-// another device waits for it. Transfers that are submitted meanwhile go out when it is done, for the
-// kernel would have their owner wait too.
+// libusb calls back on the bus's event thread; completions wait here until the owner drains them.
+// Everything that may wait in the kernel for the device (clearing a halt, a reset, cancelling a
+// transfer, releasing the interface) runs on a thread of the device's own, so that neither its
+// owner nor another device waits for it. Transfers that are submitted meanwhile are sent when it is
+// done, because the kernel would otherwise make their owner wait too.
 #pragma once
 
 #include <cstddef>
@@ -32,17 +32,17 @@ namespace voxeld::display {
 
 class OpenDevice {
  public:
-  // Opens the device's node, and claims the interface; a kernel's driver that has it is detached
-  // until the close. PermissionDenied, Unavailable (somebody else has it; it went away) or Internal,
-  // each with what would help. Ids begin at `first_id`. `wake`
-  // is called when there are completions: with true while libusb handles events, when more may follow
-  // at once, with false by the device's own thread. `budget` outlives the device.
+  // Opens the device's node, and claims the interface; a kernel driver that holds it is detached
+  // until the close. Errors: PermissionDenied, Unavailable (in use, or the device went away) or
+  // Internal, each with a remedy. Ids begin at `first_id`. `wake` is called when there are
+  // completions: with true while libusb handles events, when more may follow at once; with false by
+  // the device's own thread. `budget` must outlive the device.
   static absl::StatusOr<std::unique_ptr<OpenDevice>> Open(std::shared_ptr<LibusbContext> context,
                                                           const UsbDeviceEntry& entry,
                                                           uint8_t interface, UsbfsBudget& budget,
                                                           sync::Clock& clock, TransferId first_id,
                                                           std::function<void(bool)> wake);
-  // Everything must have ended.
+  // Requires: everything has ended.
   ~OpenDevice();
   OpenDevice(const OpenDevice&) = delete;
   OpenDevice& operator=(const OpenDevice&) = delete;
@@ -50,7 +50,7 @@ class OpenDevice {
   const UsbDeviceEntry& entry() const { return entry_; }
   TransferId next_id() const;
 
-  // As UsbTransport's.
+  // As in UsbTransport.
   absl::StatusOr<TransferId> Submit(Transfer&& transfer);
   void Cancel(TransferId id);
   absl::StatusOr<TransferId> ClearHalt(uint8_t endpoint);
@@ -59,11 +59,11 @@ class OpenDevice {
   size_t bytes_in_flight() const;
   TransferBytes TakeBuffer(size_t capacity);
 
-  // No transfer is taken any more, and `wake` is not called again. Requests get `patience` to end by
-  // themselves, then all is cancelled, and the interface is given back. Waits for that until `limit`;
-  // true: it has ended and may be destroyed.
+  // Accepts no more transfers, and stops calling `wake`. Lets requests end by themselves for
+  // `patience`, then cancels everything and releases the interface. Waits for that until `limit`;
+  // returns true if it has ended and may be destroyed.
   bool End(sync::TimeNs patience, sync::TimeNs limit);
-  // After End: has it ended by now?
+  // After End: returns whether it has ended by now.
   bool Ended() const;
 
  private:
@@ -71,7 +71,7 @@ class OpenDevice {
   struct Job {
     enum class What : uint8_t { kClearHalt, kReset, kCancel };
     What what = What::kClearHalt;
-    TransferId id = 0;     // its own, or of the transfer to cancel
+    TransferId id = 0;     // its own, or that of the transfer to cancel
     uint8_t endpoint = 0;  // kClearHalt
   };
 
@@ -80,14 +80,14 @@ class OpenDevice {
              std::function<void(bool)> wake);
 
   static void OnDone(libusb_transfer* done);
-  // Of a transfer that libusb is done with, or never had.
+  // For a transfer that libusb has finished, or never got.
   void Complete(Pending& pending, TransferStatus status);
   void Wake(bool more);
   absl::Status Refusal() const VOXELD_REQUIRES(mutex_);
   absl::Status SubmitLocked(Pending& pending) VOXELD_REQUIRES(mutex_);
   absl::StatusOr<TransferId> Queue(Job job);
 
-  // The device's thread.
+  // Runs on the device's thread.
   void Work();
   void CarryOut(const Job& job);
   TransferStatus ResetPort(TransferId id);
@@ -101,26 +101,28 @@ class OpenDevice {
   const uint8_t interface_;
   UsbfsBudget& budget_;
   sync::Clock& clock_;
-  std::shared_ptr<SlabMemory> memory_;  // the owner's; borrowed when it is first of use
+  std::shared_ptr<SlabMemory> memory_;  // the owner's; borrowed when first useful
 
   sync::Mutex wake_mutex_;
   std::function<void(bool)> wake_ VOXELD_GUARDED_BY(wake_mutex_);
 
   mutable sync::Mutex mutex_;
-  sync::CondVar changed_;  // something of what follows
+  sync::CondVar changed_;  // notified when a member below changes
   bool ending_ VOXELD_GUARDED_BY(mutex_) = false;
   bool ended_ VOXELD_GUARDED_BY(mutex_) = false;
-  sync::TimeNs patient_until_ VOXELD_GUARDED_BY(mutex_) = 0;  // once ending_
+  sync::TimeNs patient_until_ VOXELD_GUARDED_BY(mutex_) = 0;  // valid once ending_
   bool gone_ VOXELD_GUARDED_BY(mutex_) = false;
   TransferId next_id_ VOXELD_GUARDED_BY(mutex_);
   std::map<TransferId, Pending*> pending_ VOXELD_GUARDED_BY(mutex_);
-  std::deque<Pending*> deferred_ VOXELD_GUARDED_BY(mutex_);  // of these, those not submitted yet
-  std::vector<std::unique_ptr<Pending>> all_ VOXELD_GUARDED_BY(mutex_);  // made once, used again
+  // those of pending_ that are not submitted yet
+  std::deque<Pending*> deferred_ VOXELD_GUARDED_BY(mutex_);
+  // allocated once and reused
+  std::vector<std::unique_ptr<Pending>> all_ VOXELD_GUARDED_BY(mutex_);
   std::vector<Pending*> free_ VOXELD_GUARDED_BY(mutex_);
   size_t bytes_in_flight_ VOXELD_GUARDED_BY(mutex_) = 0;
-  int finishing_ VOXELD_GUARDED_BY(mutex_) = 0;  // completions that are not told of yet
+  int finishing_ VOXELD_GUARDED_BY(mutex_) = 0;  // completions that are not reported yet
   std::vector<TransferCompletion> completions_ VOXELD_GUARDED_BY(mutex_);
-  std::deque<Job> jobs_ VOXELD_GUARDED_BY(mutex_);  // the first is being carried out
+  std::deque<Job> jobs_ VOXELD_GUARDED_BY(mutex_);  // the first is being executed
   std::thread thread_;
 };
 

@@ -36,7 +36,7 @@ TransferStatus StatusOf(int result) {
     case 0:
       return TransferStatus::kOk;
     case LIBUSB_ERROR_NO_DEVICE:
-    case LIBUSB_ERROR_NOT_FOUND:  // after a reset: it came back as another
+    case LIBUSB_ERROR_NOT_FOUND:  // after a reset: it came back as another device
       return TransferStatus::kDisconnected;
     case LIBUSB_ERROR_TIMEOUT:
       return TransferStatus::kTimedOut;

@@ -1,4 +1,4 @@
-// What libusb's words mean in ours.
+// Translates libusb's statuses to TransferStatus.
 #pragma once
 
 #include "display/usb/usb_transport.h"
@@ -7,9 +7,9 @@ struct libusb_transfer;
 
 namespace voxeld::display {
 
-// Of a transfer that ended.
+// For a transfer that ended.
 TransferStatus StatusOf(const libusb_transfer& done);
-// Of a call that waited: 0, or a LIBUSB_ERROR.
+// For a blocking call's result: 0, or a LIBUSB_ERROR.
 TransferStatus StatusOf(int result);
 
 }  // namespace voxeld::display

@@ -11,7 +11,7 @@ namespace {
 constexpr const char* kParameter = "/sys/module/usbcore/parameters/usbfs_memory_mb";
 constexpr size_t kMiB = size_t{1} << 20;
 constexpr size_t kDefaultMiB = 16;
-constexpr size_t kUnlimited = size_t{1} << 30;  // more than any display has use for
+constexpr size_t kUnlimited = size_t{1} << 30;  // more than any display can use
 
 }  // namespace
 
