@@ -1,4 +1,4 @@
-// What a driver gets from whoever creates displays.
+// The environment that the creator of displays gives to a driver.
 #pragma once
 
 #include <functional>
@@ -11,7 +11,7 @@
 namespace voxeld::display {
 
 struct DriverContext {
-  // Without USB.
+  // A context without USB.
   DriverContext(sync::Clock& time)  // NOLINT(google-explicit-constructor): a clock is enough
       : clock(time), usb([]() -> absl::StatusOr<UsbBus*> {
           return absl::UnavailableError("there is no USB here");
@@ -19,8 +19,9 @@ struct DriverContext {
   DriverContext(sync::Clock& time, std::function<absl::StatusOr<UsbBus*>()> bus)
       : clock(time), usb(std::move(bus)) {}
 
-  sync::Clock& clock;  // outlives the display
-  // The USB that displays share; outlives the display. Asked for by those alone that need it.
+  sync::Clock& clock;  // must outlive the display
+  // Returns the USB bus that displays share; it must outlive the display. Only drivers that need it
+  // call this.
   std::function<absl::StatusOr<UsbBus*>()> usb;
 };
 

@@ -22,7 +22,7 @@ struct Driver {
                                                               const DriverContext& context);
 };
 
-// Ascending by name.
+// Returns the drivers, ascending by name.
 std::span<const Driver> DriverList();
 
 }  // namespace voxeld::display

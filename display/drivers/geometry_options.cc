@@ -20,7 +20,7 @@ namespace {
 
 constexpr int32_t kMostSlices = 16384;
 constexpr double kMostNumber = 1e6;
-// As many as a voxlink device's description of itself has room for.
+// As many as fit into a voxlink device's description of itself.
 constexpr size_t kMostLights = 40'000;
 
 void ReadPositions(OptionReader& reader, double slice_pitch, int32_t slices, PlanarStack& planar) {
@@ -155,7 +155,7 @@ Geometry ReadHelix(OptionReader& reader, double pitch) {
   return {.shape = helix, .grid = {}, .correction = {}};
 }
 
-// In rows, layer by layer, or wherever the points are.
+// Reads lights in rows, layer by layer, or at given points.
 Geometry ReadLattice(OptionReader& reader, double pitch) {
   Lattice lattice;
   const std::vector<double> points = reader.Numbers("points_mm");
@@ -170,7 +170,7 @@ Geometry ReadLattice(OptionReader& reader, double pitch) {
     for (size_t i = 0; i + 2 < points.size(); i += 3) {
       lattice.points_mm.push_back(Vec3{points[i], points[i + 1], points[i + 2]});
     }
-    // The last slice may have fewer.
+    // Pad the last slice, which may have fewer lights.
     while (lattice.points_mm.size() % static_cast<size_t>(width) != 0) {
       lattice.points_mm.emplace_back();
     }

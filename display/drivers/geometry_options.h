@@ -1,4 +1,4 @@
-// What a display is, from its options.
+// Reads a display's geometry from its options.
 #pragma once
 
 #include "display/api/geometry.h"
@@ -6,8 +6,9 @@
 
 namespace voxeld::display {
 
-// The keys of a geometry as ReadDisplayInfo has them; `pitch` of pixels, mm. What is wrong by itself is `reader`'s error, what does
-// not fit together ValidateShape's; then something valid or not comes back.
+// Reads the keys of a geometry as listed at ReadDisplayInfo; `pitch` is that of pixels, mm. A value
+// that is wrong by itself is `reader`'s error; inconsistent values are left for ValidateShape, and
+// the result may then be invalid.
 Geometry ReadGeometry(OptionReader& reader, double pitch);
 
 }  // namespace voxeld::display

@@ -25,7 +25,7 @@ constexpr double kMostLength = 1e6;
 constexpr uint64_t kMostVolumeBytes = uint64_t{1} << 30;
 constexpr size_t kMostCurve = 256;
 
-// Three numbers from `least` to `most`, or one for all.
+// Reads three numbers from `least` to `most`, or one for all.
 std::array<double, 3> ReadThree(OptionReader& reader, const std::string& key, double fallback,
                                 double least, double most) {
   std::array<double, 3> three = {fallback, fallback, fallback};
@@ -53,7 +53,7 @@ std::vector<double> ReadCurve(OptionReader& reader, const std::string& key) {
   return curve;
 }
 
-// At `at` (0 to 1) of values at even steps.
+// Interpolates evenly spaced values at `at` (0 to 1).
 double AlongCurve(const std::vector<double>& values, double at) {
   const double place = at * static_cast<double>(values.size() - 1);
   const size_t i = std::min(static_cast<size_t>(place), values.size() - 2);
@@ -67,7 +67,7 @@ std::optional<Vec3> ReadVoxelPitch(OptionReader& reader) {
   return Vec3{pitch[0], pitch[1], pitch[2]};
 }
 
-// A grid around the same middle, just large enough.
+// Returns the smallest grid of that pitch around the same middle.
 VoxelGrid WithPitch(const VoxelGrid& grid, const Vec3& pitch) {
   VoxelGrid out;
   out.pitch_mm = pitch;

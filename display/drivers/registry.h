@@ -1,4 +1,4 @@
-// The drivers that this build has: the list in display/drivers/CMakeLists.txt.
+// The drivers of this build: the list in display/drivers/CMakeLists.txt.
 #pragma once
 
 #include <memory>
@@ -13,17 +13,17 @@
 
 namespace voxeld::display {
 
-// A stopped display. InvalidArgument for an unknown driver, an unknown option or a bad value, with
-// what would be right; whatever context.usb says, of a driver that needs it.
+// Creates a stopped display. Errors: InvalidArgument for an unknown driver, an unknown option or a
+// bad value, with what is expected; the error of context.usb, for a driver that needs it.
 absl::StatusOr<std::unique_ptr<Display>> CreateDisplay(const DisplayOptions& options,
                                                        const DriverContext& context);
 
-// The devices that a display with these options would drive, each with its protocol's conformance
-// suite. Nothing is opened. Errors as CreateDisplay's.
+// Returns the devices that a display with these options would drive, each with its protocol's
+// conformance suite. Opens nothing. Errors as for CreateDisplay.
 absl::StatusOr<std::vector<conformance::Subject>> VerifySubjects(const DisplayOptions& options,
                                                                  const DriverContext& context);
 
-// Ascending.
+// Returns the drivers' names, ascending.
 std::vector<std::string> DriverNames();
 
 }  // namespace voxeld::display

@@ -1,4 +1,4 @@
-// How options say which USB device a display is, and what is kept of what goes over its cable.
+// The options that select a display's USB device and the recording of its traffic.
 #pragma once
 
 #include <cstddef>
@@ -14,18 +14,19 @@ namespace voxeld::display {
 
 struct UsbOptions {
   UsbMatch match;
-  std::string record;  // a path, or nothing
+  std::string record;  // a path, or empty
 };
 
-// vendor=XXXX product=XXXX (hexadecimal), serial=TEXT, path=BUS-PORT[.PORT…]; each may be left out.
-// Mistakes are the reader's to tell.
+// Reads vendor=XXXX product=XXXX (hexadecimal), serial=TEXT, path=BUS-PORT[.PORT…]; each may be
+// left out. Errors are recorded in the reader.
 UsbMatch ReadUsbMatch(OptionReader& reader);
 
-// record=FILE: everything that goes over the cable, as pcapng (docs/recordings.md). Empty: nothing.
+// Reads record=FILE: records all USB traffic as pcapng (docs/recordings.md). Empty: no recording.
 std::string ReadUsbRecord(OptionReader& reader);
 
-// A closed transport to what `options` mean, on the context's bus. What the bus says; of a recording
-// whose file cannot be written, an error with its path. `display` names the recording's interface.
+// Returns a closed transport to the device that `options` select, on the context's bus. Errors: the
+// bus's; for a recording whose file cannot be written, an error with its path. `display` names the
+// recording's interface.
 absl::StatusOr<std::unique_ptr<UsbTransport>> MakeUsbTransport(const UsbOptions& options,
                                                                const std::string& display,
                                                                const DriverContext& context);

@@ -9,9 +9,10 @@
 namespace voxeld::display::fadecandy {
 namespace {
 
-// A board takes a frame at each refresh, some milliseconds apart.
+// A board accepts a frame at each refresh, some milliseconds apart.
 constexpr sync::TimeNs kTimeout = sync::kSecond;
-// Of silence, after which the board is asked for a counter: an idle one is not missed otherwise.
+// After this much silence the board is asked for a counter: an idle board's loss goes unnoticed
+// otherwise.
 constexpr sync::TimeNs kAskAfter = 60 * sync::kMillisecond;
 constexpr sync::TimeNs kRoomAfter = 10 * sync::kMillisecond;
 constexpr int kMostFailures = 5;
@@ -77,7 +78,7 @@ void Board::Load(std::span<const std::byte> rgb, bool twice) {
 void Board::Show() { video_ = Video::kShow; }
 
 void Board::Refused(const absl::Status& status) {
-  if (absl::IsResourceExhausted(status)) return;  // room comes with a wake
+  if (absl::IsResourceExhausted(status)) return;  // a wake reports new room
   Fail(absl::IsUnavailable(status) ? kUnplugged : std::string(status.message()));
 }
 
@@ -103,7 +104,7 @@ sync::TimeNs Board::Pump() {
 void Board::Compose() {
   const bool video_due = video_ == Video::kLoad || video_ == Video::kShow;
   if (!video_due && !due_.any()) return;
-  // In turns: a slider for brightness must not hold frames up.
+  // Take turns: moving a brightness slider must not delay frames.
   const bool video = video_due && (!due_.any() || set_up_last_);
   set_up_last_ = !video;
   if (buffer_.capacity() == 0) buffer_ = transport_->TakeBuffer(4 * kFrameOnWire);
@@ -139,7 +140,7 @@ void Board::SubmitBulk() {
     bulk_ = *id;
     return;
   }
-  // What is refused was not moved.
+  // A refused transfer was not moved from.
   buffer_ = std::move(transfer.data);  // NOLINT(bugprone-use-after-move)
   Refused(id.status());
 }
@@ -274,7 +275,7 @@ void Board::OnRequestDone(const TransferCompletion& completion) {
       return Fail(
           absl::StrCat("it answered no request for ", kTimeout / sync::kMillisecond, " ms"));
     default:
-      // A board that refuses to count is still there.
+      // A board that refuses to return its counter is still present.
       if (request == Request::kCounter && completion.status == TransferStatus::kStall) return;
       return CountFailure(completion.status);
   }

@@ -1,8 +1,8 @@
-// One board on its cable. What it is to hold is said by Configure, SetLut, Blacken, Load and Show;
-// Pump sends what is missing, one transfer at a time. A transfer that failed goes out again, a
-// frame always whole.
+// One board on its cable. Configure, SetLut, Blacken, Load and Show say what it should hold; Pump
+// sends what is missing, one transfer at a time. A failed transfer is sent again, a frame always in
+// full.
 //
-// Bound to its owner's thread; nothing blocks but Close, as the transport's.
+// Bound to its owner's thread; only Close blocks, as the transport's does.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,8 @@ namespace voxeld::display::fadecandy {
 
 class Board {
  public:
-  // Every byte that is handed to the transport, just before it is; `video`: of Load and Show.
+  // Called with all bytes just before they are handed to the transport; `video`: they are from Load
+  // or Show.
   using OnBytes =
       std::function<void(const Board& board, std::span<const std::byte> bytes, bool video)>;
 
@@ -31,48 +32,51 @@ class Board {
         OnBytes on_bytes);
 
   UsbTransport& transport() { return *transport_; }
-  // As asked for, or as the board that was opened says it.
+  // Returns the requested serial number, or the one that the opened board reports.
   std::string Serial() const { return serial_.empty() ? transport_->identity().serial : serial_; }
   bool any_serial() const { return serial_.empty(); }
-  // Its place among the display's boards, from 0.
+  // The board's index in the display, from 0.
   size_t slice() const { return slice_; }
   void set_slice(size_t slice) { slice_ = slice; }
-  // "board 2 (serial ENICCULV)"; safe to print.
+  // Returns "board 2 (serial ENICCULV)"; safe to print.
   std::string Name() const;
 
-  // Nothing is said yet that it is to hold. A board that went silent has its port reset first.
+  // Opens the board, whose state is then undefined. The port of a board that went silent is reset
+  // first.
   absl::Status Open();
   void Close();
 
   void Configure(uint8_t flags);
   void SetLut(std::shared_ptr<const Lut> lut);
-  // A black frame, twice, so that nothing of the frames before is left in fades.
+  // Sends a black frame twice, so that no former frame remains in fades.
   void Blacken();
-  // A frame but for its last packet; `rgb` stays until the board shows it or is closed. `twice`: the
-  // whole frame goes before it, so that the fade to it does not last as long as the pause before it.
+  // Sends a frame except its last packet; `rgb` must stay valid until the board shows it or is
+  // closed. `twice`: sends the whole frame before it, so that the fade to it does not last as long
+  // as the pause before it.
   void Load(std::span<const std::byte> rgb, bool twice);
-  // The last packet of a loaded frame.
+  // Sends the last packet of a loaded frame.
   void Show();
 
-  // It holds what Configure, SetLut and Blacken said.
+  // Whether it holds what Configure, SetLut and Blacken requested.
   bool set_up() const { return !due_.any() && !in_flight_.any(); }
   bool loaded() const { return video_ == Video::kLoaded; }
   bool shown() const { return video_ == Video::kShown; }
-  // When Show last succeeded since Open; 0: never.
+  // Returns when Show last succeeded since Open; 0: never.
   sync::TimeNs shown_ns() const { return shown_ns_; }
-  // How often a frame had to be sent again since the last call.
+  // Returns how often a frame had to be sent again since the last call.
   uint64_t TakeReloads() { return std::exchange(reloads_, 0); }
-  // Transfers that failed since then, but for those that a board that went took with it.
+  // Returns the failed transfers since then, except those that ended because the board was
+  // unplugged.
   uint64_t TakeFailures() { return std::exchange(failed_transfers_, 0); }
 
   // Drains completions.
   void Poll();
-  // Sends what there is to send; when it wants to be called again at the latest.
+  // Sends what is due; returns the latest time for the next call.
   sync::TimeNs Pump();
-  // Sends a table of darkness behind whatever is in flight, whatever becomes of it.
+  // Sends a table of darkness after whatever is in flight, ignoring the result.
   void Darken();
 
-  // Empty, or why the board is to be closed.
+  // Empty, or why the board must be closed.
   const std::string& failure() const { return failure_; }
 
  private:
@@ -89,10 +93,10 @@ class Board {
   void OnBulkDone(TransferCompletion& completion);
   void OnRequestDone(const TransferCompletion& completion);
   void Delivered();
-  // What was in flight has to be sent again.
+  // The transfer in flight has to be sent again.
   void Again(TransferStatus status);
   void CountFailure(TransferStatus status);
-  // Submit's error.
+  // Handles Submit's error.
   void Refused(const absl::Status& status);
   void Fail(std::string reason);
 
@@ -112,7 +116,7 @@ class Board {
   sync::TimeNs shown_ns_ = 0;
   uint64_t reloads_ = 0, failed_transfers_ = 0;
 
-  // The transfer that is in flight, or held back for want of room.
+  // The transfer that is in flight, or waits for room.
   TransferId bulk_ = 0;
   TransferBytes buffer_;
   SetUp in_flight_;
@@ -123,7 +127,7 @@ class Board {
   TransferId request_id_ = 0;
   bool reset_due_ = false, halted_ = false;
   sync::TimeNs ask_at_ = 0;
-  int failures_ = 0;  // in a row
+  int failures_ = 0;  // consecutive
   std::vector<TransferCompletion> drained_;
 };
 

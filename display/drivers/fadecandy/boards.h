@@ -1,4 +1,4 @@
-// Which boards a display wants, and the numbers of their pixels.
+// The boards that a display uses, and the numbers of their pixels.
 #pragma once
 
 #include <cstdint>
@@ -13,15 +13,15 @@ namespace voxeld::display::fadecandy {
 
 inline constexpr int64_t kMostBoards = 64;
 
-// The boards that a display wants, in the order of their pixels.
+// The boards that a display uses, in the order of their pixels.
 struct Boards {
-  // One a board; empty ones: whichever there are, in ascending order of serial number.
+  // One per board; empty ones: any boards, in ascending order of serial number.
   std::vector<std::string> serials;
 };
-// boards=N or boards=SERIAL;SERIAL;…
+// Reads boards=N or boards=SERIAL;SERIAL;…
 Boards ReadBoards(OptionReader& reader);
 
-// A pixel's number counts over all boards: board · 512 + strip · 64 + place on the strip.
+// Pixels are numbered over all boards: board · 512 + strip · 64 + place on the strip.
 inline wiring::PixelNumbers PixelsOf(int32_t boards) {
   return {.a_slice = kPixels, .slices = boards, .a_strip = kStripPixels, .unit = "board"};
 }

@@ -1,5 +1,5 @@
-// Volumes from what goes out to all boards: the other reading of the protocol, strict where a board
-// is patient.
+// Rebuilds volumes from the bytes sent to all boards. An independent reading of the protocol,
+// strict where a board is tolerant.
 #pragma once
 
 #include <bitset>
@@ -17,21 +17,22 @@ namespace voxeld::display::fadecandy {
 
 class FadecandyDecoder final : public WireDecoder {
  public:
-  // A slice of `layout` is a board: the `device` of OnBytes.
+  // Each slice of `layout` is a board: the `device` of OnBytes.
   explicit FadecandyDecoder(const FrameLayout& layout);
 
-  // Transfers of whole packets. DataLoss at the first that breaks the protocol, or that ends a frame
-  // of which packets are missing, and from then on. Packets may be sent again.
+  // Takes transfers of whole packets. Errors: DataLoss at the first packet that violates the
+  // protocol, or that ends a frame with missing packets, and from then on. Packets may be sent
+  // again.
   absl::Status OnBytes(uint8_t endpoint, std::span<const std::byte> bytes, size_t device) override;
-  // A volume is complete when all boards were sent a frame, or another one.
+  // A volume is complete when every board was sent a new frame.
   std::optional<DecodedVolume> TakeVolume() override;
 
  private:
   struct Slice {
     std::vector<std::byte> filling;
-    std::bitset<kFramePackets> have;  // of `filling`
-    Picture whole;                    // the last one that was ended
-    bool fresh = false;               // `whole` was not taken yet
+    std::bitset<kFramePackets> have;  // packets of `filling` received so far
+    Picture whole;                    // the last complete frame
+    bool fresh = false;               // `whole` has not been returned yet
   };
 
   absl::Status Read(std::span<const std::byte, kPacketBytes> packet, size_t device);

@@ -42,7 +42,8 @@ uint8_t ReadFlags(OptionReader& reader) {
   return static_cast<uint8_t>((dithers ? 0 : kNoDither) | (fades ? 0 : kNoInterpolation) | led);
 }
 
-// Boards record into files of their own: "cube.pcapng" becomes "cube-0.pcapng", "cube-1.pcapng", ….
+// Each board records into a file of its own: "cube.pcapng" becomes "cube-0.pcapng",
+// "cube-1.pcapng", ….
 std::string RecordOf(const std::string& path, size_t board, size_t boards) {
   if (path.empty() || boards == 1) return path;
   const std::filesystem::path file(path);
@@ -79,7 +80,7 @@ absl::StatusOr<std::vector<conformance::Subject>> Verify(const DisplayOptions& o
                                                          const DriverContext& context) {
   std::vector<conformance::Subject> subjects;
   const MakeTransport make = OnBus(options, context);
-  // Reads and checks the options as for a display; of its transports none is opened.
+  // Reads and checks the options as for a display; none of its transports is opened.
   const absl::StatusOr<std::unique_ptr<Display>> checked =
       CreateOver(options, context.clock, [&](const BoardPlace& board) {
         absl::StatusOr<std::unique_ptr<UsbTransport>> transport = make(board);
@@ -110,7 +111,7 @@ absl::StatusOr<std::unique_ptr<Display>> CreateOver(const DisplayOptions& option
   info.driver = options.driver;
   info.layout = {.slices = count, .width = kPixels, .height = 1};
   info.volumes_per_second = reader.Number("rate", 60, 0.5, kMostVolumesPerSecond);
-  // The curve is the board's.
+  // The board applies the colour curve.
   info.tone = MakeTone({.dither = Dither::kNone});
   absl::StatusOr<Lattice> lattice = wiring::ReadLattice(reader, PixelsOf(count));
   const std::string record = ReadUsbRecord(reader);

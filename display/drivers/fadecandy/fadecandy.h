@@ -1,4 +1,4 @@
-// Displays made of Fadecandy boards, from options. README.md lists them.
+// Creates displays made of Fadecandy boards from options, which README.md lists.
 #pragma once
 
 #include <cstddef>
@@ -21,23 +21,23 @@ namespace voxeld::display::fadecandy {
 absl::StatusOr<std::unique_ptr<Display>> Create(const DisplayOptions& options,
                                                 const DriverContext& context);
 
-// Each board that the display would drive is a subject.
+// Returns each board that the display would drive as a subject.
 absl::StatusOr<std::vector<conformance::Subject>> Verify(const DisplayOptions& options,
                                                          const DriverContext& context);
 
 struct BoardPlace {
   std::string
-      serial;  // if empty: of `count` boards the one that is number `index` by serial number
+      serial;  // if empty: the board with index `index` by serial number among `count` boards
   size_t index = 0, count = 1;
-  std::string record;  // where its traffic goes, or nothing
+  std::string record;  // file for recording its traffic, or empty
 };
-// A transport to that board, which need not be there. Not null.
+// Makes a transport to that board, which need not be present. Never null.
 using MakeTransport =
     std::function<absl::StatusOr<std::unique_ptr<UsbTransport>>(const BoardPlace& board)>;
 
-// A stopped display. InvalidArgument for an unknown option or a bad value, with what would be
-// right; what `make_transport` says, which is called before the function returns. `clock` outlives
-// the display.
+// Creates a stopped display. Errors: InvalidArgument for an unknown option or a bad value, with
+// what is expected; or the error of `make_transport`, which is called before the function returns.
+// `clock` must outlive the display.
 absl::StatusOr<std::unique_ptr<Display>> CreateOver(const DisplayOptions& options,
                                                     sync::Clock& clock,
                                                     const MakeTransport& make_transport);

@@ -9,7 +9,7 @@
 namespace voxeld::display::fadecandy {
 namespace {
 
-// A fade longer than so many volumes' time is cut short.
+// Limits a fade to this many volumes' time.
 constexpr double kLongestFade = 2;
 
 }  // namespace
@@ -66,7 +66,7 @@ sync::TimeNs FadecandyDisplay::DoTick(sync::TimeNs now) {
   if (phase_ == Phase::kDetached) {
     bool arrived = false;
     for (const auto& board : boards_) arrived |= board->transport().TakeArrival();
-    // A board that comes and goes is tried no faster than one that fails.
+    // A board that comes and goes is retried no faster than one that fails.
     if (arrived) attach_at_ = std::min(attach_at_, failed_at_ + retry_.first());
     if (now >= attach_at_) TryAttach(now);
   }
@@ -109,7 +109,7 @@ void FadecandyDisplay::TryAttach(sync::TimeNs now) {
     const absl::Status status = board->Open();
     if (status.ok()) continue;
     const std::string reason = absl::StrCat(board->Name(), ": ", status.message());
-    // As long as there never was a device, it is looked for.
+    // Until a device was found once, keep looking for it.
     if (!absl::IsNotFound(status) || state() != DisplayState::kAttaching)
       return Detach(now, reason);
     NoDevice(reason);
@@ -152,7 +152,7 @@ absl::Status FadecandyDisplay::DoSetBrightness(double brightness) {
 }
 
 absl::Status FadecandyDisplay::DoSetBlank(bool blank) {
-  // Light comes back with a whole picture: if there is none yet, after the next volume.
+  // Unblank with a complete image: if none exists yet, after the next volume.
   dark_ = blank || !whole_;
   SetLuts(brightness());
   Pump();
@@ -191,7 +191,7 @@ void FadecandyDisplay::Advance() {
       std::all_of(boards_.begin(), boards_.end(), [](const auto& b) { return b->set_up(); })) {
     phase_ = Phase::kReady;
     ++mutable_stats().attaches;
-    // What was asked for while the boards were set up.
+    // Apply settings that were requested while the boards were set up.
     if (brightness() != lut_brightness_ || blanked() != dark_) {
       dark_ = blanked() || (dark_ && !whole_);  // as in SetBlank
       SetLuts(brightness());
@@ -199,7 +199,7 @@ void FadecandyDisplay::Advance() {
     Attached();
   }
   if (sending_.frame == nullptr) return;
-  // The last packets go out together, when all boards have everything else.
+  // Send the last packets together, when all boards have everything else.
   const auto every = [this](auto holds) {
     return std::all_of(sending_.boards.begin(), sending_.boards.end(),
                        [&](size_t b) { return holds(*boards_[b]); });

@@ -9,7 +9,7 @@ namespace {
 double Light(const ColorCurve& curve, double x) {
   if (x * curve.slope <= curve.cutoff) return x * curve.slope;
   const double rest = 1 - curve.cutoff;
-  // Negative where the slope is above 1, just beyond the linear part.
+  // Negative just beyond the linear part if the slope is above 1.
   const double beyond = std::max(0.0, x - curve.slope * curve.cutoff);
   return curve.cutoff + std::pow(beyond / rest, curve.gamma) * rest;
 }

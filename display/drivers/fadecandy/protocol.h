@@ -1,5 +1,5 @@
 // The Fadecandy's USB protocol as numbers. Each names its section of docs/protocols/fadecandy.md,
-// which says what it means.
+// which explains it.
 #pragma once
 
 #include <array>

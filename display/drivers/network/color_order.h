@@ -1,4 +1,4 @@
-// In which order lights take their colours.
+// The order in which lights take their colours.
 #pragma once
 
 #include <array>
@@ -7,7 +7,7 @@
 
 namespace voxeld::display::network {
 
-// Which of red, green and blue (0, 1, 2) each byte of a pixel is.
+// Gives for each byte of a pixel its colour: red, green or blue (0, 1, 2).
 using ColorOrder = std::array<size_t, 3>;
 
 inline constexpr std::array<std::string_view, 6> kColorOrders = {"rgb", "rbg", "grb",

@@ -1,4 +1,4 @@
-// Volumes from the packets that go out: for captures.
+// Rebuilds volumes from outgoing packets, for captures.
 #pragma once
 
 #include <cstddef>
@@ -17,9 +17,9 @@ class NetworkDecoder final : public WireDecoder {
  public:
   NetworkDecoder(const FrameLayout& layout, StreamOptions stream, ColorOrder order);
 
-  // A packet, whole. Packets that end a stream or ask for the show of what came say nothing of pixels.
+  // Takes a whole packet. Packets that end a stream or trigger the show contain no pixels.
   absl::Status OnBytes(uint8_t endpoint, std::span<const std::byte> bytes, size_t device) override;
-  // What all slices hold, once each has come, if anything came since.
+  // Returns the content of all slices, once each has come, if anything came since the last call.
   std::optional<DecodedVolume> TakeVolume() override;
 
  private:

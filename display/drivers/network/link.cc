@@ -23,7 +23,7 @@
 namespace voxeld::display::network {
 namespace {
 
-// What of a stream may wait in the kernel: more would only be late.
+// How much of a stream may wait in the kernel: more would only be late.
 constexpr int kSendBuffer = 128 << 10;
 
 struct Address {
@@ -88,7 +88,7 @@ class Socket {
     fd_ = -1;
   }
   int fd() const { return fd_; }
-  // What the kernel noted since this was asked last; 0: nothing.
+  // Returns the error that the kernel noted since the last call; 0: none.
   int TakeError() const {
     int error = 0;
     socklen_t size = sizeof(error);
@@ -99,7 +99,7 @@ class Socket {
   int fd_ = -1;
 };
 
-// Of what goes out, no more than fits; 0 if it is full.
+// Sends no more bytes than fit; returns 0 if the socket is full.
 absl::StatusOr<size_t> SendOn(const Socket& socket, const Endpoint& to,
                               std::span<const std::byte> bytes) {
   const ssize_t sent = send(socket.fd(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
@@ -175,7 +175,7 @@ class TcpLink final : public Link {
       connected_ = poll(&now, 1, 0) == 1 && (now.revents & POLLOUT) != 0;
       if (!connected_) return State::kOpening;
     }
-    // Nobody sends anything back; what comes is the end.
+    // The controller sends nothing; any reply means that the connection ended.
     char byte = 0;
     const ssize_t got = recv(socket_.fd(), &byte, 1, MSG_DONTWAIT);
     if (got == 0) return absl::UnavailableError(absl::StrCat(to_.text(), ": it hung up"));
@@ -197,7 +197,7 @@ class TcpLink final : public Link {
   }
 
  private:
-  // Whether room in the socket is waited for, besides its end.
+  // Watches the socket for a hang-up and, with `room`, for room to send.
   void Watch(bool room) {
     {
       sync::MutexLock lock(mutex_);
@@ -207,7 +207,7 @@ class TcpLink final : public Link {
   }
   void Stir() const {
     const uint64_t one = 1;
-    // If it cannot be written it is not yet read: the thread is awake already.
+    // If the write fails, an earlier one is still unread: the thread is already awake.
     [[maybe_unused]] const ssize_t written = write(event_, &one, sizeof(one));
   }
 
@@ -220,7 +220,7 @@ class TcpLink final : public Link {
         if (ends_) return;
         room = wants_room_;
       }
-      // What hung up is told once.
+      // A hang-up is reported once.
       const short events = static_cast<short>((room ? POLLOUT : 0) | POLLRDHUP);
       pollfd fds[2] = {{event_, POLLIN, 0}, {hung_up ? -1 : socket_.fd(), events, 0}};
       if (poll(fds, 2, -1) < 0 && errno != EINTR) return;

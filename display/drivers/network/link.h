@@ -1,4 +1,4 @@
-// What carries packets to a controller: a socket of this machine's, or whatever a test puts in its place.
+// Carries packets to a controller: through a socket of this machine, or a test's substitute.
 #pragma once
 
 #include <cstddef>
@@ -13,36 +13,38 @@
 
 namespace voxeld::display::network {
 
-// An IPv4 or IPv6 address in numbers, and a port: "192.168.1.20:4048", "[fe80::1]:4048".
+// A numeric IPv4 or IPv6 address, and a port: "192.168.1.20:4048", "[fe80::1]:4048".
 struct Endpoint {
   std::string host;
   uint16_t port = 0;
   std::string text() const;
 };
-// InvalidArgument with what would be right. Without a port: `fallback`. Names are not looked up: that may take seconds, and the
-// address behind one changes.
+// Parses an endpoint; `fallback` is the default port. Errors: InvalidArgument with what is
+// expected. Names are not resolved: that may take seconds, and the address of a name can change.
 absl::StatusOr<Endpoint> ParseEndpoint(const std::string& text, uint16_t fallback);
 
-// Bound to one thread, but for the wake. No call blocks.
+// Bound to one thread, except for the wake. No call blocks.
 class Link {
  public:
   enum class State : uint8_t { kClosed, kOpening, kOpen };
 
   virtual ~Link() = default;
-  // Begins to open; what comes of it Poll tells.
+  // Starts to open; Poll reports the result.
   virtual absl::Status Open() = 0;
   virtual void Close() = 0;
-  // The state now, or why it is closed again: Unavailable.
+  // Returns the current state, or why the link closed again: Unavailable.
   virtual absl::StatusOr<State> Poll() = 0;
-  // How many of the bytes were taken: a datagram all or none, of a stream what fits. Unavailable: it is gone.
+  // Returns how many bytes were accepted: for datagrams all or none, for a stream what fits.
+  // Errors: Unavailable if the link is gone.
   virtual absl::StatusOr<size_t> Send(std::span<const std::byte> bytes) = 0;
-  // Called, from any thread, when Poll or Send may have more to say. Null: no more.
+  // Sets the function to call, from any thread, when Poll or Send may have something new. Null:
+  // none.
   virtual void SetWake(std::function<void()> wake) = 0;
 };
 
-// Of datagrams. Who hears nothing is found out by what comes back when something is sent.
+// Makes a datagram link. An absent receiver is detected by the errors that sending to it returns.
 std::unique_ptr<Link> MakeUdpLink(const Endpoint& to);
-// Of a stream, with a thread that waits for its socket.
+// Makes a stream link, with a thread that waits for its socket.
 std::unique_ptr<Link> MakeTcpLink(const Endpoint& to);
 
 }  // namespace voxeld::display::network

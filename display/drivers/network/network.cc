@@ -17,8 +17,8 @@ namespace {
 
 constexpr double kMostVolumesPerSecond = 1000;
 
-// E1.31 wants one number that is a sender's for good: of the display's name and of this machine's own number, where it has
-// one (machine-id(5)).
+// E1.31 requires a permanent number per sender: derive it from the display's name and this
+// machine's id, if it has one (machine-id(5)).
 std::array<uint8_t, 16> CidOf(const std::string& name) {
   std::string machine;
   std::getline(std::ifstream("/etc/machine-id"), machine);
@@ -28,7 +28,7 @@ std::array<uint8_t, 16> CidOf(const std::string& name) {
     const uint32_t sum = Crc32c(std::as_bytes(std::span(text)));
     for (size_t i = 0; i < 4; ++i) cid[word * 4 + i] = static_cast<uint8_t>(sum >> (8 * i));
   }
-  // A UUID of version 4 by its marks (RFC 4122 §4.4).
+  // Mark it as a UUID of version 4 (RFC 4122 §4.4).
   cid[6] = static_cast<uint8_t>((cid[6] & 0x0F) | 0x40);
   cid[8] = static_cast<uint8_t>((cid[8] & 0x3F) | 0x80);
   return cid;
@@ -70,7 +70,7 @@ uint16_t PortOf(Protocol protocol) {
   return 0;
 }
 
-// Without the slices, or of a single one the pixels, after the last light.
+// Removes the slices, or in a single slice the pixels, after the last light.
 void Trim(Lattice& lattice, int32_t a_slice) {
   const auto last = std::find_if(lattice.points_mm.rbegin(), lattice.points_mm.rend(),
                                  [](const auto& point) { return point.has_value(); });

@@ -1,4 +1,4 @@
-// Displays behind a controller on the network, from options. README.md lists them.
+// Creates displays behind a network controller from options, which README.md lists.
 #pragma once
 
 #include <functional>
@@ -18,14 +18,15 @@ namespace voxeld::display::network {
 absl::StatusOr<std::unique_ptr<Display>> Create(const DisplayOptions& options,
                                                 const DriverContext& context);
 
-// Unimplemented: controllers answer nothing that could be checked.
+// Always Unimplemented: controllers send no answers that could be checked.
 absl::StatusOr<std::vector<conformance::Subject>> Verify(const DisplayOptions& options,
                                                          const DriverContext& context);
 
-// What carries packets of that protocol there.
+// Makes the link that carries packets of that protocol to the endpoint.
 using MakeLink = std::function<std::unique_ptr<Link>(Protocol protocol, const Endpoint& to)>;
 
-// A stopped display. InvalidArgument for an unknown option or a bad value, with what would be right.
+// Creates a stopped display. Errors: InvalidArgument for an unknown option or a bad value, with
+// what is expected.
 absl::StatusOr<std::unique_ptr<Display>> CreateOver(const DisplayOptions& options,
                                                     sync::Clock& clock, const MakeLink& make_link);
 

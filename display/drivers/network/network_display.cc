@@ -10,11 +10,11 @@
 namespace voxeld::display::network {
 namespace {
 
-// A controller that nobody is at answers within this time that nobody is.
+// If no controller is at the address, the network reports that within this time.
 constexpr sync::TimeNs kProof = 50 * sync::kMillisecond;
-// The kernel has no room for a datagram: it has, once some have gone out.
+// The kernel had no room for a datagram: it has some once others were sent.
 constexpr sync::TimeNs kAgain = sync::kMillisecond;
-// How often it is asked whether packets came back.
+// How often to check for returned errors.
 constexpr sync::TimeNs kLook = 100 * sync::kMillisecond;
 constexpr int kEndPackets = 3;  // E1.31 §6.2.6
 
@@ -56,7 +56,7 @@ absl::Status NetworkDisplay::DoStart() {
   return absl::OkStatus();
 }
 
-// What is lit is put out and the stream said to end, as far as the kernel has room.
+// Turns off the lights and ends the stream, as far as the kernel has room.
 void NetworkDisplay::DoStop() {
   if (phase_ == Phase::kReady && taken_ == 0) {
     picture_.assign(picture_.size(), 0);
@@ -108,7 +108,7 @@ void NetworkDisplay::LookAtLink(sync::TimeNs now) {
     phase_ = Phase::kProving;
     proved_at_ = sync::kNever;
     SetLight(brightness(), blanked());
-    // What was lit before comes again, and black where nothing was.
+    // Repeat the former content, or black if there was none.
     QueueWhole();
     if (writer_.Leap()) QueueWhole();
   }
@@ -222,7 +222,8 @@ void NetworkDisplay::DoSend(const SliceFramePtr& frame, bool full) {
   Wake();
 }
 
-// A volume is shown from its last packet on, and has its period before the next one goes out: nothing else paces a network.
+// A volume is shown from its last packet on, and lasts its period before the next one is sent:
+// nothing else paces a network.
 sync::TimeNs NetworkDisplay::Finish(sync::TimeNs now) {
   if (sending_.frame == nullptr || !queue_.empty()) return sync::kNever;
   const sync::TimeNs end = sending_.begin_ns + period();

@@ -1,4 +1,4 @@
-// The driver of LED lattices behind a controller on the network. README.md has its ways.
+// The driver of LED lattices behind a network controller. README.md describes its behaviour.
 #pragma once
 
 #include <array>
@@ -24,7 +24,7 @@ class NetworkDisplay final : public Display {
     ColorOrder order = ColorOrderOf("rgb");
   };
 
-  // A slice of `info.layout` is a packet: RGB888 in one picture.
+  // Each slice of `info.layout` is a packet: RGB888 in one image.
   NetworkDisplay(DisplayInfo info, Settings settings, std::unique_ptr<Link> link,
                  sync::Clock& clock);
   ~NetworkDisplay() override;
@@ -36,10 +36,10 @@ class NetworkDisplay final : public Display {
 
   struct Packet {
     std::vector<std::byte> bytes;
-    bool volume = false;  // of the volume on its way, not a repeat
+    bool volume = false;  // part of the volume being sent, not a repeat
   };
 
-  // The volume on its way.
+  // The volume being sent.
   struct Sending {
     SliceFramePtr frame;  // null: none
     sync::TimeNs begin_ns = 0, last_byte_ns = 0;
@@ -59,13 +59,13 @@ class NetworkDisplay final : public Display {
   void Fail(sync::TimeNs now, const std::string& reason);
   void Open(sync::TimeNs now);
   void LookAtLink(sync::TimeNs now);
-  // All slices as they are, or as black, after whatever waits.
+  // Queues all slices, current or black, after whatever waits.
   void QueueWhole();
   void QueueSlices(const std::vector<int32_t>& slices, bool of_volume);
-  // What packets are made for, from now on; true if that is another.
+  // Sets the light for which packets are made; returns true if it changed.
   bool SetLight(double brightness, bool dark);
   std::vector<uint8_t> LightOf(int32_t slice) const;
-  // When to try again.
+  // Returns when to try again.
   sync::TimeNs Pump(sync::TimeNs now);
   sync::TimeNs Finish(sync::TimeNs now);
 
@@ -78,15 +78,15 @@ class NetworkDisplay final : public Display {
   sync::Backoff retry_{100 * sync::kMillisecond, 5 * sync::kSecond};
 
   std::vector<uint8_t>
-      picture_;  // of all slices, before brightness and order; zeros before the first
+      picture_;  // all slices, before brightness and colour order; zeros before the first volume
   std::deque<Packet> queue_;
-  size_t taken_ = 0;  // of the first packet's bytes
+  size_t taken_ = 0;  // bytes sent of the first packet
   Sending sending_;
   uint64_t complete_frame_ = 0;  // the volume that the controller holds; 0: none
   sync::TimeNs last_sent_ = 0;
-  double lit_brightness_ = 1;  // that packets are made for
+  double lit_brightness_ = 1;  // the brightness for which packets are made
   bool dark_ = false;
-  std::array<uint8_t, 256> scale_{};  // by brightness
+  std::array<uint8_t, 256> scale_{};  // scales a channel by the brightness
 };
 
 }  // namespace voxeld::display::network

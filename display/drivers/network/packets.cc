@@ -27,12 +27,12 @@ void PutBytes(Bytes& out, size_t at, std::span<const uint8_t> bytes) {
                  [](uint8_t byte) { return std::byte{byte}; });
 }
 
-// `in`: no shorter.
+// Requires: `in` is at least as long.
 bool Begins(View in, std::span<const uint8_t> with) {
   return std::memcmp(in.data(), with.data(), with.size()) == 0;
 }
 
-// The lengths of nested layers, each to the packet's end.
+// Writes the lengths of nested layers, each to the packet's end.
 void PutLength(Bytes& out, size_t at) {
   Put(out, at, 0x7000 | static_cast<uint32_t>(out.size() - at), 2);
 }
@@ -211,14 +211,15 @@ std::vector<std::byte> PacketWriter::E131(int32_t slice, std::span<const uint8_t
 }
 
 std::vector<std::byte> PacketWriter::ArtNet(int32_t slice, std::span<const uint8_t> rgb) {
-  const size_t length = rgb.size() + rgb.size() % 2;  // even
+  const size_t length = rgb.size() + rgb.size() % 2;  // must be even
   Bytes out(artnet::kHeader + length);
   PutBytes(out, 0, artnet::kId);
   Put(out, 8, artnet::kOpDmx & 0xFF, 1);
   Put(out, 9, artnet::kOpDmx >> 8, 1);
   Put(out, 10, artnet::kRevision, 2);
   uint8_t& sequence = universe_sequences_[static_cast<size_t>(slice)];
-  sequence = static_cast<uint8_t>(sequence % 255 + 1);  // 0 would say that there is none
+  // 0 would mean that packets have no sequence
+  sequence = static_cast<uint8_t>(sequence % 255 + 1);
   Put(out, 12, sequence, 1);
   const auto universe = static_cast<uint32_t>(options_.first_universe + slice);
   Put(out, 14, universe & 0xFF, 1);

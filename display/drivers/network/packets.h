@@ -1,4 +1,4 @@
-// Packets of pixels: made, and read again.
+// Writes and reads packets of pixels.
 #pragma once
 
 #include <array>
@@ -13,37 +13,41 @@
 
 namespace voxeld::display::network {
 
-// What of a stream does not change.
+// The constant settings of a stream.
 struct StreamOptions {
   Protocol protocol = Protocol::kDdp;
-  int32_t first_universe = 1;  // of slice 0; Art-Net counts from 0. OPC: the channel
+  int32_t first_universe = 1;  // universe of slice 0; Art-Net counts from 0. OPC: the channel
   uint8_t priority = 100;      // E1.31: 0 to 200
-  // E1.31: the universe that sync packets name, Art-Net: any but 0 asks for them. 0: controllers show what comes when it comes.
+  // E1.31: the universe named by sync packets; Art-Net: any value but 0 enables them. 0:
+  // controllers show pixels as they come.
   int32_t sync_universe = 0;
   std::string source_name = "voxeld";  // E1.31: 63 bytes at most
-  std::array<uint8_t, 16> cid{};       // E1.31: of this sender, always the same
+  std::array<uint8_t, 16> cid{};       // E1.31: identifies this sender, always the same
 };
 
-// Pixels of a slice that one packet can have.
+// Returns the most pixels of a slice that fit into one packet.
 int32_t MostPixels(Protocol protocol);
-// Slices that a stream can have.
+// Returns the most slices that a stream can have.
 int32_t MostSlices(const StreamOptions& options);
 
 // Makes a display's packets; keeps sequence numbers.
 class PacketWriter {
  public:
-  // Slices of `pixels` pixels each.
+  // Slices have `pixels` pixels each.
   PacketWriter(StreamOptions options, int32_t pixels);
 
-  // The packet of a slice. rgb: pixels · 3 bytes. `last`: of this volume.
+  // Returns the packet of a slice. rgb: pixels · 3 bytes. `last`: the last one of this volume.
   std::vector<std::byte> Pixels(int32_t slice, std::span<const uint8_t> rgb, bool last);
-  // What makes controllers show what they have; empty where there is no such packet.
+  // Returns the packet that makes controllers show the received pixels; empty if the protocol has
+  // none.
   std::vector<std::byte> Sync();
-  // E1.31: numbers go on half their range further on. A receiver passes over the 20 numbers up to the last that it had
-  // from this source (ANSI E1.31 §6.7.2), be it in a daemon's life before this: of a picture sent before and after, one passes.
-  // False: the protocol's receivers have no such memory.
+  // E1.31: advances the sequence numbers by half their range. A receiver ignores the 20 numbers up
+  // to the last one that it had from this source (ANSI E1.31 §6.7.2), even from a former run of the
+  // daemon: if a slice image is sent before and after the call, one of the two is accepted. Returns
+  // false if the protocol's receivers do not remember numbers.
   bool Leap();
-  // What tells them that this stream ends, of a slice; empty where there is none.
+  // Returns the packet that announces the end of this stream for a slice; empty if the protocol has
+  // none.
   std::vector<std::byte> End(int32_t slice, std::span<const uint8_t> rgb);
 
  private:
@@ -55,11 +59,11 @@ class PacketWriter {
   const StreamOptions options_;
   const int32_t pixels_;
   uint8_t ddp_sequence_ = 0;                 // 1 to 15
-  std::vector<uint8_t> universe_sequences_;  // of each slice
+  std::vector<uint8_t> universe_sequences_;  // per slice
   uint8_t sync_sequence_ = 0;
 };
 
-// What a packet says.
+// The content of a packet.
 struct ReadPacket {
   enum class Kind : uint8_t { kPixels, kSync, kEnd };
   Kind kind = Kind::kPixels;
@@ -69,7 +73,8 @@ struct ReadPacket {
   std::span<const std::byte> rgb = {};  // within the packet
 };
 
-// Nothing if it breaks the protocol, or is of no slice of that stream. `slices` of `pixels` each.
+// Parses a packet. Returns nothing if it violates the protocol, or is not for a slice of that
+// stream. `slices` of `pixels` each.
 std::optional<ReadPacket> Read(const StreamOptions& options, int32_t slices, int32_t pixels,
                                std::span<const std::byte> packet);
 

@@ -1,5 +1,5 @@
-// Numbers of the protocols by which LED controllers take pixels over a network. docs/protocols/network.md says how they are
-// used here.
+// Constants of the protocols by which LED controllers receive pixels over a network.
+// docs/protocols/network.md describes how they are used here.
 #pragma once
 
 #include <array>
@@ -15,12 +15,12 @@ namespace ddp {
 inline constexpr uint16_t kPort = 4048;
 inline constexpr size_t kHeader = 10;
 inline constexpr uint8_t kVersion1 = 0x40, kPush = 0x01;
-inline constexpr uint8_t kRgb8 = 0x0B;        // RGB, 8 bits an element
+inline constexpr uint8_t kRgb8 = 0x0B;        // RGB, 8 bits per element
 inline constexpr uint8_t kDefaultOutput = 1;  // destination
-inline constexpr int32_t kPixels = 480;       // of a packet: 1,440 bytes
+inline constexpr int32_t kPixels = 480;       // in a packet: 1,440 bytes
 }  // namespace ddp
 
-// ANSI E1.31-2018, streaming ACN: UDP. Offsets are of table 4-1.
+// ANSI E1.31-2018, streaming ACN: UDP. Offsets are those of table 4-1.
 namespace e131 {
 inline constexpr uint16_t kPort = 5568;
 inline constexpr std::array<uint8_t, 16> kPreamble = {0,   0x10, 0,   0,   'A', 'S', 'C', '-',
@@ -52,13 +52,13 @@ namespace opc {
 inline constexpr uint16_t kPort = 7890;
 inline constexpr size_t kHeader = 4;
 inline constexpr uint8_t kSetPixels = 0;
-inline constexpr int32_t kPixels = 16384;  // of a message here; 21,845 are possible
+inline constexpr int32_t kPixels = 16384;  // in one message here; 21,845 are possible
 }  // namespace opc
 
-// Of a DMX universe of 512 slots: whole pixels.
+// Whole pixels in a DMX universe of 512 slots.
 inline constexpr int32_t kUniversePixels = 170;
 
-// After so long without a packet a controller is told all again.
+// After this long without a packet, everything is sent to the controller again.
 inline constexpr int64_t kRefreshNs = 800'000'000;
 
 }  // namespace voxeld::display::network

@@ -33,7 +33,8 @@ absl::StatusOr<EmulatedDevice> ReadEmulatedDevice(const DisplayOptions& options)
   config.watchdog = reader.Flag("watchdog", true);
   config.brightness = reader.Flag("device_brightness", true);
   config.power_limit = reader.Flag("device_power_limit", true);
-  reader.Flag("calibrated", false);  // its device is what the options say in any case
+  // accepted and ignored: the device always is what the options say
+  reader.Flag("calibrated", false);
   config.serial = reader.Text("serial", options.name);
   absl::StatusOr<emulator::FaultPlan> plan = emulator::ParseFaultPlan(reader.Text("faults", ""));
   absl::StatusOr<DisplayInfo> info = ReadDisplayInfo(options, reader);

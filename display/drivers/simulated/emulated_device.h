@@ -1,4 +1,4 @@
-// An emulated voxlink device, from options.
+// Makes an emulated voxlink device from options.
 #pragma once
 
 #include "absl/status/statusor.h"
@@ -10,12 +10,12 @@
 namespace voxeld::display::simulated {
 
 struct EmulatedDevice {
-  DisplayInfo info;  // of the display that it is
+  DisplayInfo info;  // of the display that it emulates
   emulator::VoxlinkDeviceConfig config;
   emulator::FaultPlan plan;
 };
 
-// The options of README.md. InvalidArgument with what is wrong and what would be right.
+// Reads the options in README.md. Errors: InvalidArgument with what is wrong and what is expected.
 absl::StatusOr<EmulatedDevice> ReadEmulatedDevice(const DisplayOptions& options);
 
 }  // namespace voxeld::display::simulated

@@ -1,5 +1,5 @@
-// The display that everybody has: the voxlink driver, with a device model of voxlink at the other
-// end of a cable that lies inside this process. Same driver, same wire bytes as a real one.
+// The display that needs no hardware: the voxlink driver, connected inside this process to a device
+// model of voxlink. It uses the same driver and the same wire bytes as a real display.
 #pragma once
 
 #include <memory>
@@ -26,19 +26,19 @@ namespace voxeld::display::simulated {
 absl::StatusOr<std::unique_ptr<Display>> Create(const DisplayOptions& options,
                                                 const DriverContext& context);
 
-// voxlink's conformance suite and the emulated device, in this process: to try it without a device.
+// Returns voxlink's conformance suite with the emulated device, to run it without hardware.
 absl::StatusOr<std::vector<conformance::Subject>> Verify(const DisplayOptions& options,
                                                          const DriverContext& context);
 
-// A display with its insides, which belong to `display`. The device and the faults may be touched
-// within transport->WithDevice only.
+// A display with its parts, which `display` owns. Access the device and the faults only within
+// transport->WithDevice.
 struct Parts {
   std::unique_ptr<Display> display;
   InProcessTransport* transport = nullptr;
   emulator::FaultInjector* faults = nullptr;
   emulator::VoxlinkDevice* device = nullptr;
 };
-// `own_thread` false: nothing happens but when transport->Pump is called.
+// With `own_thread` false, nothing happens except when transport->Pump is called.
 absl::StatusOr<Parts> CreateParts(const DisplayOptions& options, sync::Clock& clock,
                                   bool own_thread);
 

@@ -1,6 +1,5 @@
-// Puts a volume together from the packets that carry it (docs/protocols/voxlink.md §5.2 to §5.4).
-// The device model and the decoder both stand on it;
-// they differ in what they do with what it refuses.
+// Assembles a volume from the packets that carry it (docs/protocols/voxlink.md §5.2 to §5.4). The
+// device model and the decoder both use it; they differ in how they handle what it refuses.
 //
 // Single-threaded.
 #pragma once
@@ -26,22 +25,23 @@ class VolumeAssembler {
  public:
   explicit VolumeAssembler(const FrameLayout& layout) : layout_(layout) {}
 
-  // Starts a volume on `base`, the volume that BEGIN named (null for 0); what was being filled is
-  // gone. Refuses (kBadLength, kBadBegin) what does not fit the layout, and then fills nothing.
+  // Starts a volume on `base`, the volume that BEGIN named (null for 0), and discards what was
+  // being filled. If the packet does not fit the layout, it returns kBadLength or kBadBegin and
+  // fills nothing.
   ErrorCode Begin(const PacketHeader& header, std::span<const std::byte> payload, VolumePtr base);
 
-  // A fragment of a picture. Fragments of one picture come in order;
-  // one at offset 0 begins it again.
+  // Adds a fragment of a slice image. Fragments of one image must come in order; one at offset 0
+  // starts it again.
   ErrorCode Slice(const PacketHeader& header, std::span<const std::byte> payload);
 
   bool filling() const { return number_ != 0; }
   uint64_t number() const { return number_; }  // 0: none
 
-  // Runs of announced pictures that are not whole, ascending.
+  // Returns runs of announced images that are not complete, ascending.
   std::vector<PictureRun> Missing() const;
 
-  // The volume, if nothing is missing; null otherwise. It goes on filling:
-  // pictures that come again replace theirs.
+  // Returns the volume if nothing is missing; null otherwise. Filling can continue: images that
+  // come again replace the former ones.
   VolumePtr Finish() const;
 
   void Clear();
@@ -51,7 +51,7 @@ class VolumeAssembler {
   uint64_t number_ = 0;
   VolumePtr base_;
   std::vector<bool> announced_;
-  std::vector<std::shared_ptr<std::vector<std::byte>>> pictures_;  // as far as they have come
+  std::vector<std::shared_ptr<std::vector<std::byte>>> pictures_;  // as received so far
 };
 
 }  // namespace voxeld::display::voxlink

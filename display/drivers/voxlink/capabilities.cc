@@ -352,7 +352,7 @@ namespace {
 
 using Shape = decltype(Geometry::shape);
 
-// What is the same however a display was put together.
+// Returns the shape without the properties that depend on how a display was assembled.
 Shape AsBuilt(Shape shape) {
   if (auto* planar = std::get_if<PlanarStack>(&shape)) {
     planar->mirror_u = planar->mirror_v = false;

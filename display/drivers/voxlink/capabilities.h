@@ -1,5 +1,5 @@
-// Capabilities of a voxlink device (docs/protocols/voxlink.md §4.1, §4.2)
-// to and from a display's geometry.
+// Converts the capabilities of a voxlink device (docs/protocols/voxlink.md §4.1, §4.2) to and from
+// a display's geometry.
 #pragma once
 
 #include <cstddef>
@@ -16,20 +16,21 @@ namespace voxeld::display::voxlink {
 
 struct DeviceCapabilities {
   Capabilities fixed{};
-  Geometry geometry;  // the shape; the grid is the host's affair and stays empty
+  Geometry geometry;  // the shape; the host chooses the grid, which stays empty
 };
 
-// The block as GET_CAPABILITIES sends it, page after page; `fixed.total_length`, `slices`, `width`
-// and `height` are set from the geometry.
+// Returns the block that GET_CAPABILITIES sends, page after page; `fixed.total_length`, `slices`,
+// `width` and `height` are set from the geometry.
 std::vector<std::byte> EncodeCapabilities(const DeviceCapabilities& capabilities);
 
-// From an unknown device: every field is checked. DataLoss with the field and its value.
+// Parses the block of an untrusted device: every field is checked. Errors: DataLoss with the field
+// and its value.
 absl::StatusOr<DeviceCapabilities> ParseCapabilities(std::span<const std::byte> block);
 
-// FailedPrecondition, with what was asked for and what the device has, if it cannot show `layout`
-// on `geometry` (grids and corrections are not compared).
-// `calibrated`: the geometry was measured on the display, so that what the device says of mirrors, axes, tilts, phases and
-// directions does not count.
+// Errors: FailedPrecondition, with what was requested and what the device has, if it cannot show
+// `layout` on `geometry` (grids and corrections are not compared). `calibrated`: the geometry was
+// measured on the display, so that the device's mirrors, axes, tilts, phases and directions are
+// ignored.
 absl::Status CheckCapabilities(const DeviceCapabilities& device, const Geometry& geometry,
                                const FrameLayout& layout, bool calibrated = false);
 

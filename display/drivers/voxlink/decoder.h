@@ -1,5 +1,6 @@
-// Volumes from a voxlink driver's outgoing bytes: the other reading of the protocol, strict where a
-// device is patient. The stream may begin anywhere between two volumes, with a volume of base 0.
+// Rebuilds volumes from a voxlink driver's outgoing bytes. An independent reading of the protocol,
+// strict where a device is tolerant. The stream may start anywhere between two volumes, with a
+// volume of base 0.
 #pragma once
 
 #include <cstdint>
@@ -17,8 +18,8 @@ class VoxlinkDecoder final : public WireDecoder, private PacketParser::Sink {
  public:
   VoxlinkDecoder(const FrameLayout& layout, uint32_t max_payload);
 
-  // DataLoss at the first byte that breaks the protocol, and from then on. Slices may be sent again
-  // after VOLUME_END (the device had lost them), and a volume may be begun again.
+  // Errors: DataLoss at the first byte that violates the protocol, and from then on. Slices may be
+  // sent again after VOLUME_END (if the device had lost them), and a volume may be started again.
   absl::Status OnBytes(uint8_t endpoint, std::span<const std::byte> bytes, size_t device) override;
   std::optional<DecodedVolume> TakeVolume() override;
 
@@ -33,9 +34,9 @@ class VoxlinkDecoder final : public WireDecoder, private PacketParser::Sink {
   const FrameLayout layout_;
   PacketParser parser_;
   VolumeAssembler assembler_;
-  std::optional<uint32_t> sequence_;  // of the next packet; none before the first
-  VolumePtr complete_;                // the last whole volume: the base of the next
-  bool fresh_ = false;                // complete_ was not taken yet
+  std::optional<uint32_t> sequence_;  // expected of the next packet; empty before the first
+  VolumePtr complete_;                // the last complete volume: the base of the next
+  bool fresh_ = false;                // complete_ has not been returned yet
   uint64_t bytes_ = 0;
   absl::Status status_;
 };

@@ -134,7 +134,7 @@ void PacketParser::Deliver(std::span<const std::byte> packet, Sink& sink) {
 void PacketParser::Feed(std::span<const std::byte> bytes, Sink& sink) {
   while (!bytes.empty()) {
     if (partial_.empty()) {
-      // Straight from the caller's bytes, as long as whole packets lie in them.
+      // Parse directly from the caller's bytes, as long as whole packets lie in them.
       if (bytes.size() >= kHeaderSize) {
         if (!SoundHeader(bytes)) {
           const auto next = std::find(bytes.begin() + 1, bytes.end(), std::byte{kMagic & 0xFF});
@@ -154,7 +154,7 @@ void PacketParser::Feed(std::span<const std::byte> bytes, Sink& sink) {
       partial_.assign(bytes.begin(), bytes.end());
       break;
     }
-    // Take only as much as the packet that has begun needs.
+    // Take only as many bytes as the started packet needs.
     const bool have_header = partial_.size() >= kHeaderSize;
     const size_t need = have_header ? PacketSize(partial_) : kHeaderSize;
     const size_t take = std::min(bytes.size(), need - partial_.size());

@@ -1,5 +1,5 @@
-// Packets of voxlink (docs/protocols/voxlink.md §5): writing them,
-// and finding them in a stream of bytes.
+// Packets of voxlink (docs/protocols/voxlink.md §5): writes them, and finds them in a stream of
+// bytes.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@ class PacketWriter {
  public:
   // The next packet's number.
   uint32_t sequence() const { return sequence_; }
-  // The stream begins anew (START).
+  // Restarts the stream (START).
   void Restart() { sequence_ = 0; }
 
   template <typename Bytes>
@@ -33,12 +33,12 @@ class PacketWriter {
   void Show(Bytes& out, uint64_t volume, uint64_t sweep);
   template <typename Bytes>
   void ShowAhead(Bytes& out, uint64_t volume, uint64_t sweep, uint32_t ahead);
-  // ABORT, DROP and KEEPALIVE carry nothing (volume 0 for the last).
+  // ABORT, DROP and KEEPALIVE have no payload (volume 0 for the last).
   template <typename Bytes>
   void Plain(Bytes& out, PacketType type, uint64_t volume);
 
  private:
-  // Fills in what all packets share; sequence and sums included.
+  // Fills in the fields that all packets share, including sequence and checksums.
   template <typename Bytes>
   void Put(Bytes& out, PacketHeader header, std::span<const std::byte> head,
            std::span<const std::byte> tail);
@@ -46,25 +46,25 @@ class PacketWriter {
   uint32_t sequence_ = 0;
 };
 
-// Finds packets in a stream that may be cut anywhere, and finds its feet again after damage: what
-// is not a sound header is skipped byte by byte. Holds at most one packet.
+// Finds packets in a stream that may be split anywhere, and resynchronises after damage: bytes that
+// are not a valid header are skipped one by one. Holds at most one packet.
 class PacketParser {
  public:
   struct Sink {
     virtual ~Sink() = default;
-    // Header and payload are sound; `payload` is valid during the call.
+    // Header and payload are valid; `payload` is valid during the call.
     virtual void OnPacket(const PacketHeader& header, std::span<const std::byte> payload) = 0;
-    // The header is sound, the payload is not.
+    // The header is valid, the payload is damaged.
     virtual void OnBadPayload(const PacketHeader& header) = 0;
-    // `bytes` that belong to no packet were skipped, just before what follows.
+    // `bytes` that belong to no packet were skipped, just before the next call.
     virtual void OnSkipped(size_t bytes) = 0;
   };
 
-  // A header that announces more than `max_payload` bytes is not sound.
+  // A header that announces more than `max_payload` bytes is invalid.
   explicit PacketParser(uint32_t max_payload) : max_payload_(max_payload) {}
 
   void Feed(std::span<const std::byte> bytes, Sink& sink);
-  // Bytes of a packet that has begun and not ended.
+  // Returns the bytes held of an unfinished packet.
   size_t pending() const { return partial_.size(); }
   void Reset();
 
@@ -74,7 +74,7 @@ class PacketParser {
   void FlushSkipped(Sink& sink);
 
   uint32_t max_payload_;
-  std::vector<std::byte> partial_;  // a packet's beginning, carried over from one Feed to the next
+  std::vector<std::byte> partial_;  // the beginning of a packet, kept from one Feed to the next
   size_t skipped_ = 0;
 };
 

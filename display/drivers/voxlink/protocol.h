@@ -1,8 +1,7 @@
-// voxlink 1.0 as numbers and wire structs. Each names its section of docs/protocols/voxlink.md,
-// which says what it means.
+// voxlink 1.0 as constants and wire structs. Each names its section of docs/protocols/voxlink.md,
+// which explains it.
 //
-// Everything on the wire is little-endian;
-// these structs are copied to and from it as they lie in memory.
+// Everything on the wire is little-endian; these structs are copied to and from it unchanged.
 #pragma once
 
 #include <bit>
@@ -30,7 +29,7 @@ inline constexpr size_t kEventSize = 64;  // the most that one interrupt transfe
 inline constexpr uint8_t kMsVendorCode = 0x20;
 inline constexpr uint16_t kMsDescriptorIndex = 7;
 
-// §2 Versions: major in the high byte. The major is checked; minors only add.
+// §2 Versions: major in the high byte. The major version is checked; minor versions only add.
 inline constexpr uint16_t kVersion = 0x0100;
 
 // §4 Requests (bRequest; vendor, interface recipient)
@@ -50,9 +49,9 @@ inline constexpr uint8_t kRequestIn = 0xC1;
 inline constexpr size_t kCapabilitiesPage = 4096;
 inline constexpr size_t kMaxCapabilities = size_t{1} << 20;
 
-// §4.1 Capabilities: this, then the shape (§4.2)
+// §4.1 Capabilities: this struct, then the shape (§4.2)
 struct Capabilities {
-  uint32_t total_length;  // of the whole block, this included
+  uint32_t total_length;  // of the whole block, including this
   uint16_t version;
   uint8_t formats;  // bit n: PixelFormat n
   uint8_t max_sub_frames;
@@ -61,7 +60,7 @@ struct Capabilities {
   uint32_t max_payload;     // bytes of one packet's payload
   uint32_t slices, width, height;
   uint32_t volume_buffers;
-  uint32_t min_rate_mhz, max_rate_mhz, nominal_rate_mhz;  // sweeps in 1,000 s
+  uint32_t min_rate_mhz, max_rate_mhz, nominal_rate_mhz;  // sweeps per 1,000 s
   uint32_t max_power_mw;
   uint16_t keepalive_ms, watchdog_ms;
   uint32_t reserved[2];
@@ -117,7 +116,7 @@ static_assert(sizeof(HelixShape) == 64);
 struct LatticeShape {
   uint8_t kind;  // 4
   uint8_t reserved[3];
-  uint32_t lights;  // f64 × 3 each, x, y and z, follow; NaN: there is none
+  uint32_t lights;  // f64 × 3 each, x, y and z, follow; NaN: no light
   double cell_mm[3];
 };
 static_assert(sizeof(LatticeShape) == 32);
@@ -131,7 +130,7 @@ inline constexpr uint8_t kShapeLattice = 4;
 struct Mode {
   uint8_t format;
   uint8_t sub_frames;
-  uint8_t bits;  // a channel; 0: the format's own
+  uint8_t bits;  // per channel; 0: the format's default
   uint8_t reserved0;
   uint32_t rate_mhz;  // 0: nominal
   uint32_t reserved1[2];
@@ -143,17 +142,17 @@ struct Status {
   uint8_t running;  // 0 idle, 1 in a session
   uint8_t flags;
   uint16_t reserved0;
-  uint32_t event_sequence;  // of the next event
+  uint32_t event_sequence;  // expected of the next event
   uint64_t time_ns;
   uint64_t bytes_received;
   uint64_t credit_limit;
   uint64_t filling;        // 0: none
-  uint64_t last_complete;  // what a BEGIN may name as its base; 0: nothing
+  uint64_t last_complete;  // what a BEGIN may name as its base; 0: none
   uint64_t shown;          // 0: none
   uint64_t shown_sweep;
   uint64_t shown_start_ns;
   uint32_t underruns;
-  int16_t temperature;  // 0.1 °C; INT16_MIN: not known
+  int16_t temperature;  // 0.1 °C; INT16_MIN: unknown
   uint16_t reserved1;
 };
 static_assert(sizeof(Status) == 80);
@@ -184,14 +183,14 @@ struct PacketHeader {
   uint32_t offset;
   uint32_t length;
   uint32_t payload_crc;
-  uint32_t header_crc;  // of the 36 bytes before
+  uint32_t header_crc;  // of the 36 bytes before it
 };
 static_assert(sizeof(PacketHeader) == 40);
 inline constexpr size_t kHeaderCrcOffset = 36;
 
-inline constexpr uint8_t kEndShow = 1u << 0;  // flags of END: show it, else hold it
+inline constexpr uint8_t kEndShow = 1u << 0;  // flags of END: show the volume, else hold it
 
-// §5.2 VOLUME_BEGIN: this, then a bit a picture, lowest first (none with base 0)
+// §5.2 VOLUME_BEGIN: this struct, then one bit per slice image, lowest first (none with base 0)
 struct BeginPayload {
   uint64_t base;
   uint32_t pictures;  // of the mode
@@ -204,10 +203,10 @@ struct ShowPayload {
   uint64_t sweep;  // 0: the next
 };
 inline constexpr uint8_t kShowAhead =
-    1u << 0;  // flags: taken only ahead, and answered; then its payload is
+    1u << 0;  // flags: accepted only ahead of time, and answered; the payload is then:
 struct ShowAheadPayload {
   uint64_t sweep;
-  uint32_t ahead;  // sweep − the last one begun must be at least that, or nothing changes
+  uint32_t ahead;  // sweep − the last one begun must be at least this, or nothing changes
   uint32_t reserved;
 };
 static_assert(sizeof(ShowAheadPayload) == 16);
@@ -269,7 +268,7 @@ struct PictureRun {
 static_assert(sizeof(PictureRun) == 8);
 
 inline constexpr size_t kRunsPerEvent = 3;
-inline constexpr size_t kMostMissingEvents = 16;  // a longer list is made shorter by joining runs
+inline constexpr size_t kMostMissingEvents = 16;  // a longer list is shortened by joining runs
 inline constexpr uint8_t kMissingLast = 1u << 0;  // flags: the list ends here
 
 struct MissingEvent {
@@ -282,8 +281,8 @@ static_assert(sizeof(MissingEvent) == 40);
 
 enum class Reason : uint32_t {
   kByHost = 1,         // ABORT, or DROP
-  kSuperseded = 2,     // another BEGIN, or a later volume was complete before it was shown
-  kBadBase = 3,        // BEGIN named a base that the device does not hold
+  kSuperseded = 2,     // another BEGIN, or a later volume was complete before this one was shown
+  kBadBase = 3,        // BEGIN named a base that the device does not have
   kUnknownVolume = 4,  // END, SHOW or DROP of a volume that the device does not know
   kMalformed = 5,      // BEGIN does not fit the mode
 };
@@ -295,7 +294,7 @@ struct VolumeEvent {  // ABORTED, DROPPED
 };
 static_assert(sizeof(VolumeEvent) == 16);
 
-inline constexpr uint8_t kShownDark = 1u << 0;  // flags of SHOWN: blanked or dark while it was due
+inline constexpr uint8_t kShownDark = 1u << 0;  // flags of SHOWN: blanked or dark at that time
 
 struct ShownEvent {
   uint64_t volume;
@@ -324,10 +323,10 @@ enum class ErrorCode : uint32_t {
   kBadPayload = 2,   // CRC
   kSequence = 3,     // packets are missing
   kNotFilling = 4,   // SLICE of a volume that is not being filled
-  kNotInBitmap = 5,  // SLICE that BEGIN did not announce
-  kBadPicture = 6,   // slice, sub-frame, offset or length outside the mode's
-  kBadOrder = 7,     // fragments out of order, or a volume's number that does not ascend
-  kBadLength = 8,    // payload of the wrong size for its type
+  kNotInBitmap = 5,  // SLICE of an image that BEGIN did not announce
+  kBadPicture = 6,   // slice, sub-frame, offset or length outside the mode
+  kBadOrder = 7,     // fragments out of order, or a volume number that does not ascend
+  kBadLength = 8,    // payload of the wrong size for the packet's type
   kUnknownType = 9,
   kBadBegin = 10,
   kCreditExceeded = 11,
@@ -357,11 +356,11 @@ struct OrderedEvent {
 static_assert(sizeof(OrderedEvent) == 16);
 
 // §8 Times
-inline constexpr int64_t kKeepaliveNs = 100'000'000;  // the host's longest silence
-inline constexpr int64_t kWatchdogNs = 250'000'000;   // then the device goes dark
+inline constexpr int64_t kKeepaliveNs = 100'000'000;  // the longest silence of the host
+inline constexpr int64_t kWatchdogNs = 250'000'000;   // after that the device goes dark
 inline constexpr int kMaxResends = 4;                 // rounds of re-sent slices in one volume
 
-// A wire struct from bytes; `bytes` must hold it.
+// Reads a wire struct from bytes. Requires: `bytes` are long enough.
 template <typename T>
 T Load(std::span<const std::byte> bytes) {
   T value;

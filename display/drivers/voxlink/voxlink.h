@@ -1,4 +1,4 @@
-// A voxlink display on the machine's USB.
+// Creates a voxlink display on the machine's USB.
 #pragma once
 
 #include <memory>
@@ -16,8 +16,8 @@ namespace voxeld::display::voxlink {
 absl::StatusOr<std::unique_ptr<Display>> Create(const DisplayOptions& options,
                                                 const DriverContext& context);
 
-// The device that `options` mean and its conformance suite. Where they say more than which device it
-// is, a case holds it to them.
+// Returns the device that `options` select and its conformance suite. Options that describe more
+// than which device it is are checked by a case.
 absl::StatusOr<std::vector<conformance::Subject>> Verify(const DisplayOptions& options,
                                                          const DriverContext& context);
 

@@ -11,17 +11,17 @@
 namespace voxeld::display::voxlink {
 namespace {
 
-// A device whose set-up failed this often in a row has its port reset.
+// After this many consecutive failures of its set-up, the device's port is reset.
 constexpr int kFailuresToReset = 3;
 constexpr sync::TimeNs kReadyLimit = sync::kSecond;
-// Earlier than the protocol's 100 ms, for the jitter of the owner's thread.
+// Earlier than the protocol's 100 ms, to allow for jitter of the owner's thread.
 constexpr sync::TimeNs kKeepaliveAfter = 70 * sync::kMillisecond;
 constexpr sync::TimeNs kClockWindow = 5 * sync::kSecond;
 double NominalPeriod(const DisplayInfo& info) {
   return static_cast<double>(sync::kSecond) / std::max(info.volumes_per_second, 1e-3);
 }
 
-// An interface of the protocol with its two endpoints, in a configuration descriptor.
+// Checks that a configuration descriptor has the protocol's interface with its two endpoints.
 absl::Status CheckDescriptor(std::span<const std::byte> descriptor) {
   bool ours = false, out = false, in = false;
   while (descriptor.size() >= 2) {
@@ -58,7 +58,7 @@ VoxlinkDisplay::VoxlinkDisplay(DisplayInfo info, std::unique_ptr<UsbTransport> t
 VoxlinkDisplay::~VoxlinkDisplay() { Stop(); }
 
 void VoxlinkDisplay::ClockMap::Note(uint64_t device_ns, sync::TimeNs host_ns) {
-  // A device may say anything: it wraps.
+  // A device may report anything: this wraps around.
   const auto difference = static_cast<int64_t>(static_cast<uint64_t>(host_ns) - device_ns);
   if (!known) {
     known = true;
@@ -111,7 +111,7 @@ sync::TimeNs VoxlinkDisplay::DoTick(sync::TimeNs now) {
   mutable_stats().transfers_failed += link_.TakeFailures();
   sweeps_.Advance(now);
   if (phase_ == Phase::kDetached && link_.transport().TakeArrival()) {
-    // A device that comes and goes is tried no faster than one that fails.
+    // A device that comes and goes is retried no faster than one that fails.
     attach_at_ = std::min(attach_at_, failed_at_ + retry_.first());
   }
   if (phase_ == Phase::kDetached && now >= attach_at_) TryAttach(now);
@@ -121,7 +121,7 @@ sync::TimeNs VoxlinkDisplay::DoTick(sync::TimeNs now) {
 
 sync::TimeNs VoxlinkDisplay::Advance(sync::TimeNs now) {
   if (phase_ == Phase::kDetached) return attach_at_;
-  if (phase_ == Phase::kSettingUp) return sync::kNever;  // requests have their own time limit
+  if (phase_ == Phase::kSettingUp) return sync::kNever;  // requests have their own timeout
   if (phase_ == Phase::kWaitingReady) {
     if (now < ready_by_) return ready_by_;
     OnLinkFailed("the device did not start its session");
@@ -134,7 +134,8 @@ sync::TimeNs VoxlinkDisplay::Advance(sync::TimeNs now) {
 }
 
 sync::TimeNs VoxlinkDisplay::KeepAlive(sync::TimeNs now) {
-  if (link_.bulk_in_flight() > 0 || link_.recovering()) return sync::kNever;  // a completion wakes
+  // a completion wakes the display
+  if (link_.bulk_in_flight() > 0 || link_.recovering()) return sync::kNever;
   const sync::TimeNs due = link_.last_sent() + kKeepaliveAfter;
   if (now < due) return due;
   if (link_.Room() < sizeof(PacketHeader)) return now + kKeepaliveAfter;
@@ -228,7 +229,7 @@ void VoxlinkDisplay::Configure() {
   const bool limits = (capabilities_.fixed.features & kFeaturePowerLimit) != 0;
   KeepsPowerLimit(limits);
   configured_power_limit_w_ = power_limit_w();
-  if (limits) DoSetPowerLimit(power_limit_w());  // one from before may be in force
+  if (limits) DoSetPowerLimit(power_limit_w());  // an earlier limit may still be in force
   configured_blank_ = blanked();
   link_.Write(Request::kSetBlank, blanked() ? 1 : 0);
   link_.Write(Request::kStart, 0);
@@ -238,7 +239,7 @@ void VoxlinkDisplay::Ready() {
   phase_ = Phase::kReady;
   failed_setups_ = 0;
   ++mutable_stats().attaches;
-  // What was asked for since the device was configured.
+  // Apply settings that were requested since the device was configured.
   if ((capabilities_.fixed.features & kFeatureBrightness) != 0 &&
       brightness() != configured_brightness_) {
     link_.Write(Request::kSetBrightness, WireBrightness(brightness()));
@@ -253,7 +254,7 @@ void VoxlinkDisplay::Ready() {
 void VoxlinkDisplay::OnReply(Request request, std::span<const std::byte> data) {
   if (request == Request::kGetCapabilities) return OnCapabilities(data);
   if (request != Request::kStart) return;
-  // The session is there: READY waits for the first read.
+  // The session exists: READY waits for the first read.
   writer_.Restart();
   sending_ = Sending{};
   last_number_ = complete_number_ = complete_frame_ = dropped_ordered_ = 0;
@@ -282,7 +283,7 @@ void VoxlinkDisplay::DoSetPowerLimit(double watts) {
 
 absl::Status VoxlinkDisplay::DoSetBlank(bool blank) {
   if (!blank && holding()) {
-    // Dark until the genlock's next volume: a device that is lit again shows its old one.
+    // Stay dark until the genlock's next volume: an unblanked device would show its old one.
     OnLinkFailed("begins anew after it was blanked");
     attach_at_ = clock().Now();
     Wake();
@@ -339,9 +340,9 @@ void VoxlinkDisplay::OnEvent(const EventHeader& header, std::span<const std::byt
       return OnOrdered(Load<OrderedEvent>(body), (header.flags & kOrderTaken) != 0);
     case EventType::kCredit:
     case EventType::kHealth:
-    case EventType::kError:  // what an error damaged, VOLUME_END brings to light
+    case EventType::kError:  // VOLUME_END reveals what an error damaged
     case EventType::kLight:
-    default:  // of a later minor version
+    default:  // from a later minor version
       return;
   }
   OnLinkFailed(

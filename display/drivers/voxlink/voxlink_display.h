@@ -1,5 +1,5 @@
-// The driver of voxlink 1.x displays, over any USB transport. README.md has its ways; the protocol
-// is in docs/protocols/voxlink.md.
+// The driver of voxlink 1.x displays, over any USB transport. README.md describes its behaviour;
+// the protocol is in docs/protocols/voxlink.md.
 #pragma once
 
 #include <cstdint>
@@ -17,13 +17,13 @@
 
 namespace voxeld::display::voxlink {
 
-// What a device says of sweeps farther from now is not believed.
+// Reports of sweeps farther from now than this are rejected.
 inline constexpr sync::TimeNs kOldestSweep = 60 * sync::kSecond;
 
 class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
  public:
-  // `info` is what the device must be: attaching to another ends in a state reason that names both. `calibrated`: but for how it
-  // was put together (CheckCapabilities).
+  // `info` is the required device: attaching to another ends in a state reason that names both.
+  // `calibrated`: properties of its assembly may differ (CheckCapabilities).
   VoxlinkDisplay(DisplayInfo info, std::unique_ptr<UsbTransport> transport, sync::Clock& clock,
                  VoxlinkLink::Options options = {}, bool calibrated = false);
   ~VoxlinkDisplay() override;
@@ -36,40 +36,40 @@ class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
   enum class Phase : uint8_t { kDetached, kSettingUp, kWaitingReady, kReady };
   enum class Stage : uint8_t { kIdle, kBegin, kPictures, kEnd, kAwaitComplete, kHeld, kAwaitShown };
 
-  // The volume on its way.
+  // The volume being sent.
   struct Sending {
     Stage stage = Stage::kIdle;
     uint64_t number = 0;  // on the wire
     uint64_t base = 0;
     std::vector<uint32_t> pictures;  // to send in this round
-    size_t next = 0;                 // of `pictures`
-    size_t offset = 0;               // in that picture
+    size_t next = 0;                 // index into `pictures`
+    size_t offset = 0;               // in that slice image
     std::vector<bool> announced;
     std::vector<PictureRun> missing;  // listed so far
-    int rounds = 0;                   // of re-sending
-    int queries = 0;                  // without an answer
+    int rounds = 0;                   // rounds of re-sending
+    int queries = 0;                  // unanswered
     uint64_t bytes = 0;
     sync::TimeNs last_byte_ns = 0;
     uint64_t end_mark = 0;       // kAwaitComplete: link_.sent() after VOLUME_END
-    sync::TimeNs answer_by = 0;  // when to ask at the latest; 0: not known yet
+    sync::TimeNs answer_by = 0;  // latest time to ask; 0: not known yet
     sync::TimeNs asked_ns = 0;
     bool hold = false;
-    uint64_t ordered_sweep = 0;  // in the newest order to show it; 0: none
+    uint64_t ordered_sweep = 0;  // in the newest order to show the volume; 0: none
     sync::TimeNs ordered_at = 0;
   };
 
-  // A packet that is no part of a volume on its way: ABORT, SHOW or DROP.
+  // A packet outside a volume being sent: ABORT, SHOW or DROP.
   struct Command {
     PacketType type;
     uint64_t volume;
-    uint64_t sweep = 0;  // of SHOW
+    uint64_t sweep = 0;  // for SHOW
     uint32_t ahead = 0;
   };
 
-  // Device's clock → ours: the smallest difference seen lately is the least delayed one.
+  // Maps the device's clock to ours: the smallest recent difference is the least delayed one.
   struct ClockMap {
     bool known = false;
-    int64_t offset = 0, coming = 0;  // of the last whole window and of the one that runs
+    int64_t offset = 0, coming = 0;  // of the last complete window and of the current one
     sync::TimeNs window_end = 0;
     void Note(uint64_t device_ns, sync::TimeNs host_ns);
     sync::TimeNs ToHost(uint64_t device_ns) const {
@@ -129,9 +129,9 @@ class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
   sync::TimeNs attach_at_ = 0;
   sync::TimeNs failed_at_ = 0;
   sync::Backoff retry_{100 * sync::kMillisecond, 5 * sync::kSecond};
-  int failed_setups_ = 0;  // in a row
+  int failed_setups_ = 0;  // consecutive
   sync::TimeNs ready_by_ = 0;
-  double configured_brightness_ = 1;  // what the device was given
+  double configured_brightness_ = 1;  // sent to the device
   double configured_power_limit_w_ = 0;
   bool configured_blank_ = false;
   std::vector<std::byte> capability_bytes_;
@@ -139,12 +139,12 @@ class VoxlinkDisplay final : public Display, private VoxlinkLink::Client {
 
   PacketWriter writer_;
   Sending sending_;
-  uint64_t dropped_ordered_ = 0;   // dropped after it was ordered shown: it may be shown yet
+  uint64_t dropped_ordered_ = 0;   // dropped after it was ordered shown: it may still be shown
   uint64_t last_number_ = 0;       // wire number of the newest volume of this session
   uint64_t complete_number_ = 0;   // the last one that the device completed; 0: none
-  uint64_t complete_frame_ = 0;    // and the frame that it was
-  size_t fragment_ = 0;            // the most of a picture that one packet carries
-  std::vector<Command> commands_;  // that have to go out
+  uint64_t complete_frame_ = 0;    // the frame that it was
+  size_t fragment_ = 0;            // the most bytes of a slice image in one packet
+  std::vector<Command> commands_;  // waiting to be sent
 
   ClockMap clock_map_;
   sync::SweepClock sweeps_;

@@ -8,11 +8,11 @@
 namespace voxeld::display::voxlink {
 namespace {
 
-constexpr int kEventReads = 8;  // interrupt transfers that wait at any time
+constexpr int kEventReads = 8;  // interrupt transfers pending at any time
 constexpr int kMostEventFailures = 16;
 constexpr uint16_t kMostConfiguration = 1024;
-constexpr sync::TimeNs kTryAgain = 10 * sync::kMillisecond;  // where there was no room
-constexpr size_t kKeptFree = 8192;  // of the transport's limit, for requests and events
+constexpr sync::TimeNs kTryAgain = 10 * sync::kMillisecond;  // after there was no room
+constexpr size_t kKeptFree = 8192;  // of the transport's limit, reserved for requests and events
 
 }  // namespace
 
@@ -53,7 +53,7 @@ void VoxlinkLink::Fail(const std::string& reason) {
   failure_ = reason;
 }
 
-// Poll tries again, for as long as an answer would be waited for.
+// Poll tries again, for as long as it would wait for an answer.
 void VoxlinkLink::NoRoom(const absl::Status& status) {
   const sync::TimeNs now = clock_.Now();
   if (refused_since_ == 0) refused_since_ = now;
@@ -87,7 +87,7 @@ void VoxlinkLink::SendControl() {
     if ((request.setup.request_type & 0x80) != 0) transfer.length = request.setup.length;
     transfer.timeout = options_.control_timeout;
     id = transport_->Submit(std::move(transfer));
-    // What is refused was not moved.
+    // A refused transfer was not moved from.
     if (!id.ok()) request.data = std::move(transfer.data);  // NOLINT(bugprone-use-after-move)
   }
   if (absl::IsResourceExhausted(id.status())) return NoRoom(id.status());
@@ -184,7 +184,7 @@ void VoxlinkLink::BeginSession(uint32_t receive_buffer) {
   receive_buffer_ = receive_buffer;
   next_event_ = 0;
   sent_ = 0;
-  credit_limit_ = 0;  // READY brings the first
+  credit_limit_ = 0;  // READY brings the first credit
   last_sent_ = last_progress_ = clock_.Now();
   PostEventReads();
 }
@@ -226,7 +226,7 @@ void VoxlinkLink::OnEventDone(TransferCompletion& completion) {
         clear.endpoint = kInterruptIn;
         Enqueue(std::move(clear));
       }
-      AskStatus();  // an event may be lost; the next read is posted when the answer is here
+      AskStatus();  // an event may be lost; the next read is posted when the answer has come
       return;
   }
   event_failures_ = 0;
@@ -259,7 +259,7 @@ void VoxlinkLink::OnStatusReply(Kind kind, std::span<const std::byte> data) {
     credit_limit_ = status.credit_limit;
     last_progress_ = clock_.Now();
   }
-  // Asked when nothing was in flight, and nothing was sent since.
+  // Valid because it was requested when nothing was in flight, and nothing was sent since.
   if (kind == Kind::kRecoveryStatus) {
     sent_ = status.bytes_received;
     recovery_ = Recovery::kNone;
@@ -301,7 +301,7 @@ void VoxlinkLink::SubmitBulk(TransferBytes buffer) {
   transfer.timeout = options_.bulk_timeout;
   const absl::StatusOr<TransferId> id = transport_->Submit(std::move(transfer));
   if (absl::IsResourceExhausted(id.status())) {
-    // What is refused was not moved.
+    // A refused transfer was not moved from.
     held_ = std::move(transfer.data);  // NOLINT(bugprone-use-after-move)
     return;
   }
@@ -347,7 +347,7 @@ void VoxlinkLink::Recover() {
 
 void VoxlinkLink::StepRecovery() {
   if (recovery_ != Recovery::kDraining || !bulk_.empty()) return;
-  held_.reset();  // lost with what was before it
+  held_.reset();  // lost with the bytes before it
   if (std::exchange(halted_, false)) {
     ControlRequest clear;
     clear.kind = Kind::kClearHalt;
@@ -375,7 +375,7 @@ void VoxlinkLink::Poll() {
   }
   completions.clear();
   drained_ = std::move(completions);
-  // What there was no room for.
+  // Retry what there was no room for.
   if (generation == generation_) {
     SendControl();
     if (events_held_) PostEventReads();

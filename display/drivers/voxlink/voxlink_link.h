@@ -1,7 +1,7 @@
 // The driver's end of the cable: requests one at a time, events, and bulk bytes within the device's
-// credit (docs/protocols/voxlink.md §7) and the transport's limit. It finds its feet again after a
-// failed transfer: nothing more goes out until all that was in flight has ended, the halt is
-// cleared, and the device has said how many bytes it has.
+// credit (docs/protocols/voxlink.md §7) and the transport's limit. It recovers from a failed
+// transfer: nothing more is sent until everything in flight has ended, the halt is cleared, and the
+// device has reported how many bytes it received.
 //
 // Bound to the display's thread; never blocks.
 #pragma once
@@ -27,22 +27,22 @@ inline constexpr size_t kTransferBytes = size_t{256} << 10;
 
 class VoxlinkLink {
  public:
-  // Called from Poll only. Any of them may call the link, Close included.
+  // Called from Poll only. Each of them may call the link, including Close.
   struct Client {
     virtual ~Client() = default;
     virtual void OnEvent(const EventHeader& header, std::span<const std::byte> body) = 0;
-    // The answer to Read and Write; a refused or failed one goes to OnLinkFailed.
+    // Delivers the answer to Read and Write; if one is refused or fails, OnLinkFailed is called.
     virtual void OnReply(Request request, std::span<const std::byte> data) = 0;
     virtual void OnConfiguration(std::span<const std::byte> descriptor) = 0;
-    // The answer to AskStatus and Recover.
-    // `settled`: all that was sent has been received and consumed.
+    // Delivers the answer to AskStatus and Recover. `settled`: everything sent has been received
+    // and consumed.
     virtual void OnStatus(const Status& status, bool settled) = 0;
-    // The device is gone, or does not behave. The link must be closed.
+    // The device is gone, or misbehaves. The link must be closed.
     virtual void OnLinkFailed(const std::string& reason) = 0;
   };
 
   struct Options {
-    // Of bulk transfers; the transport's limit holds too.
+    // Limit of bulk transfers; the transport's limit also applies.
     size_t max_bytes_in_flight = size_t{4} << 20;
     sync::TimeNs control_timeout = sync::kSecond;
     sync::TimeNs bulk_timeout = 2 * sync::kSecond;
@@ -64,36 +64,37 @@ class VoxlinkLink {
   void Read(Request request, uint16_t value, uint16_t length);
   void Write(Request request, uint16_t value, std::span<const std::byte> data = {});
 
-  // Begins to listen for events of a new session: credit, counts and numbers start anew.
+  // Starts to listen for events of a new session; credit, counts and numbers restart.
   void BeginSession(uint32_t receive_buffer);
   void AskStatus();
   void Recover();
 
-  // When Poll has something to try again; kNever if nothing.
+  // Returns when Poll must retry something; kNever if nothing.
   sync::TimeNs NextTry() const;
 
-  // Bytes that may be handed over now: 0 while recovering or without a session.
+  // Returns how many bytes may be handed over now: 0 while recovering or without a session.
   size_t Room() const;
-  // An empty buffer with memory for a transfer.
+  // Returns an empty buffer with memory for a transfer.
   TransferBytes TakeBuffer();
-  // Whole packets; at most Room(). What the transport has no room for, because other devices took
-  // it, waits here.
+  // Sends whole packets, at most Room() bytes. If the transport has no room, because other devices
+  // took it, the buffer waits here.
   void Send(TransferBytes buffer);
   bool recovering() const { return recovery_ != Recovery::kNone; }
   size_t bulk_in_flight() const { return bulk_bytes_; }
-  // The most bytes that may ever be in flight.
+  // Returns the most bytes that may ever be in flight.
   size_t bulk_limit() const;
   uint64_t sent() const { return sent_; }  // bytes of this session
-  // Bytes that the device is known to have consumed.
+  // Returns the bytes that the device is known to have consumed.
   uint64_t consumed() const {
     return credit_limit_ > receive_buffer_ ? credit_limit_ - receive_buffer_ : 0;
   }
   sync::TimeNs last_sent() const { return last_sent_; }          // when bytes were last handed over
   sync::TimeNs last_progress() const { return last_progress_; }  // when the device last gave credit
-  bool failed() const { return failed_; }                        // the next Poll tells
-  // Transfers that ended otherwise than they should, by whatever the device or the cable did, since the last call.
+  bool failed() const { return failed_; }                        // the next Poll reports it
+  // Returns how many transfers failed since the last call, for any reason of the device or the
+  // cable.
   uint64_t TakeFailures() { return std::exchange(failures_, 0); }
-  // The device did what it was asked to: failures are counted anew.
+  // The device did what was requested: resets the count of failures.
   void NoteProgress();
 
   // Drains completions into the client's functions.
@@ -134,9 +135,9 @@ class VoxlinkLink {
   Client* const client_;
   const Options options_;
 
-  uint64_t generation_ = 0;  // of Open: what comes from before a Close is stale
+  uint64_t generation_ = 0;  // counts Open: completions from before a Close are stale
   bool failed_ = false;
-  std::string failure_;  // to be told by Poll
+  std::string failure_;  // to be reported by Poll
   std::deque<ControlRequest> controls_;
   TransferId control_id_ = 0;  // 0: none in flight
   std::vector<TransferCompletion> drained_;
@@ -145,8 +146,9 @@ class VoxlinkLink {
   uint32_t receive_buffer_ = 0;
   uint32_t next_event_ = 0;
   int event_reads_ = 0;
-  bool events_held_ = false;        // there was no room for a read
-  sync::TimeNs refused_since_ = 0;  // there is no room for a request or a read; 0: there is
+  bool events_held_ = false;  // there was no room for a read
+  // when a request or a read first lacked room; 0: none does
+  sync::TimeNs refused_since_ = 0;
   int event_failures_ = 0;
   bool status_asked_ = false;
 

@@ -1,4 +1,4 @@
-// VoxlinkDisplay's way with volumes: docs/protocols/voxlink.md §5 and §10.
+// How VoxlinkDisplay sends volumes: docs/protocols/voxlink.md §5 and §10.
 
 #include <algorithm>
 #include <cmath>
@@ -21,7 +21,7 @@ void VoxlinkDisplay::DoSend(const SliceFramePtr& frame, bool full) {
 }
 
 void VoxlinkDisplay::Begin(const SliceFramePtr& frame, bool full) {
-  // What was counted for this frame so far stays (it may be sent anew under another number).
+  // Keep the counts of this frame (it may be sent again under another number).
   const uint64_t bytes = sending_.bytes;
   const int rounds = sending_.rounds;
   sending_ = Sending{};
@@ -196,7 +196,7 @@ void VoxlinkDisplay::OnShown(uint64_t volume, uint64_t start_ns, bool dark) {
   retry_.Reset();
   if (dark && !blanked()) return Lose("the device was dark when the volume's sweep began");
   const Sending done = std::exchange(sending_, Sending{});
-  // A device may say anything.
+  // A device may report anything.
   const sync::TimeNs now = clock().Now();
   const sync::TimeNs shown =
       std::clamp(clock_map_.ToHost(start_ns), now - kOldestSweep, now + kOldestSweep);
@@ -226,7 +226,7 @@ void VoxlinkDisplay::OnMissing(const EventHeader& header, const MissingEvent& ev
   }
   mutable_stats().slices_resent += sending_.pictures.size();
   sending_.stage = sending_.pictures.empty() ? Stage::kEnd : Stage::kPictures;
-  link_.Recover();  // bytes were lost: how many has the device?
+  link_.Recover();  // bytes were lost: ask how many the device received
 }
 
 void VoxlinkDisplay::OnRefused(const VolumeEvent& event, bool dropped) {
@@ -256,12 +256,12 @@ void VoxlinkDisplay::OnStatus(const Status& status, bool settled) {
     return Ready();  // READY itself was lost
   }
   if (sending_.stage == Stage::kIdle) return;
-  sending_.end_mark = std::min(sending_.end_mark, link_.sent());  // what was lost is not counted
+  sending_.end_mark = std::min(sending_.end_mark, link_.sent());  // lost bytes are not counted
   if (status.shown == sending_.number) return OnShown(status.shown, status.shown_start_ns, false);
   if (status.last_complete == sending_.number) return OnComplete(status.last_complete);
   if (!settled || sending_.stage == Stage::kBegin) return;
   if (status.filling != sending_.number) return SendAgain("its beginning was lost");
-  if (sending_.stage == Stage::kAwaitComplete) {  // the list of what is missing was lost: ask again
+  if (sending_.stage == Stage::kAwaitComplete) {  // the list of missing images was lost: ask again
     sending_.missing.clear();
     sending_.stage = Stage::kEnd;
   }

@@ -32,11 +32,11 @@ Lattice EmptyLattice(const PixelNumbers& pixels, double pitch_mm) {
   return lattice;
 }
 
-// The place of the chain's `index`-th light before the cube is flipped and turned.
+// Returns the place of the chain's `index`-th light before the cube is flipped and turned.
 std::array<int32_t, 3> PlaceOf(const CubeWiring& wiring, int32_t index) {
   const auto along = [&](int n) { return wiring.size[static_cast<size_t>(wiring.order[n])]; };
   int32_t fast = index % along(0);
-  const int32_t row = index / along(0);  // of the whole chain
+  const int32_t row = index / along(0);  // row in the whole chain
   int32_t middle = row % along(1);
   const int32_t slow = row / along(1);
   const bool rows = wiring.serpentine != CubeWiring::Serpentine::kNone;
@@ -128,7 +128,7 @@ absl::StatusOr<std::string> ReadFile(const std::string& path) {
   return text;
 }
 
-// An order of the three axes: "xyz".
+// Reads an order of the three axes: "xyz".
 void ReadOrder(OptionReader& reader, CubeWiring& wiring) {
   const std::string text = reader.Text("order", "xyz");
   std::string sorted = text;

@@ -61,7 +61,7 @@ TransferBytes Frame(uint8_t level, size_t begin = 0, size_t end = kFramePackets)
   return out;
 }
 
-// A frame is counted when the refresh has come for which it waits.
+// A frame is counted at the refresh for which it waits.
 void ExpectFrames(Probe& probe, uint32_t before, uint32_t frames) {
   uint32_t got = 0;
   for (int i = 0; probe.check().ok() && i < 100; ++i) {
@@ -69,14 +69,14 @@ void ExpectFrames(Probe& probe, uint32_t before, uint32_t frames) {
     if (got >= frames) break;
     probe.Pause(10 * kMillisecond);
   }
-  probe.Pause(20 * kMillisecond);  // and no more
+  probe.Pause(20 * kMillisecond);  // and no more frames
   got = Counter(probe, kFrameCounter) - before;
   if (probe.check().ok()) {
     probe.check().Equal("frames that the board counts:", frames, got);
   }
 }
 
-// The next frame is taken and counted.
+// The next frame must be accepted and counted.
 void MustWork(Probe& probe) {
   const uint32_t before = Counter(probe, kFrameCounter);
   Send(probe, "a frame", Frame(0));
@@ -175,7 +175,7 @@ void Ignored(Probe& probe) {
 
 void ShortPacket(Probe& probe) {
   for (const size_t size : {size_t{1}, size_t{63}, size_t{65}}) {
-    // 0xC0: of type 3, whatever a board makes of a short one.
+    // 0xC0: type 3, however a board interprets a short packet.
     const std::vector<std::byte> bytes(size, std::byte{0xC0});
     const Answer answer = probe.Bulk(kBulkOut, bytes);
     probe.check().Expect(answer.ok(), absl::StrCat("a transfer of ", size, " bytes ends"),
@@ -191,7 +191,7 @@ void Paced(Probe& probe) {
   const uint32_t refreshes = Counter(probe, kRefreshCounter);
   for (int i = 0; probe.check().ok() && i < kFrames; ++i) Send(probe, "a frame", Frame(0));
   const uint32_t passed = Counter(probe, kRefreshCounter) - refreshes;
-  // The last one, and the one before, may still wait.
+  // The last frame, and the one before, may still wait.
   probe.check().Expect(
       passed + 2 >= kFrames,
       absl::StrCat("a refresh for each frame: ", kFrames - 2, " or more for ", kFrames, " frames"),
@@ -208,7 +208,8 @@ void TablesDoNotWait(Probe& probe) {
   Send(probe, "40 colour tables", tables);
   const sync::TimeNs took = probe.Now() - begin;
   const uint32_t passed = Counter(probe, kRefreshCounter) - refreshes;
-  // 64,000 bytes take 53 ms at full speed: some 20 refreshes. Were each waited for, it were 40.
+  // 64,000 bytes take 53 ms at full speed: some 20 refreshes. If each waited for one, there would
+  // be 40.
   probe.check().Expect(passed < kTables * 3 / 4,
                        "fewer refreshes than three for each four colour tables",
                        absl::StrCat(passed, " refreshes, ", took / kMillisecond, " ms"));
@@ -278,7 +279,7 @@ void Reset(Probe& probe) {
   MustWork(probe);
 }
 
-// Two black frames, so that no fade holds one before, and a table of darkness.
+// Sends two black frames, so that no fade holds an earlier one, and a table of darkness.
 absl::Status Rest(Probe& probe) {
   probe.ClearHalt(kBulkOut);
   TransferBytes bytes;

@@ -1,5 +1,5 @@
-// The Fadecandy's conformance suite: what docs/protocols/fadecandy.md says of a board and a host can
-// see over USB. What a board lights cannot be seen.
+// The Fadecandy's conformance suite: the requirements of docs/protocols/fadecandy.md on a board
+// that a host can observe over USB. The light of a board cannot be observed.
 #pragma once
 
 #include "display/conformance/suite.h"

@@ -9,7 +9,7 @@ static const uint64_t kHealthPeriodNs = 1000000000;
 
 void voxlink_queue(struct voxlink_device* d, uint8_t type, uint8_t flags, const uint8_t* body,
                    uint8_t length) {
-  if (d->events_count == VOXLINK_EVENTS) {  // the oldest goes, its number stays unused
+  if (d->events_count == VOXLINK_EVENTS) {  // drop the oldest; its number stays unused
     d->events_first = (d->events_first + 1) % VOXLINK_EVENTS;
     --d->events_count;
     ++d->next_event;
@@ -22,7 +22,7 @@ void voxlink_queue(struct voxlink_device* d, uint8_t type, uint8_t flags, const 
   memcpy(event->body, body, length);
 }
 
-// COMPLETE, ABORTED and DROPPED.
+// Queues COMPLETE, ABORTED or DROPPED.
 void voxlink_tell(struct voxlink_device* d, uint8_t type, uint64_t volume, uint32_t reason) {
   uint8_t body[16] = {0};
   put(body, volume, 8);
@@ -56,7 +56,7 @@ size_t voxlink_event(struct voxlink_device* d, uint64_t now_ns, uint8_t out[64])
     event = d->events[d->events_first];
     d->events_first = (d->events_first + 1) % VOXLINK_EVENTS;
     --d->events_count;
-  } else if (d->sweep_due) {  // the newest alone
+  } else if (d->sweep_due) {  // only the newest
     d->sweep_due = false;
     event.type = SWEEP;
     event.length = 32;
@@ -134,7 +134,7 @@ const uint8_t* voxlink_light(const struct voxlink_device* d) {
 
 // ---- requests: §4
 
-// Bytes of a picture; 0: there is no such.
+// Returns the bytes of a slice image; 0: no such format.
 static uint32_t size_of(uint8_t format, uint8_t bits, uint32_t width, uint32_t height) {
   const uint32_t planes = bits == 0 ? 1 : bits;
   if (format == 0) return 3 * width * height;

@@ -22,7 +22,8 @@ static uint32_t crc32c(const uint8_t* bytes, size_t count) {
 
 // ---- volumes: §5
 
-// Runs of pictures that are not whole, those joined that `gap` or fewer others lie between; told, if so asked.
+// Returns the number of runs of incomplete images, joining those with `gap` or fewer others in
+// between; queues them as events if `told`.
 static uint32_t missing_runs(struct voxlink_device* d, uint32_t gap, bool told) {
   uint8_t body[40] = {0};
   uint32_t runs = 0, in_event = 0, first = 0, end = 0;
@@ -30,7 +31,7 @@ static uint32_t missing_runs(struct voxlink_device* d, uint32_t gap, bool told) 
     const bool over = p == d->pictures;
     if (!over && (d->memory.filled[p] == kNotFollowing || d->memory.filled[p] == d->picture_bytes))
       continue;
-    if (end != 0 && (over || p - end > gap)) {  // a run is whole
+    if (end != 0 && (over || p - end > gap)) {  // a run is complete
       ++runs;
       put(body + 16 + 8 * in_event, first, 4);
       put(body + 20 + 8 * in_event, end - first, 4);
@@ -149,7 +150,7 @@ static void end(struct voxlink_device* d, uint64_t volume) {
   voxlink_tell(d, COMPLETE, volume, 0);
 }
 
-// SHOW AHEAD, of a device that takes it.
+// Returns whether the packet is SHOW AHEAD, and the device supports it.
 static bool is_ahead(const struct voxlink_device* d) {
   return (says(d, FEATURES) & 16) != 0 && (d->header[5] & 1) != 0;
 }
@@ -236,7 +237,7 @@ void voxlink_bulk(struct voxlink_device* d, uint64_t now_ns, const uint8_t* byte
       if (d->header_have < HEADER_BYTES) continue;
       if (get(d->header, 4) != kMagic || get(d->header + 28, 4) > says(d, PAYLOAD) ||
           crc32c(d->header, 36) != get(d->header + 36, 4)) {
-        uint32_t skip = 1;  // to where the magic could begin
+        uint32_t skip = 1;  // skip to where the magic could begin
         while (skip < HEADER_BYTES && d->header[skip] != (kMagic & 0xFF)) ++skip;
         memmove(d->header, d->header + skip, HEADER_BYTES - skip);
         d->header_have -= skip;

@@ -1,4 +1,4 @@
-// What voxlink_device.c and voxlink_packets.c share; not for the firmware.
+// Shared by voxlink_device.c and voxlink_packets.c; not for use by the firmware.
 #pragma once
 
 #include "voxlink_device.h"
@@ -41,7 +41,7 @@ static inline uint8_t* volume_at(const struct voxlink_device* d, uint8_t place) 
   return d->memory.volumes + place * d->memory.volume_bytes;
 }
 
-// An event for the queue; with what COMPLETE, ABORTED and DROPPED say; ERROR; LIGHT.
+// Queue an event; one for COMPLETE, ABORTED or DROPPED; ERROR; LIGHT.
 void voxlink_queue(struct voxlink_device* d, uint8_t type, uint8_t flags, const uint8_t* body,
                    uint8_t length);
 void voxlink_tell(struct voxlink_device* d, uint8_t type, uint64_t volume, uint32_t reason);

@@ -13,7 +13,7 @@ std::vector<std::byte> Bitmap(const Session& session, const std::vector<uint32_t
   return bits;
 }
 
-// A volume that is complete, with `number`.
+// Sends a complete volume with `number`.
 void Complete(Session& session, uint64_t number) {
   session.Whole(number);
   session.ExpectComplete(number);
@@ -76,7 +76,7 @@ void WrongBase(Probe& probe) {
     const uint64_t volume = base == 1 ? 3 : base == 77 ? 4 : 5;
     session.Begin(volume, base, Bitmap(session, {0}));
     session.ExpectAborted(volume, Reason::kBadBase);
-    session.Picture(volume, 0);  // passed over in silence
+    session.Picture(volume, 0);  // ignored without an event
     session.End(volume);
     session.ExpectAborted(volume, Reason::kBadBase);
   }

@@ -10,7 +10,7 @@ namespace voxeld::display::voxlink {
 
 using Cases = std::vector<conformance::Case>;
 
-// That the device can be driven as a display's options say.
+// Checks that the device can be driven as a display's options say.
 conformance::Case ConfiguredCase(const Configured& configured);
 
 void AddUsbCases(Cases& cases);      // §3

@@ -29,7 +29,7 @@ void Numbering(Probe& probe) {
   }
   const Status status = session.GetStatus();
   if (!session.ok()) return;
-  // Some may be on their way.
+  // Some events may be in flight.
   session.Pause(20 * kMillisecond);
   const uint32_t next = session.log().back().header.sequence + 1;
   probe.check().Expect(status.event_sequence <= next && status.event_sequence + 64 > next,
@@ -44,7 +44,7 @@ void Unread(Probe& probe) {
   for (uint64_t i = 0; i < 500; ++i) session.End(100 + i);
   session.Settle();
   session.SetListening(true);
-  // Each takes an interval of the bus: all that there are, as long as they go on coming.
+  // Each event takes an interval of the bus: read as long as they keep coming.
   const sync::TimeNs deadline = probe.Now() + 10 * kSecond;
   for (size_t before = 1, now = 0; session.ok() && now != before && probe.Now() < deadline;) {
     before = now;
@@ -54,7 +54,7 @@ void Unread(Probe& probe) {
   session.RoundTrip();
   const std::vector<Event>& log = session.log();
   if (!session.ok()) return;
-  // Whatever was thrown away is a gap, before what was kept.
+  // Discarded events must leave a gap before those that were kept.
   size_t aborted = 0;
   for (const Event& event : log) aborted += event.type() == EventType::kAborted ? 1 : 0;
   const uint32_t unused = log.back().header.sequence + 1 - static_cast<uint32_t>(log.size());
@@ -94,7 +94,7 @@ void Sweeps(Probe& probe) {
     if (!probe.check().ok()) return;
     const auto want = static_cast<int64_t>(b.sweep - a.sweep) * session.period();
     const auto got = static_cast<int64_t>(b.start_ns - a.start_ns);
-    // A motor is no clock: 10 %.
+    // A motor is not exact: allow 10 %.
     probe.check().Expect(std::abs(got - want) <= want / 10,
                          absl::StrCat("sweep ", b.sweep, " begins ", want, " ns after sweep ",
                                       a.sweep, ", by the mode's rate, within 10 %"),
@@ -168,7 +168,7 @@ void Underruns(Probe& probe) {
 
 // ---- credit
 
-// Bytes of a volume that is never ended, until more than the receive buffer has gone out.
+// Sends bytes of a volume that is never ended, until more than the receive buffer was sent.
 void SendMoreThanTheBuffer(Session& session) {
   const uint32_t buffer = session.capabilities().fixed.receive_buffer;
   session.Begin(1);
@@ -187,7 +187,7 @@ void CreditIsTold(Probe& probe) {
         absl::StrCat("the receive buffer has ", buffer, " bytes; at most 64 MiB are filled"));
   }
   SendMoreThanTheBuffer(session);
-  // No request is made that could tell it instead.
+  // Make no request that could report it instead.
   const uint64_t least = session.sent() + buffer - buffer / 4;
   session.Await(absl::StrCat("an event with credit_limit above ", least,
                              ": no more than a quarter of the buffer is untold"),
@@ -202,7 +202,7 @@ void CreditIsExact(Probe& probe) {
   session.SetKeepalive(false);
   const uint32_t buffer = session.capabilities().fixed.receive_buffer;
   for (const size_t size : {size_t{1}, size_t{39}, size_t{40}, size_t{2000}}) {
-    // Sound or not.
+    // Valid or not.
     session.Raw(std::vector<std::byte>(size, std::byte{0xA5}));
     session.RoundTrip();
     session.Settle();
@@ -213,7 +213,7 @@ void CreditIsExact(Probe& probe) {
   }
 }
 
-// The whole credit at once, without waiting for any of it to be consumed.
+// Sends the whole credit at once, without waiting for any of it to be consumed.
 void WholeCredit(Probe& probe) {
   Session session(probe);
   session.Start();

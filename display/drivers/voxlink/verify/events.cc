@@ -1,4 +1,4 @@
-// What a Session makes of the events that came.
+// How a Session handles received events.
 #include <map>
 
 #include "display/drivers/voxlink/verify/session.h"
@@ -40,7 +40,7 @@ uint64_t VolumeOf(const Event& event) {
     case EventType::kAborted:
     case EventType::kShown:
     case EventType::kDropped:
-      return event.As<CompleteEvent>().volume;  // where each of them has it
+      return event.As<CompleteEvent>().volume;  // at the same offset in each of them
     case EventType::kError:
       return event.As<ErrorEvent>().volume;
     default:

@@ -59,7 +59,7 @@ void Hold(Probe& probe) {
   session.ExpectNoErrors();
 }
 
-// A session with volume 1 held; the sweep that is told next.
+// Starts a session with volume 1 held; returns the next SWEEP event.
 Event HoldUntilASweep(Session& session) {
   session.Start();
   session.Whole(1, false);
@@ -72,7 +72,7 @@ Event HoldUntilASweep(Session& session) {
 void ShowAt(Probe& probe) {
   Session session(probe);
   const Event sweep = HoldUntilASweep(session);
-  // Far enough that SHOW comes in time.
+  // Far enough ahead for SHOW to arrive in time.
   const auto ahead = static_cast<uint64_t>(500 * sync::kMillisecond / session.period() + 3);
   const uint64_t wanted = sweep.As<SweepEvent>().sweep + ahead;
   if (!session.ok()) return;
@@ -88,8 +88,8 @@ void ShowAt(Probe& probe) {
   }
 }
 
-// An order that must come ahead: refused where it does not, and then nothing changes; taken where it does, and then the
-// volume is shown at the sweep that the newest one names.
+// Sends orders that must come ahead of time: one that does not is refused, and nothing changes; one
+// that does is accepted, and the volume is shown at the sweep that the newest order names.
 void ShowAhead(Probe& probe) {
   Session session(probe);
   if (session.ok() && !session.Has(kFeatureShowAhead)) {
@@ -123,7 +123,7 @@ void ShowAhead(Probe& probe) {
   }
 }
 
-// What is named is past: the next sweep.
+// Orders a sweep that has passed: the volume is shown at the next one.
 void ShowPast(Probe& probe) {
   Session session(probe);
   session.Start();

@@ -10,10 +10,10 @@ using sync::kMillisecond;
 using sync::kSecond;
 
 constexpr sync::TimeNs kLook = 10 * kMillisecond;
-// Of a device and of this machine, on top of 250 ms.
+// Tolerance for a device and this machine, added to 250 ms.
 constexpr sync::TimeNs kSlack = 100 * kMillisecond;
 
-// LIGHT after the mark.
+// Expects LIGHT after the mark.
 LightEvent ExpectLight(Session& session, uint32_t lit, uint32_t cause) {
   const Event event =
       session.Await(absl::StrCat("LIGHT ", lit != 0 ? "on" : "off", ", cause ", cause), kSecond,
@@ -79,7 +79,7 @@ void Blank(Probe& probe) {
   session.Do(Request::kSetBlank, 1);
   ExpectLight(session, 0, 2);
   Flags(session, "after SET_BLANK 1", kStatusBlanked, true);
-  // Volumes come and take each other's place all the same.
+  // Volumes are still received and replace one another.
   session.Whole(2);
   session.ExpectComplete(2);
   const Event shown = session.ExpectShown(2);
@@ -116,7 +116,7 @@ void BlankOutlasts(Probe& probe) {
 
 // ---- watchdog
 
-// A sound packet, and the time at which it was surely heard.
+// Sends a valid packet; returns the time by which it was certainly received.
 sync::TimeNs Speak(Session& session) {
   session.Plain(PacketType::kKeepalive, 0);
   session.Settle();
@@ -153,7 +153,7 @@ void Watchdog(Probe& probe) {
     session.Pause(kLook);
   }
   ExpectLight(session, 0, 1);
-  // The volume is kept, and comes back with the next packet.
+  // The volume is kept, and is shown again with the next packet.
   session.Mark();
   Speak(session);
   ExpectLight(session, 1, 3);
@@ -171,7 +171,7 @@ void KeptAlive(Probe& probe) {
   session.Whole(1);
   session.ExpectShown(1);
   session.Mark();
-  session.Pause(1200 * kMillisecond);  // with a KEEPALIVE each 70 ms
+  session.Pause(1200 * kMillisecond);  // sends a KEEPALIVE each 70 ms
   session.RoundTrip();
   const size_t lights = session.Count(EventType::kLight);
   if (session.ok()) {

@@ -29,7 +29,7 @@ void UnknownRequests(Probe& probe) {
   }
 }
 
-// What is an OUT request must not be read, and the other way about.
+// OUT requests must not be readable, and IN requests not writable.
 void WrongDirections(Probe& probe) {
   Session session(probe);
   for (const Request request : {Request::kSetMode, Request::kStart, Request::kStop,
@@ -262,7 +262,7 @@ void StatusClock(Probe& probe) {
   const Status second = session.GetStatus();
   if (!session.ok()) return;
   const auto passed = static_cast<int64_t>(second.time_ns - first.time_ns);
-  // 1 %, and what the requests took.
+  // 1 %, plus the time that the requests took.
   const int64_t most = (probe.Now() - begin) * 101 / 100 + sync::kMillisecond;
   const int64_t least = (later - between) * 99 / 100 - sync::kMillisecond;
   probe.check().Expect(passed >= least && passed <= most,

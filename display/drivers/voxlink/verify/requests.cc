@@ -9,7 +9,7 @@ using conformance::Answer;
 
 namespace {
 
-// "GET_STATUS", as §4 has it.
+// Returns the name in §4, such as "GET_STATUS".
 const char* RequestName(Request request) {
   switch (request) {
     case Request::kGetCapabilities:
@@ -74,7 +74,8 @@ void Session::MustStall(const std::string& what, const UsbSetup& setup,
 
 Status Session::GetStatus() {
   if (!ok()) return {};
-  // One more than there should be, so that a longer answer is seen; a later minor may add some.
+  // Request one byte more than expected, so that a longer answer is noticed; a later minor version
+  // may add some.
   const Answer answer = Get(Request::kGetStatus, 0, sizeof(Status));
   if (!answer.ok() || answer.data.size() < sizeof(Status)) {
     check().Fail("GET_STATUS gives 80 bytes", Describe(answer), "4.4");
@@ -170,7 +171,7 @@ absl::Status BringToRest(conformance::Probe& probe) {
     return probe.Out(Session::Setup(request, value, static_cast<uint16_t>(data.size()), false),
                      data);
   };
-  // Before the first request of a case, so that its own show what is wrong with requests.
+  // Sent before the first request of a case, so that the case's own requests show what is wrong.
   const Answer stopped = put(Request::kStop, 0);
   probe.ClearHalt(kBulkOut);
   probe.ClearHalt(kInterruptIn);

@@ -10,16 +10,16 @@ using sync::kSecond;
 
 namespace {
 
-constexpr size_t kReads = 16;  // interrupt transfers that wait at any time
+constexpr size_t kReads = 16;  // interrupt transfers pending at any time
 constexpr size_t kVerifyTransferBytes = size_t{64} << 10;
 constexpr size_t kGatherBytes = size_t{256} << 10;
 constexpr sync::TimeNs kVerifyKeepaliveAfter = 70 * kMillisecond;
-// Without any progress of the device.
+// Without any progress by the device.
 constexpr sync::TimeNs kStuck = 3 * kSecond;
 constexpr sync::TimeNs kStatusInterval = 20 * kMillisecond;
 constexpr sync::TimeNs kLongestPeriod = 5 * kSecond;
 constexpr size_t kLargestVolume = size_t{256} << 20;
-constexpr size_t kMostEvents = 200'000;  // of one case
+constexpr size_t kMostEvents = 200'000;  // in one case
 
 }  // namespace
 
@@ -165,7 +165,8 @@ void Session::SendTransfer(std::span<const std::byte> bytes) {
 
 size_t Session::WaitForCredit() {
   const sync::TimeNs begin = probe_.Now();
-  if (!running_) return kVerifyTransferBytes;  // thrown away: outside a session there is no credit
+  // discarded: credit does not apply outside a session
+  if (!running_) return kVerifyTransferBytes;
   while (ok() && sent_ >= credit_limit_) {
     if (probe_.Now() - begin > kStuck) {
       check().Fail("credit for the bytes that were consumed",
@@ -302,7 +303,7 @@ void Session::TakeEvent(std::span<const std::byte> bytes) {
     check().Fail("credit_limit never falls", absl::StrCat(header.credit_limit, " after ", told_),
                  "7");
   }
-  // What is on its way may be consumed before its transfer is told to have ended.
+  // Bytes in flight may be consumed before their transfer is reported as ended.
   const uint64_t most = sent_ + kVerifyTransferBytes + capabilities().fixed.receive_buffer;
   if (header.credit_limit > most) {
     check().Fail(absl::StrCat("credit_limit is at most the bytes sent and the receive buffer, ",
@@ -323,7 +324,7 @@ void Session::Step(sync::TimeNs until) {
   KeepAlive();
   if (!ok()) return;
   if (running_ && keepalive_) until = std::min(until, last_sent_ + kVerifyKeepaliveAfter);
-  // Without credit a keep-alive is not due, however late it is.
+  // Without credit no keep-alive is due, however late it is.
   if (until <= probe_.Now()) until = probe_.Now() + kMillisecond;
   probe_.Step(until);
   TakeEvents();

@@ -1,6 +1,6 @@
-// A host's end of voxlink for conformance cases: requests, packets within the device's credit, and
-// events, of which each is held to docs/protocols/voxlink.md §6 and §7 as it comes. Nothing waits
-// longer than its limit; after the check has failed nothing is done any more.
+// The host's end of voxlink for conformance cases: requests, packets within the device's credit,
+// and events, each of which is checked against docs/protocols/voxlink.md §6 and §7 on arrival. No
+// wait exceeds its limit; once the check has failed, calls do nothing.
 #pragma once
 
 #include <cstddef>
@@ -24,10 +24,10 @@ inline constexpr sync::TimeNs kEventLimit = sync::kSecond;
 struct Event {
   EventHeader header{};
   std::vector<std::byte> body;
-  sync::TimeNs at = 0;  // when it came, on our clock
+  sync::TimeNs at = 0;  // arrival time, on our clock
   bool awaited = false;
   EventType type() const { return static_cast<EventType>(header.type); }
-  // The body, filled up with zeros where it is too short (which was told before).
+  // Returns the body, padded with zeros if it is too short (which was reported before).
   template <typename T>
   T As() const {
     std::vector<std::byte> whole = body;
@@ -36,15 +36,15 @@ struct Event {
   }
 };
 
-// The volume that an event is about, 0 if it is about none.
+// Returns the volume that an event is about, or 0.
 uint64_t VolumeOf(const Event& event);
-// "ABORTED of volume 7: superseded", for messages.
+// Returns "ABORTED of volume 7: superseded", for messages.
 std::string Describe(const Event& event);
 
 class Session {
  public:
   explicit Session(conformance::Probe& probe);
-  // Leaves the device as it is, but reads no events any more.
+  // Leaves the device as it is, but stops reading events.
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -55,42 +55,42 @@ class Session {
 
   // ---- requests
   static UsbSetup Setup(Request request, uint16_t value, uint16_t length, bool in);
-  // What the request is answered with, whatever it is.
+  // Returns the answer to the request, whatever it is.
   conformance::Answer Get(Request request, uint16_t value, uint16_t length);
   conformance::Answer Put(Request request, uint16_t value = 0,
                           std::span<const std::byte> data = {});
-  // It must be done.
+  // Sends a request that must succeed.
   void Do(Request request, uint16_t value = 0, std::span<const std::byte> data = {});
-  // It must be stalled, and GET_STATUS answered after it.
+  // Sends a request that must be stalled; GET_STATUS must be answered after it.
   void MustStall(const std::string& what, const UsbSetup& setup,
                  std::span<const std::byte> data = {});
   Status GetStatus();
   Mode GetMode();
-  // All pages, put together, read once.
+  // Returns all pages together, read once.
   const std::vector<std::byte>& CapabilityBytes();
   const DeviceCapabilities& capabilities();
   bool Has(Feature feature) { return (capabilities().fixed.features & feature) != 0; }
 
   // ---- sessions
-  // The mode in which a volume has the fewest bytes.
+  // Returns the mode in which a volume has the fewest bytes.
   Mode SmallestMode();
   FrameLayout LayoutOf(const Mode& mode);
-  // SET_MODE (SmallestMode), START, READY. Not applicable if a volume is too large, or a sweep too
-  // long, to be waited for.
+  // Sends SET_MODE (SmallestMode) and START, and awaits READY. Not applicable if a volume is too
+  // large, or a sweep too long, to wait for.
   void Start();
   void Start(const Mode& mode);
-  // START alone, and its READY.
+  // Sends only START, and awaits its READY.
   void Restart();
   const FrameLayout& layout() const { return layout_; }
   uint32_t pictures() const { return static_cast<uint32_t>(layout_.pictures()); }
   sync::TimeNs period() const { return period_; }
-  // Bytes of the session, as sent.
+  // Bytes sent in this session.
   uint64_t sent() const { return sent_; }
 
-  // ---- packets: gathered, and sent by Flush or by whatever waits
+  // ---- packets: gathered, and sent by Flush or by any call that waits
   PacketWriter& writer() { return writer_; }
   void Begin(uint64_t volume, uint64_t base = 0, std::span<const std::byte> bitmap = {});
-  // A whole picture, in fragments that fit; its bytes follow from volume and number.
+  // Sends a whole slice image, in fragments that fit; volume and number determine its bytes.
   void Picture(uint64_t volume, uint32_t picture);
   void Fragment(uint64_t volume, uint32_t picture, uint32_t offset,
                 std::span<const std::byte> bytes);
@@ -101,29 +101,29 @@ class Session {
   void Whole(uint64_t volume, bool show = true);
   void Raw(std::span<const std::byte> bytes);
   std::vector<std::byte> PictureBytes(uint64_t volume, uint32_t picture) const;
-  // Sizes of the transfers to come; 0: one without bytes. Null: as large as may be.
+  // Sets the sizes of coming transfers; 0: an empty one. Null: as large as possible.
   void SetSplit(std::function<size_t()> split) { split_ = std::move(split); }
-  // An empty packet follows each transfer.
+  // Sends an empty packet after each transfer.
   void SetZeroPackets(bool on) { zero_packets_ = on; }
   void Flush();
-  // Flush, and until the device has consumed everything.
+  // Flushes, and waits until the device has consumed everything.
   void Settle();
 
   // ---- time and events
-  // KEEPALIVEs go out by themselves while something is waited for.
+  // Sends KEEPALIVEs automatically during waits.
   void SetKeepalive(bool on) { keepalive_ = on; }
   void SetListening(bool on);
   void Pause(sync::TimeNs duration);
-  // Events from now on count for what follows.
+  // Later checks only consider events from now on.
   void Mark() { mark_ = log_.size(); }
   const std::vector<Event>& log() const { return log_; }
-  // The first event after the mark for which `is` holds and that was not awaited before; it must come
-  // within `limit` once the device has consumed what was sent.
+  // Returns the first event after the mark for which `is` returns true and that was not awaited
+  // before; it must come within `limit` after the device has consumed everything sent.
   Event Await(const std::string& expected, sync::TimeNs limit,
               const std::function<bool(const Event&)>& is);
   std::optional<Event> Find(const std::function<bool(const Event&)>& is) const;  // after the mark
   size_t Count(EventType type) const;                                            // after the mark
-  std::string Recent() const;  // what came after the mark, for messages
+  std::string Recent() const;  // lists the events after the mark, for messages
 
   Event ExpectComplete(uint64_t volume);
   void ExpectAborted(uint64_t volume, Reason reason);
@@ -132,25 +132,25 @@ class Session {
   Event ExpectShown(uint64_t volume);
   std::vector<PictureRun> ExpectMissing(uint64_t volume);
   ErrorEvent ExpectError(ErrorCode code);
-  // A packet whose answer is certain: VOLUME_END of a volume that nobody began.
+  // Sends a packet with a certain answer: VOLUME_END of a volume that was never started.
   void RoundTrip();
-  // After a round trip: no ERROR came after the mark.
+  // After a round trip, expects that no ERROR came after the mark.
   void ExpectNoErrors();
 
  private:
   void BeginSession();
   void PostReads();
   void CancelReads();
-  // Lets things happen until something completes or `until` has come.
+  // Waits until something completes, or until `until`.
   void Step(sync::TimeNs until);
   void TakeEvents();
   void TakeEvent(std::span<const std::byte> bytes);
   void SendNow(std::span<const std::byte> bytes);
   void SendTransfer(std::span<const std::byte> bytes);
-  // Until credit allows more; at least one byte, or the check fails.
+  // Waits until credit allows more; returns at least one byte, or the check fails.
   size_t WaitForCredit();
   void KeepAlive();
-  // The answer to VOLUME_END.
+  // Awaits the answer to VOLUME_END.
   Event AnswerToEnd(uint64_t volume, EventType type, const std::string& expected);
 
   conformance::Probe& probe_;
@@ -158,7 +158,7 @@ class Session {
   std::optional<DeviceCapabilities> capabilities_;
 
   bool running_ = false, keepalive_ = true, listening_ = true;
-  // Never nothing, so that a case may reckon with them although START failed.
+  // Never empty, so that a case can compute with them even if START failed.
   FrameLayout layout_{.slices = 1, .width = 1, .height = 1};
   sync::TimeNs period_ = sync::kSecond;
   PacketWriter writer_;

@@ -48,7 +48,7 @@ void StartBeginsAnew(Probe& probe) {
   probe.check().Equal("shown", uint64_t{0}, status.shown);
   probe.check().Equal("last_complete", uint64_t{0}, status.last_complete);
   probe.check().Equal("underruns", 0u, status.underruns);
-  // Numbers and sequences are as new, and no volume is remembered.
+  // Numbers and sequences restart, and no volume is remembered.
   session.SetKeepalive(true);
   session.Begin(1, 5, std::vector<std::byte>((session.pictures() + 7) / 8));
   session.ExpectAborted(1, Reason::kBadBase);
@@ -70,7 +70,7 @@ void StopIsDark(Probe& probe) {
   probe.check().Equal("shown after STOP", uint64_t{0}, status.shown);
   probe.check().Equal("last_complete after STOP", uint64_t{0}, status.last_complete);
   probe.check().Equal("filling after STOP", uint64_t{0}, status.filling);
-  session.Do(Request::kStop);  // once more changes nothing
+  session.Do(Request::kStop);  // a repetition changes nothing
 }
 
 void NoEventsOutside(Probe& probe) {
@@ -78,7 +78,7 @@ void NoEventsOutside(Probe& probe) {
   session.Start();
   session.SetKeepalive(false);
   session.Do(Request::kStop);
-  session.Pause(50 * kMillisecond);  // what was on its way comes
+  session.Pause(50 * kMillisecond);  // let events in flight arrive
   session.Mark();
   session.Pause(300 * kMillisecond);
   if (!session.ok()) return;

@@ -10,7 +10,7 @@ namespace {
 
 using conformance::Probe;
 
-// All pictures but `but`.
+// Sends all slice images but `but`.
 void Others(Session& session, uint64_t volume, uint32_t but) {
   for (uint32_t p = 0; session.ok() && p < session.pictures(); ++p) {
     if (p != but) session.Picture(volume, p);
@@ -65,7 +65,7 @@ void FragmentAgain(Probe& probe) {
   if (!session.ok()) return;
   const size_t half = std::min<size_t>(bytes.size() / 2, session.capabilities().fixed.max_payload);
   session.Fragment(1, 0, 0, std::span(bytes).first(half));
-  session.Picture(1, 0);  // anew, and whole
+  session.Picture(1, 0);  // from the start, completely
   session.Picture(1, 0);  // and again
   session.Fragment(1, 0, 0, std::span(bytes).first(half));
   ExpectOnlyMissing(session, 1, 0);
@@ -88,7 +88,8 @@ void FragmentOrder(Probe& probe) {
   session.Fragment(1, 0, 0, std::span(bytes).first(1));
   session.Fragment(1, 0, 2, std::span(bytes).subspan(2, 1));  // byte 1 is left out
   session.ExpectError(ErrorCode::kBadOrder);
-  session.Fragment(1, 0, 1, std::span(bytes).subspan(1, 1));  // too late: it must be begun anew
+  // too late: it must restart at offset 0
+  session.Fragment(1, 0, 1, std::span(bytes).subspan(1, 1));
   ExpectOnlyMissing(session, 1, 0);
   session.Picture(1, 0);
   session.End(1);
@@ -150,7 +151,7 @@ void NotFilling(Probe& probe) {
   session.Start();
   session.Whole(1);
   session.ExpectComplete(1);
-  session.Picture(1, 0);  // the last complete volume's: in silence
+  session.Picture(1, 0);  // of the last complete volume: ignored without an event
   session.ExpectNoErrors();
   session.Mark();
   for (int i = 0; i < 3; ++i) session.Picture(3, 0);

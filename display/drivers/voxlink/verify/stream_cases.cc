@@ -1,4 +1,4 @@
-// §5.1: the stream of packets, however it is cut, and its damage.
+// §5.1: the stream of packets, split anywhere, and damaged.
 #include <algorithm>
 
 #include "display/crc/crc32c.h"
@@ -10,7 +10,7 @@ namespace {
 
 using conformance::Probe;
 
-// A packet written by `write`, as bytes to be damaged.
+// Returns the bytes of a packet written by `write`, to be damaged.
 std::vector<std::byte> PacketOf(
     Session& session, const std::function<void(PacketWriter&, std::vector<std::byte>&)>& write) {
   std::vector<std::byte> bytes;
@@ -18,7 +18,7 @@ std::vector<std::byte> PacketOf(
   return bytes;
 }
 
-// The header changed, and its CRC made right again.
+// Changes the header, and corrects its CRC.
 void Change(std::vector<std::byte>& packet, const std::function<void(PacketHeader&)>& change) {
   auto header = Load<PacketHeader>(packet);
   change(header);
@@ -52,7 +52,7 @@ void OddSizes(Probe& probe) {
   Session session(probe);
   session.Start();
   static constexpr uint32_t kSizes[] = {1, 3, 39, 40, 41, 63, 64, 65, 511, 512, 513, 1023, 1025};
-  // Short ones where the packets begin, longer ones through the pixels.
+  // Short transfers where the packets begin, longer ones through the pixels.
   const auto most =
       static_cast<uint32_t>(std::clamp<size_t>(session.layout().bytes() / 16, 64, 30'000));
   session.SetSplit([&]() -> size_t {
@@ -66,7 +66,8 @@ void OddSizes(Probe& probe) {
   CheckReceived(session);
 }
 
-// Transfers of whole USB packets, with and without an empty one behind; empty transfers.
+// Sends transfers of whole USB packets, with and without an empty packet after them, and empty
+// transfers.
 void ZeroLengthPackets(Probe& probe) {
   Session session(probe);
   session.Start();
@@ -91,7 +92,7 @@ void Noise(Probe& probe) {
   for (const size_t size : {size_t{1}, size_t{39}, size_t{40}, size_t{41}, size_t{1000}}) {
     session.Mark();
     std::vector<std::byte> noise(size);
-    // Never the magic's last byte, so no header is found in it.
+    // Never contains the magic's last byte, so no header is found in it.
     for (std::byte& byte : noise) byte = static_cast<std::byte>(0x4C + probe.Random(170));
     all += size;
     session.Raw(noise);
@@ -120,7 +121,7 @@ void BadHeaderCrc(Probe& probe) {
   session.Raw(packet);
   const ErrorEvent error = session.ExpectError(ErrorCode::kBadHeader);
   if (session.ok()) probe.check().Equal("bytes told as skipped", 40u, error.detail);
-  // It was not taken for an ABORT; what follows is taken.
+  // It was not treated as an ABORT; the packets after it are accepted.
   const Status status = session.GetStatus();
   if (session.ok()) probe.check().Equal("filling", uint64_t{1}, status.filling);
   session.RoundTrip();
@@ -179,7 +180,7 @@ void SequenceGap(Probe& probe) {
     PacketOf(session,
              [](PacketWriter& writer, auto& out) { writer.Plain(out, PacketType::kKeepalive, 0); });
   }
-  session.RoundTrip();  // the packet itself is taken
+  session.RoundTrip();  // the packet itself is accepted
   const ErrorEvent error = session.ExpectError(ErrorCode::kSequence);
   if (session.ok()) probe.check().Equal("packets told as missing", 3u, error.detail);
   session.Mark();

@@ -1,4 +1,5 @@
-// voxlink's conformance suite: what docs/protocols/voxlink.md asks of a device and a host can see.
+// voxlink's conformance suite: the requirements of docs/protocols/voxlink.md on a device that a
+// host can observe.
 #pragma once
 
 #include "display/api/geometry.h"
@@ -10,10 +11,10 @@ namespace voxeld::display::voxlink {
 struct Configured {
   Geometry geometry;
   FrameLayout layout;
-  bool calibrated = false;  // as CheckCapabilities has it
+  bool calibrated = false;  // as in CheckCapabilities
 };
 
-// `configured`: what the device is said to be; null: nothing is said.
+// `configured`: the configured description of the device; null: none.
 conformance::Suite MakeSuite(const Configured* configured);
 
 }  // namespace voxeld::display::voxlink

@@ -46,7 +46,7 @@ std::vector<std::byte> Descriptor(Probe& probe, uint8_t type, uint16_t length, c
 
 using Parts = std::vector<std::vector<std::byte>>;
 
-// The descriptors of the configuration, one by one.
+// Returns the descriptors of the configuration, one by one.
 Parts Configuration(Probe& probe) {
   const std::vector<std::byte> whole =
       Descriptor(probe, kConfigurationDescriptor, kMostDescriptorBytes, "a configuration", 9);
@@ -207,7 +207,7 @@ void Halt(Probe& probe, uint8_t endpoint, const std::string& name) {
   }
   const Answer cleared = probe.ClearHalt(endpoint);
   probe.check().Expect(cleared.ok(), "the halt is cleared", Describe(cleared));
-  // The session goes on where it was.
+  // The session continues where it was.
   session.SetListening(true);
   session.Mark();
   session.ExpectNoErrors();

@@ -1,4 +1,4 @@
-// §5.4: VOLUME_END, and volumes as they are shown.
+// §5.4: VOLUME_END, and how volumes are shown.
 #include <algorithm>
 
 #include "display/drivers/voxlink/verify/cases.h"
@@ -10,7 +10,7 @@ namespace {
 using conformance::Probe;
 using sync::kMillisecond;
 
-constexpr size_t kMostBytes = size_t{64} << 20;  // of a volume in larger modes than the smallest
+constexpr size_t kMostBytes = size_t{64} << 20;  // of a volume, in modes larger than the smallest
 
 void Whole(Probe& probe) {
   Session session(probe);
@@ -20,7 +20,7 @@ void Whole(Probe& probe) {
     const Event complete = session.ExpectComplete(volume);
     const auto shown = session.ExpectShown(volume).As<ShownEvent>();
     if (!session.ok()) return;
-    // From the next sweep on; COMPLETE may have waited a little for the bus.
+    // Shown from the next sweep on; COMPLETE may have waited a little for the bus.
     const auto end = static_cast<int64_t>(complete.header.time_ns);
     const auto start = static_cast<int64_t>(shown.start_ns);
     const int64_t slack = session.period() / 10 + 10 * kMillisecond;
@@ -197,7 +197,7 @@ void EndUnknown(Probe& probe) {
   if (session.ok()) probe.check().Equal("filling", uint64_t{1}, status.filling);
 }
 
-// As fast as the host can, each answered once.
+// Sends volumes as fast as the host can; each must be answered once.
 void Burst(Probe& probe) {
   Session session(probe);
   session.Start();
