@@ -1,4 +1,4 @@
-// What becomes of one case of a conformance suite.
+// The verdict of one case of a conformance suite.
 #pragma once
 
 #include <cstdint>
@@ -13,22 +13,22 @@ struct Verdict {
   enum class Kind : uint8_t { kPassed, kFailed, kNotApplicable };
   Kind kind = Kind::kPassed;
   std::string expected, seen;  // kFailed
-  std::string section;         // kFailed: of the protocol's page, where it is not the case's
+  std::string section;         // kFailed: section of the protocol's page, if it is not the case's
   std::string reason;          // kNotApplicable
 };
 
-// "passed", "failed", "not applicable".
+// Returns "passed", "failed" or "not applicable".
 const char* VerdictName(Verdict::Kind kind);
 
-// Remembers the first thing that was not as it should be: a case need not look after each step, but
-// its loops end when ok() does not hold any more.
+// Records the first deviation: a case need not check after each step, but its loops must end when
+// ok() becomes false.
 class Check {
  public:
   bool ok() const { return verdict_.kind == Verdict::Kind::kPassed; }
   const Verdict& verdict() const { return verdict_; }
 
   void Fail(std::string expected, std::string seen, std::string section = "");
-  // The device does not have what the case is about.
+  // The device lacks the feature that the case tests.
   void NotApplicable(std::string reason);
 
   void Expect(bool holds, std::string_view expected, std::string_view seen) {

@@ -8,7 +8,7 @@
 namespace voxeld::display::conformance {
 namespace {
 
-// What a transport takes to tell that a transfer timed out.
+// Time that a transport needs to report that a transfer timed out.
 constexpr sync::TimeNs kGrace = sync::kSecond;
 constexpr sync::TimeNs kRoomRetry = 5 * sync::kMillisecond;
 constexpr size_t kMostHex = 64;
@@ -47,7 +47,7 @@ void Probe::Drain() {
   drained_.clear();
   transport_.Drain(drained_);
   for (TransferCompletion& completion : drained_) {
-    // What was given up before is of no interest.
+    // Ignore completions of transfers that were given up before.
     if (posted_.erase(completion.id) > 0) done_[completion.id] = std::move(completion);
   }
 }
@@ -79,7 +79,7 @@ void Probe::Pause(sync::TimeNs duration) {
 std::optional<TransferId> Probe::Post(Transfer&& transfer) {
   const sync::TimeNs deadline = clock_.Now() + kGrace;
   while (true) {
-    // What is refused is as it was. NOLINTNEXTLINE(bugprone-use-after-move)
+    // A refused transfer is unchanged. NOLINTNEXTLINE(bugprone-use-after-move)
     const absl::StatusOr<TransferId> id = transport_.Submit(std::move(transfer));
     if (id.ok()) {
       posted_.insert(*id);
@@ -104,7 +104,7 @@ void Probe::Cancel(const std::vector<TransferId>& ids) {
   for (const TransferId id : ids) {
     if (posted_.contains(id)) transport_.Cancel(id);
   }
-  // Also of a cancelled run: the next one must not find them.
+  // Also for a cancelled run: the next one must not find them.
   const sync::TimeNs deadline = clock_.Now() + kGrace;
   const auto all_ended = [&] {
     return std::none_of(ids.begin(), ids.end(),

@@ -1,5 +1,5 @@
-// The hand of a conformance case on its device: transfers that are waited for, each with a limit, so
-// that no device can hold a run up. What does not come back is cancelled and told as timed out.
+// A conformance case's access to its device: blocking transfers, each with a time limit, so that no
+// device can stall a run. Transfers that do not end are cancelled and reported as timed out.
 //
 // Single-threaded.
 #pragma once
@@ -23,14 +23,14 @@ namespace voxeld::display::conformance {
 struct Answer {
   TransferStatus status = TransferStatus::kError;
   uint32_t actual = 0;
-  std::vector<std::byte> data;  // IN: what came
-  // A request, or a read, that the device served.
+  std::vector<std::byte> data;  // IN: the received data
+  // The device served the request or read.
   bool ok() const { return status == TransferStatus::kOk || status == TransferStatus::kShort; }
 };
 
-// "stall", or "ok, 16 bytes".
+// Returns "stall", or "ok, 16 bytes".
 std::string Describe(const Answer& answer);
-// "12 01 00 …": at most 64 bytes.
+// Returns "12 01 00 …": at most 64 bytes.
 std::string Hex(std::span<const std::byte> bytes);
 
 class Probe {
@@ -38,7 +38,7 @@ class Probe {
   static constexpr sync::TimeNs kRequestLimit = 2 * sync::kSecond;
   static constexpr sync::TimeNs kBulkLimit = 5 * sync::kSecond;
 
-  // `cancelled`, if it is set: nothing is waited for any more once it says so, and the check fails.
+  // Once `cancelled`, if it is set, returns true, all waits end and the check fails.
   Probe(UsbTransport& transport, sync::Clock& clock, Waiter& waiter, uint64_t seed,
         std::function<bool()> cancelled);
   // Cancels what is still in flight.
@@ -49,7 +49,7 @@ class Probe {
   Check& check() { return check_; }
   UsbTransport& transport() { return transport_; }
   sync::TimeNs Now() const { return clock_.Now(); }
-  // 0 to `bound` − 1, the same for the same seed.
+  // Returns 0 to `bound` − 1, the same for the same seed.
   uint32_t Random(uint32_t bound);
 
   Answer In(const UsbSetup& setup);
@@ -57,18 +57,18 @@ class Probe {
   Answer Bulk(uint8_t endpoint, std::span<const std::byte> data, bool zero_packet = false,
               sync::TimeNs limit = kBulkLimit);
   Answer ClearHalt(uint8_t endpoint);
-  // What is in flight is cancelled.
+  // Cancels what is in flight.
   Answer Reset();
 
-  // Without waiting; nothing if the device is gone. Timeouts are the caller's affair.
+  // Submits without waiting; returns nothing if the device is gone. Timeouts are up to the caller.
   std::optional<TransferId> Post(Transfer&& transfer);
-  // Of a posted transfer: its completion, once.
+  // Returns a posted transfer's completion, once.
   std::optional<TransferCompletion> Take(TransferId id);
-  // Cancels posted transfers and waits for their ends.
+  // Cancels posted transfers and waits for them to end.
   void Cancel(const std::vector<TransferId>& ids);
-  // Something completes, or `until` has come. False once the run is cancelled.
+  // Waits until something completes, or until `until`. Returns false once the run is cancelled.
   bool Step(sync::TimeNs until);
-  // Until `done`, at most for `limit`. True if `done` held.
+  // Waits at most `limit` until `done` returns true. Returns whether it did.
   bool WaitFor(sync::TimeNs limit, const std::function<bool()>& done);
   void Pause(sync::TimeNs duration);
 
@@ -83,7 +83,7 @@ class Probe {
   const std::function<bool()> cancelled_;
   std::minstd_rand random_;
   Check check_;
-  std::set<TransferId> posted_;  // and neither completed nor given up
+  std::set<TransferId> posted_;  // neither completed nor given up
   std::map<TransferId, TransferCompletion> done_;
   std::vector<TransferCompletion> drained_;
 };

@@ -9,7 +9,7 @@ namespace {
 constexpr sync::TimeNs kComeBack = 5 * sync::kSecond;
 constexpr sync::TimeNs kLook = 100 * sync::kMillisecond;
 
-// FNV-1a: a case's choices must not depend on the standard library.
+// FNV-1a: a case's random choices must not depend on the standard library.
 uint64_t SeedOf(const Case& what, uint64_t seed) {
   uint64_t hash = 14695981039346656037u ^ seed;
   for (const char c : what.id) hash = (hash ^ static_cast<uint8_t>(c)) * 1099511628211u;
@@ -40,7 +40,7 @@ class Desk {
     return result;
   }
 
-  // Also of a cancelled run.
+  // Also for a cancelled run.
   void Leave() {
     if (!subject_.transport->is_open()) return;
     Rest().IgnoreError();
@@ -53,12 +53,12 @@ class Desk {
     return subject_.suite.rest(probe);
   }
 
-  // Open, and at rest. A device that does not come to rest is opened anew, once.
+  // Opens the device and brings it to rest. A device that does not come to rest is reopened once.
   absl::Status Ready() {
     absl::Status status = subject_.transport->is_open() ? Rest() : absl::UnavailableError("");
     if (status.ok()) return status;
     subject_.transport->Close();
-    // The next case need not wait as long again.
+    // If it is gone already, the next case need not wait as long again.
     const sync::TimeNs deadline = clock_.Now() + (gone_ ? 0 : kComeBack);
     while (true) {
       status = subject_.transport->Open();
@@ -74,7 +74,7 @@ class Desk {
   sync::Clock& clock_;
   Waiter& waiter_;
   const RunOptions& options_;
-  bool gone_ = false;  // it did not come back when it was waited for
+  bool gone_ = false;  // it did not come back within the wait
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Runs a suite over a device.
+// Runs a suite on a device.
 #pragma once
 
 #include <cstdint>
@@ -15,15 +15,15 @@
 namespace voxeld::display::conformance {
 
 struct CaseResult {
-  const Case* what = nullptr;  // the suite's
+  const Case* what = nullptr;  // points into the suite
   Verdict verdict;
   sync::TimeNs duration = 0;
 };
 
 struct RunResult {
-  UsbIdentity identity;             // of the device, while it was open
-  std::vector<CaseResult> results;  // of the cases that were wanted, in their order
-  // How often a verdict was given.
+  UsbIdentity identity;             // the device's, while it was open
+  std::vector<CaseResult> results;  // of the selected cases, in their order
+  // Returns how often a verdict was given.
   size_t Count(Verdict::Kind kind) const;
 };
 
@@ -31,13 +31,14 @@ struct RunOptions {
   std::function<bool(const Case&)> wanted;               // null: all
   std::function<void(const Case&)> on_begin;             // may be null
   std::function<void(const CaseResult& result)> on_end;  // may be null
-  std::function<bool()> cancelled;                       // may be null; any thread's flag
-  uint64_t seed = 1;  // of what cases choose by chance; a case's choices depend on no other case
+  std::function<bool()> cancelled;                       // may be null; called from any thread
+  // seed of the cases' random choices; a case's choices do not depend on other cases
+  uint64_t seed = 1;
 };
 
-// Opens the transport, runs, leaves the device at rest and closes. A case that finds no device any
-// more fails; the ones after it wait a while for it to come back. What Open says, if there is no
-// device to begin with; Cancelled when `cancelled` said so.
+// Opens the transport, runs the cases, leaves the device at rest and closes. A case that loses its
+// device fails; the ones after it wait a while for the device to come back. Errors: Open's, if no
+// device was found at first; Cancelled when `cancelled` returned true.
 absl::StatusOr<RunResult> Run(Subject& subject, sync::Clock& clock, Waiter& waiter,
                               const RunOptions& options);
 

@@ -1,5 +1,6 @@
-// A protocol's conformance suite: what a device must do, case by case, each by itself and in any
-// order. A driver brings its own and gives the devices that a display's options mean as subjects.
+// A protocol's conformance suite: what a device must do, as independent cases that run in any
+// order. A driver provides its own suite, and the devices that a display's options select as
+// subjects.
 #pragma once
 
 #include <functional>
@@ -15,18 +16,18 @@ namespace voxeld::display::conformance {
 
 struct Case {
   std::string id;       // "volume.whole": unique in its suite, never changed once published
-  std::string title;    // what the device does that passes
-  std::string section;  // of the protocol's page: "5.4"
-  // Finds the device at rest, and says what it saw to the probe's check.
+  std::string title;    // what a passing device does
+  std::string section;  // section of the protocol's page: "5.4"
+  // Finds the device at rest, and reports its observations to the probe's check.
   std::function<void(Probe& probe)> run;
 };
 
 struct Suite {
   std::string protocol;  // "voxlink 1.0"
-  std::string page;      // of what it is held to: "docs/protocols/voxlink.md"
+  std::string page;      // the page that it tests: "docs/protocols/voxlink.md"
   std::vector<Case> cases;
-  // Brings the device, whatever state it is in, to rest: stopped and dark. Before each case, and at
-  // the end.
+  // Brings the device, in whatever state it is, to rest: stopped and dark. Called before each case,
+  // and at the end.
   std::function<absl::Status(Probe& probe)> rest;
 };
 

@@ -1,4 +1,4 @@
-// How the one thread of a conformance run waits for its device.
+// How the single thread of a conformance run waits for its device.
 #pragma once
 
 #include "display/sync/clock.h"
@@ -10,17 +10,17 @@ namespace voxeld::display::conformance {
 class Waiter {
  public:
   virtual ~Waiter() = default;
-  // Until the transport may have something to drain, or `until` has come. May return early.
+  // Waits until the transport may have something to drain, or until `until`. May return early.
   virtual void Wait(sync::TimeNs until) = 0;
 };
 
-// Waits for the transport's wake, of which it is the only taker as long as it lives.
+// Waits for the transport's wake, and must be its only user during its lifetime.
 class WakeWaiter final : public Waiter {
  public:
   WakeWaiter(UsbTransport& transport, sync::Clock& clock);
   ~WakeWaiter() override;
   void Wait(sync::TimeNs until) override;
-  // Any thread: the wait in progress, or the next one, ends.
+  // Ends the wait in progress, or the next one. Any thread.
   void Wake();
 
  private:

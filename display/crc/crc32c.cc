@@ -25,7 +25,7 @@ constexpr std::array<uint32_t, 256> MakeTable() {
 constexpr std::array<uint32_t, 256> kTable = MakeTable();
 
 #if defined(__x86_64__)
-// The processor begins a step each cycle and ends it after three, so three runs go side by side.
+// The processor starts a step each cycle and finishes it after three, so three runs go in parallel.
 constexpr size_t kRun = 1024;
 
 // A linear map of states, by their bits.
@@ -37,7 +37,7 @@ constexpr uint32_t Times(const Matrix& m, uint32_t state) {
   return sum;
 }
 
-// What kRun zero bytes do to a state, by its bytes.
+// Returns the effect of kRun zero bytes on a state, by its bytes.
 constexpr std::array<std::array<uint32_t, 256>, 4> MakeSkip() {
   Matrix skip{};
   for (size_t bit = 0; bit < 32; ++bit) {

@@ -1,5 +1,5 @@
-// CRC-32C (Castagnoli), reflected, initial value and final XOR all ones, as RFC 3720 and voxlink
-// (docs/protocols/voxlink.md §5.6) have it. The check value of "123456789" is 0xE3069283.
+// CRC-32C (Castagnoli), reflected, initial value and final XOR all ones, as in RFC 3720 and voxlink
+// (docs/protocols/voxlink.md §5.6). The check value of "123456789" is 0xE3069283.
 #pragma once
 
 #include <cstddef>
@@ -8,8 +8,8 @@
 
 namespace voxeld::display {
 
-// Of `bytes` after bytes whose CRC was `crc` (0 for none).
-// By the processor's instruction where it has one.
+// Returns the CRC of `bytes` after bytes whose CRC was `crc` (0 for none). Uses the processor's
+// instruction if it has one.
 uint32_t Crc32c(std::span<const std::byte> bytes, uint32_t crc = 0);
 
 // The same by table, on any machine.

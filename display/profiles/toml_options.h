@@ -1,4 +1,4 @@
-// TOML's values as options of a display.
+// Converts TOML values to options of a display.
 #pragma once
 
 #include <toml++/toml.h>
@@ -8,8 +8,8 @@
 
 namespace voxeld::display {
 
-// As a value would stand on the command line; an array's elements are joined by semicolons. Nothing of what is no text, number,
-// boolean or array of these.
+// Returns the value as written on the command line; an array's elements are joined by semicolons.
+// Returns nothing if the value is not a text, number, boolean or array of these.
 std::optional<std::string> OptionText(const toml::node& node);
 
 }  // namespace voxeld::display

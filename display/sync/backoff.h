@@ -1,4 +1,4 @@
-// How long to wait before trying again: twice as long after each failure, up to a limit.
+// The pause before a retry: doubled after each failure, up to a limit.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@ class Backoff {
  public:
   constexpr Backoff(TimeNs first, TimeNs longest) : first_(first), longest_(longest) {}
 
-  // The pause after one more failure.
+  // Returns the pause after one more failure.
   TimeNs Next() {
     pause_ = pause_ == 0 ? first_ : std::min(2 * pause_, longest_);
     return pause_;

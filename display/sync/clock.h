@@ -1,5 +1,5 @@
-// Time as a dependency. All time in voxeld is monotonic nanoseconds from a Clock that is handed in:
-// the system's in the daemon, a FakeClock (fake_clock.h) in tests and simulations.
+// Time as a dependency. All times in voxeld are monotonic nanoseconds from an injected Clock: the
+// system's in the daemon, a FakeClock (fake_clock.h) in tests and simulations.
 //
 // Thread-safe.
 #pragma once
@@ -23,13 +23,12 @@ class Clock {
 
   virtual TimeNs Now() const = 0;
 
-  // Waits until `cv` is notified or Now() >= deadline, whichever is first;
-  // may wake without cause. `mutex` must be held and guards the condition.
-  // deadline == kNever waits for a notification only.
+  // Waits until `cv` is notified or Now() >= deadline, whichever is first; may wake spuriously.
+  // `mutex` must be held and guard the condition. deadline == kNever waits for a notification only.
   virtual void WaitUntil(Mutex& mutex, CondVar& cv, TimeNs deadline) VOXELD_REQUIRES(mutex) = 0;
 };
 
-// std::chrono::steady_clock.
+// Uses std::chrono::steady_clock.
 class SystemClock final : public Clock {
  public:
   TimeNs Now() const override;

@@ -1,5 +1,5 @@
-// A clock that stands still until it is told to move: for tests and for simulations of whole
-// systems in one thread.
+// A clock that advances only on request: for tests and for simulations of whole systems in one
+// thread.
 #pragma once
 
 #include <utility>
@@ -21,7 +21,7 @@ class FakeClock final : public Clock {
   void Advance(TimeNs delta) { AdvanceTo(Now() + delta); }
   void AdvanceTo(TimeNs time);
 
-  // Threads inside WaitUntil at this moment: lets a test wait for a thread to go idle.
+  // Returns the number of threads inside WaitUntil: lets a test wait for a thread to become idle.
   int waiters() const;
 
  private:

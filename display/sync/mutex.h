@@ -1,6 +1,6 @@
-// Mutex, lock and condition variable with clang's thread-safety annotations,
-// over the standard library's. std primitives are instrumented by every sanitizer,
-// which a prebuilt third-party mutex is not.
+// Mutex, lock and condition variable with clang's thread-safety annotations, built on the standard
+// library's. std primitives are instrumented by every sanitizer; a prebuilt third-party mutex is
+// not.
 //
 // Thread-safe by definition; none of these is copyable or movable.
 #pragma once
@@ -51,8 +51,8 @@ class VOXELD_SCOPED_CAPABILITY MutexLock {
   Mutex& mutex_;
 };
 
-// Every wait may wake without cause: call it in a loop over the condition. Timed waits go through a
-// Clock (clock.h), so that a test can own the time.
+// Every wait may wake spuriously: call it in a loop that checks the condition. Timed waits go
+// through a Clock (clock.h), so that a test can control time.
 class CondVar {
  public:
   CondVar() = default;

@@ -6,19 +6,20 @@
 namespace voxeld::sync {
 namespace {
 
-// Of an error, how much goes to the phase, and to the period for each sweep since the report before.
+// Shares of an error that correct the phase, and the period per sweep since the previous report.
 constexpr double kPhaseGain = 1.0 / 4;
 constexpr double kPeriodGain = 1.0 / 32;
-// In periods: reports so near are good ones, so many in a row are a lock; one so far off is a jump.
+// In periods: reports this near are good, and that many in a row are a lock; one this far off is a
+// jump.
 constexpr double kNear = 1.0 / 16;
 constexpr int kToLock = 8;
 constexpr double kJump = 1.0 / 4;
 constexpr double kJitterShare = 1.0 / 16;
 constexpr int kSilentSweeps = 8;
-// A device may say anything: what is beyond these is not believed.
-constexpr double kPeriodRange = 4;  // times the nominal one, and a fourth of it
+// A device may report anything: values beyond these limits are rejected.
+constexpr double kPeriodRange = 4;  // times the nominal period, and its inverse
 constexpr uint64_t kMostSweeps = uint64_t{1} << 48;
-constexpr TimeNs kSilence = 250 * kMillisecond;  // at least
+constexpr TimeNs kSilence = 250 * kMillisecond;  // minimum
 
 }  // namespace
 

@@ -1,11 +1,12 @@
-// When a device's sweeps begin: a phase-locked loop on what the device says of them.
+// Predicts when a device's sweeps begin: a phase-locked loop on the device's reports.
 //
-// A screen or motor has a speed of its own, the device's clock another drift than ours, and its word arrives late by a little
-// each time. So what it says is not taken as it is but pulls at an estimate of phase and period (a loop of second order, damped
-// by 0.7), which goes on between reports and through lost ones. A phase that jumps, or silence, is a lock lost: that is
-// counted, and the estimate starts anew.
+// A screen or motor has its own speed, the device's clock drifts differently from ours, and its
+// reports arrive a little late each time. So a report is not used directly but corrects an estimate
+// of phase and period (a second-order loop, damped by 0.7), which continues between reports and
+// through lost ones. A phase jump, or silence, is a lost lock: it is counted, and the estimate
+// restarts.
 //
-// Single-threaded; times are the owner's clock.
+// Single-threaded; times are those of the owner's clock.
 #pragma once
 
 #include <cstdint>
@@ -15,42 +16,44 @@
 
 namespace voxeld::sync {
 
-// As reported by a display with a sweep.
+// The state reported by a display with a sweep.
 struct SweepLock {
   enum class State : uint8_t {
-    kUnknown,  // nothing has been said of sweeps, or not for a while
+    kUnknown,  // no sweep reports so far, or none lately
     kLocking,  // predicted from a few reports
     kLocked,
   };
   State state = State::kUnknown;
   double period_ns = 0;  // 0: unknown
-  double drift_ppm = 0;  // of the rate, against the nominal one: above 0 it is fast
-  double jitter_ns = 0;  // mean distance of late between reports and the estimate
-  uint64_t losses = 0;   // of lock, since the beginning
+  double drift_ppm = 0;  // deviation of the rate from the nominal one: above 0 it is fast
+  double jitter_ns = 0;  // recent mean distance between reports and the estimate
+  uint64_t losses = 0;   // times that the lock was lost
 };
 
 const char* SweepLockName(SweepLock::State state);
 
 class SweepClock {
  public:
-  // `nominal_ns`: the period that the device should have, above 0.
+  // `nominal_ns`: the device's nominal period, above 0.
   explicit SweepClock(double nominal_ns) : nominal_ns_(nominal_ns) {}
 
-  // A new session of the device: nothing is known. Not a loss; what was counted stays.
+  // Starts a new session of the device: nothing is known. It does not count as a loss; counts are
+  // kept.
   void Restart();
-  // Sweep `number` began at `start`, says the device, and has that period. Numbers ascend, with gaps.
+  // The device reports that sweep `number` began at `start`, with that period. Numbers ascend, with
+  // gaps.
   void Note(uint64_t number, TimeNs start, TimeNs period);
-  // Time has passed: a device that has said nothing for long is not known any more.
+  // Time has passed: after a long silence the device's sweeps become unknown.
   void Advance(TimeNs now);
 
   const SweepLock& lock() const { return lock_; }
   bool known() const { return lock_.state != SweepLock::State::kUnknown; }
 
-  // All only while known.
+  // The following require that sweeps are known.
   TimeNs StartOf(uint64_t number) const;
-  // The sweep that begins nearest to `at`, at least 1.
+  // Returns the sweep that begins nearest to `at`, at least 1.
   uint64_t Nearest(TimeNs at) const;
-  // The starts of the next `count` sweeps after `now`.
+  // Returns the starts of the next `count` sweeps after `now`.
   std::vector<TimeNs> Coming(TimeNs now, int count) const;
 
  private:
@@ -61,9 +64,9 @@ class SweepClock {
   const double nominal_ns_;
   SweepLock lock_;
   TimeNs base_ = 0;   // phases count from here
-  double phase_ = 0;  // of number_
+  double phase_ = 0;  // phase of number_
   uint64_t number_ = 0;
-  int good_ = 0;  // reports in a row that were near
+  int good_ = 0;  // consecutive near reports
 };
 
 }  // namespace voxeld::sync
