@@ -1,5 +1,5 @@
-// Affine maps in double precision, composed and applied in one fixed order of operations, so that
-// every machine gets the same bits (no contraction: the build says so for both compilers).
+// Affine maps in double precision. They are composed and applied in one fixed order of operations,
+// so that every machine gets the same bits (the build turns off contraction for both compilers).
 #pragma once
 
 #include <array>
@@ -25,7 +25,7 @@ VOXELD_HD inline Point3d Map(const Affine& a, double x, double y, double z) {
           ((a.m[8] * x + a.m[9] * y) + a.m[10] * z) + a.m[11]};
 }
 
-// outer ∘ inner: inner is applied first.
+// Returns outer ∘ inner: inner is applied first.
 VOXELD_HD inline Affine Compose(const Affine& outer, const Affine& inner) {
   Affine r;
   for (int row = 0; row < 3; ++row) {
@@ -38,14 +38,15 @@ VOXELD_HD inline Affine Compose(const Affine& outer, const Affine& inner) {
   return r;
 }
 
-// Of the linear part.
+// Returns the determinant of the linear part.
 VOXELD_HD inline double Determinant(const Affine& a) {
   const double* m = a.m;
   return (m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8])) +
          m[2] * (m[4] * m[9] - m[5] * m[8]);
 }
 
-// Of an entry of the linear part. Row r of the inverse has entries Cofactor(a, c, r) / Determinant(a).
+// Returns the cofactor of an entry of the linear part. Row r of the inverse has entries Cofactor(a,
+// c, r) / Determinant(a).
 inline double Cofactor(const Affine& a, int row, int col) {
   const auto at = [&](int i, int j) { return a.m[i % 3 * 4 + j % 3]; };
   return at(row + 1, col + 1) * at(row + 2, col + 2) - at(row + 1, col + 2) * at(row + 2, col + 1);

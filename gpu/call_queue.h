@@ -1,4 +1,4 @@
-// Carries out calls one after the other: in a thread of its own, or in the caller's.
+// Executes calls one after the other: in a thread of its own, or in the caller's thread.
 #pragma once
 
 #include <deque>
@@ -12,11 +12,11 @@ namespace voxeld::gpu {
 // Thread-safe.
 class CallQueue {
  public:
-  // With `cancelled` a call is not to be carried out, only to be answered.
+  // If `cancelled` is true, the call must not be executed, only answered.
   using Call = std::function<void(bool cancelled)>;
 
   explicit CallQueue(bool run_inline);
-  // Calls not begun yet are cancelled.
+  // Cancels calls that have not begun.
   ~CallQueue();
   CallQueue(const CallQueue&) = delete;
   CallQueue& operator=(const CallQueue&) = delete;

@@ -1,4 +1,4 @@
-// What every engine refuses alike: calls whose arguments do not hold together.
+// Checks that every engine shares: they reject calls whose arguments are inconsistent.
 #pragma once
 
 #include <cstddef>
@@ -16,17 +16,18 @@
 
 namespace voxeld::gpu {
 
-// InvalidArgument with the field, its value and what would be right.
+// Errors: InvalidArgument with the field, its value and the values that are valid.
 absl::Status CheckTarget(const Target& target, SlicePart part);
 
-// The first `size` bytes of `block`, if it has them.
+// Returns the first `size` bytes of `block`, or an error if the block is smaller.
 absl::StatusOr<std::span<std::byte>> CheckDelta(const StagingBlock& block, size_t size);
 
-// Which tiles a part's slices, of so many in all, look at: a TileOwner each.
+// Returns, as a TileOwner for each tile, which tiles the slices of `part` look at. `slices` is the
+// number of all slices.
 std::vector<uint8_t> OwnedTiles(const display::TileToSlices& tile_to_slices, const TileGrid& grid,
                                 SlicePart part, int32_t slices);
 
-// `layout` is the target's; none: FailedPrecondition.
+// `layout` is the target's layout. Errors: FailedPrecondition if it is empty.
 absl::Status CheckFrame(const FrameRequest& request, const FrameBuffer& buffer,
                         const std::optional<display::FrameLayout>& layout, uint64_t last_frame);
 absl::Status CheckBox(const VoxelBox& box, size_t out,

@@ -6,7 +6,7 @@
 namespace voxeld::gpu {
 namespace {
 
-// To the nearest whole number, halves away from zero; saturates. `x` is not NaN.
+// Rounds to the nearest whole number, halves away from zero; saturates. Requires: `x` is not NaN.
 int64_t RoundSymmetric(double x, int64_t most) {
   const double size = x < 0 ? -x : x;
   const int64_t rounded =
@@ -18,13 +18,13 @@ double GreatestSize(const double v[3]) {
   return std::max({std::fabs(v[0]), std::fabs(v[1]), std::fabs(v[2])});
 }
 
-// What turns a plane n·p + d of scene space into one of voxel space: n·A⁻¹(q − t) + d, times the
-// size of A's determinant, which is not divided by.
+// Maps a plane n·p + d of scene space to one of voxel space: n·A⁻¹(q − t) + d, multiplied by the
+// size of A's determinant, so that nothing is divided by it.
 struct PlaneMap {
   double cofactor[3]
                  [3];  // of the view's linear part, by row and column, with the determinant's sign
   double shift[3];
-  double size;  // of the determinant
+  double size;  // of the determinant, its absolute value
 
   explicit PlaneMap(const Affine& view) {
     const double determinant = Determinant(view);
@@ -39,7 +39,8 @@ struct PlaneMap {
   }
 
   VoxelHalfSpace Of(const ClipPlane& plane) const {
-    // Scaling by powers of two is exact: it keeps what follows clear of over- and underflow.
+    // Scaling by powers of two is exact: it keeps the following operations clear of over- and
+    // underflow.
     const double scene[3] = {plane.a, plane.b, plane.c};
     int exponent = 0;
     std::frexp(GreatestSize(scene), &exponent);
@@ -55,7 +56,7 @@ struct PlaneMap {
     const double offset =
         size * d - ((normal[0] * shift[0] + normal[1] * shift[1]) + normal[2] * shift[2]);
     const double greatest = GreatestSize(normal);
-    // A view without an inverse, too.
+    // A view without an inverse also ends here.
     if (!(size > 0) || !std::isfinite(size) || !(greatest > 0) || !std::isfinite(greatest) ||
         std::isnan(offset)) {
       return NowhereInside();
@@ -67,14 +68,14 @@ struct PlaneMap {
       half_space.normal[a] =
           RoundSymmetric(std::ldexp(normal[a], kNormalBits - exponent), kMaxClipNormal);
     }
-    // In half voxels.
+    // The offset is in half voxels.
     half_space.offset =
         RoundSymmetric(std::ldexp(offset, kNormalBits + 1 - exponent), kMaxClipOffset);
     return half_space;
   }
 };
 
-// Nowhere, where there is no inverse.
+// Without an inverse, no voxel is inside.
 VoxelCylinder MapCylinder(const ClipCylinder& cylinder, const Affine& view) {
   const Affine map = Compose(view, cylinder.unit);  // x² + y² ≤ 1 → voxel space
   const double determinant = Determinant(map);

@@ -1,28 +1,30 @@
 // Where a layer is drawn: its clip planes and its region (gpu/delta.h), as half-spaces of voxel
-// space in whole numbers, and its clip cylinders in double precision, so that every machine gives each voxel the
-// same verdict.
+// space in whole numbers, and its clip cylinders in double precision, so that every machine decides
+// the same for each voxel.
 //
 // Definition. A voxel (x, y, z) belongs to the layer if for each half-space
 //
 //   normal · (2x+1, 2y+1, 2z+1) + offset ≥ 0          in integers, exactly
 //
-// which is its centre, in half voxels, on the inner side of the plane or on it. A plane of scene
-// space becomes a half-space of the view's voxel space in double precision, in the order in which
-// it is written in clip.cc, and is rounded once, after a scaling by a power of two that puts the
-// greatest component of its normal into [2³⁷, 2³⁸). A region is six planes, its faces inside.
+// that is, if its centre, in half voxels, is on the inner side of the plane or on it. A plane of
+// scene space becomes a half-space of the view's voxel space in double precision, with the
+// operations in the order that clip.cc writes. It is rounded once, after a scaling by a power of
+// two that puts the greatest component of its normal into [2³⁷, 2³⁸). A region is six planes; its
+// faces are inside.
 //
-// Error. In a grid of nx × ny × nz voxels rounding shifts a plane, measured along the axis nearest
-// to its normal, by at most (nx + ny + nz + 1) · 2⁻³⁸ voxel: 2⁻²² in the greatest grid there can
-// be. Double precision before that adds what it adds to vertices: 2⁻⁵⁰ of the terms that are
+// Error. In a grid of nx × ny × nz voxels, rounding shifts a plane, measured along the axis nearest
+// to its normal, by at most (nx + ny + nz + 1) · 2⁻³⁸ voxel: 2⁻²² in the greatest possible grid.
+// The double precision before that adds as much as it adds to vertices: 2⁻⁵⁰ of the terms that are
 // summed.
 //
 // A cylinder holds a voxel if q₀² + q₁² ≤ 1 for
 //
 //   qᵣ = ((row₀·(2x+1) + row₁·(2y+1)) + row₂·(2z+1)) + base     in IEEE double, each operation rounded
 //
-// Rounding keeps order: of a box of voxels the least and the greatest q are known from its corners, as computed.
+// Rounding keeps order: the least and the greatest computed q of a box of voxels are found at its
+// corners.
 //
-// A plane and its opposite are rounded to exact opposites: each voxel is in one of them at least,
+// A plane and its opposite are rounded to exact opposites: each voxel is in at least one of them,
 // and in both only if its centre lies in the rounded plane.
 #pragma once
 
@@ -42,10 +44,11 @@ struct VoxelHalfSpace {
 inline constexpr int64_t kMaxClipNormal = int64_t{1} << 38;
 inline constexpr int64_t kMaxClipOffset = int64_t{1} << 61;
 
-// What is nowhere: a layer under a view that has no inverse shows none of what is clipped.
+// A half-space that no voxel is in. Under a view without an inverse, a layer with clips shows
+// nothing.
 VOXELD_HD inline VoxelHalfSpace NowhereInside() { return {{0, 0, 0}, -1}; }
 
-// Coordinates of a grid's voxels: 0 to 2¹⁸, so that nothing overflows.
+// Requires: coordinates of a grid's voxels, 0 to 2¹⁸, so that nothing overflows.
 VOXELD_HD inline int64_t ClipValue(const VoxelHalfSpace& h, int64_t x, int64_t y, int64_t z) {
   return h.normal[0] * (2 * x + 1) + h.normal[1] * (2 * y + 1) + h.normal[2] * (2 * z + 1) +
          h.offset;
@@ -57,7 +60,7 @@ VOXELD_HD inline bool IsInside(const VoxelHalfSpace& h, int64_t x, int64_t y, in
 
 enum class ClipSide : uint8_t { kInside, kCut, kOutside };
 
-// Of all voxels of a box, which is not empty.
+// Returns the side on which all voxels of a box are. Requires: the box is not empty.
 VOXELD_HD inline ClipSide SideOf(const VoxelHalfSpace& h, const Box3& box) {
   int64_t least = h.offset, greatest = h.offset;
   for (int a = 0; a < 3; ++a) {
@@ -111,10 +114,10 @@ VOXELD_HD inline ClipSide SideOf(const VoxelCylinder& c, const Box3& box) {
   return nearest[0] + nearest[1] <= 1 ? ClipSide::kCut : ClipSide::kOutside;
 }
 
-// Planes and the region's six faces.
+// The planes and the region's six faces.
 inline constexpr uint32_t kMaxHalfSpaces = kMaxClipPlanes + 6;
 
-// All of a layer's, under one view; without any it is drawn everywhere.
+// All clips of a layer, under one view. A layer without any is drawn everywhere.
 struct VoxelClip {
   uint32_t count = 0;
   VoxelHalfSpace half_spaces[kMaxHalfSpaces];
@@ -122,7 +125,7 @@ struct VoxelClip {
   VoxelCylinder cylinders[kMaxClipCylinders];
 };
 
-// `view`: scene → voxel space. Host.
+// `view` maps the scene to voxel space. Host only.
 VoxelClip MapClip(const LayerRecord& layer, const Affine& view);
 
 }  // namespace voxeld::gpu

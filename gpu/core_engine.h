@@ -1,5 +1,5 @@
-// The engine's door over a core that does the work of its calls: queue, staging, and what happens
-// when a call fails in its middle.
+// The engine's interface around a core that does the work of its calls. It adds the queue, the
+// staging memory, and the handling of calls that fail midway.
 #pragma once
 
 #include <exception>
@@ -16,8 +16,8 @@
 
 namespace voxeld::gpu {
 
-// `Core`, used by one thread at a time: SetTarget, Apply, SubmitFrame, ReadVoxels, as CpuCore has
-// them; link, where it has one.
+// `Core` is used by one thread at a time. It has SetTarget, Apply, SubmitFrame and ReadVoxels, as
+// CpuCore has them, and link if it has one.
 template <typename Core>
 class CoreEngine final : public Engine {
  public:
@@ -41,7 +41,7 @@ class CoreEngine final : public Engine {
 
   void Apply(StagingBlock block, size_t size, Done done) override {
     Post(std::move(done), [this, block = std::move(block), size]() mutable {
-      const StagingBlock mine = std::move(block);  // given back before the answer
+      const StagingBlock mine = std::move(block);  // released before the answer
       return core_->Apply(mine, size);
     });
   }
@@ -63,7 +63,7 @@ class CoreEngine final : public Engine {
   }
 
  private:
-  // Runs `work` in its turn and answers with what it returns.
+  // Runs `work` when its turn comes and answers with the value that it returns.
   template <typename DoneFunction, typename Work>
   void Post(DoneFunction done, Work work) {
     calls_.Post([this, done = std::move(done), work = std::move(work)](bool cancelled) mutable {
@@ -73,7 +73,7 @@ class CoreEngine final : public Engine {
     });
   }
 
-  // Memory that runs out in the middle of a call leaves an engine that cannot be trusted.
+  // If memory runs out in the middle of a call, the state of the engine can no longer be trusted.
   template <typename Work>
   auto Guarded(Work& work) -> decltype(work()) {
     try {
@@ -95,8 +95,8 @@ class CoreEngine final : public Engine {
   const EngineInfo info_;
   StagingPool staging_;
   const std::unique_ptr<Core> core_;
-  absl::Status lost_;  // not OK: DataLoss, after a failure in the middle of a call
-  CallQueue calls_;    // last: its thread uses the others
+  absl::Status lost_;  // if not OK: DataLoss, after a failure in the middle of a call
+  CallQueue calls_;    // last, because its thread uses the other members
 };
 
 }  // namespace voxeld::gpu

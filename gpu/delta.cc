@@ -25,7 +25,7 @@ static_assert(sizeof(RecordHeader) == kAlign && sizeof(IdRecord) == kAlign);
 
 constexpr uint64_t Padded(uint64_t size) { return (size + kAlign - 1) / kAlign * kAlign; }
 
-// Builds messages that say where, what, and what would be right.
+// Builds messages that say where the error is, the value, and which values are valid.
 class Checker {
  public:
   Checker(uint64_t offset, const char* record) : offset_(offset), record_(record) {}
@@ -160,7 +160,7 @@ absl::Status CheckGeometry(const Checker& check, const GeometryRecord& g) {
   return absl::OkStatus();
 }
 
-// The geometry's arrays at `at`, which has room for them.
+// Points the view at the geometry's arrays, which begin at `at`. Requires: there is room for them.
 void SetArrays(const std::byte* at, GeometryView& view) {
   const GeometryRecord& g = view.record;
   const ArrayLayout layout = ArrayLayout::Of(g);
@@ -169,7 +169,8 @@ void SetArrays(const std::byte* at, GeometryView& view) {
   view.colors = {reinterpret_cast<const uint32_t*>(at + layout.colors), ColorCount(g)};
 }
 
-// Of a program, or of a grid's head, which are looked at wherever they lie.
+// Checks a program or the head of a grid. These are checked whether they lie in the record or in
+// bulk memory.
 absl::Status CheckCode(uint64_t offset, const GeometryView& view) {
   absl::Status status;
   if (view.record.kind == PrimitiveKind::kImplicit) {
@@ -187,7 +188,7 @@ std::string ForCounts(uint64_t size, const GeometryRecord& g) {
                       ColorCount(g), " colours");
 }
 
-// `body`: what follows the header.
+// `body`: the bytes after the header.
 absl::Status ReadGeometry(uint64_t offset, std::span<const std::byte> body, DeltaVisitor& visitor) {
   const Checker check(offset, "geometry");
   GeometryView view;
@@ -348,7 +349,7 @@ uint64_t ColorCount(const GeometryRecord& g) {
   return count;
 }
 
-// Counts are 32-bit, so the sums fit.
+// Counts are 32-bit, so the sums fit in 64 bits.
 ArrayLayout ArrayLayout::Of(const GeometryRecord& g) {
   ArrayLayout layout;
   layout.indices = Padded(uint64_t{g.vertex_count} * 12);

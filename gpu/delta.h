@@ -1,8 +1,8 @@
-// A scene's change as flat bytes: what goes through the engine's door, whoever is behind it.
+// A scene's change as flat bytes: the data that is passed to an engine, whatever its kind.
 //
-// A delta is a sequence of records, each 16-byte aligned: RecordHeader, a fixed struct, arrays.
-// Little-endian; no pointers; ids are the caller's and unique within their kind. Records apply in
-// order; order between drawables has no influence on what is drawn.
+// A delta is a sequence of records, each 16-byte aligned: RecordHeader, a fixed struct, arrays. It
+// is little-endian and has no pointers. Ids are the caller's and unique within their kind. Records
+// apply in order; the order of drawables has no influence on what is drawn.
 //
 //   geometry  immutable content: a kind of primitive, its parameters and arrays,
 //             in its own coordinates
@@ -10,7 +10,7 @@
 //             share one
 //   layer     how its voxels combine with those below, and where it is drawn
 //
-// A geometry's arrays lie in its record, or in bulk memory that the record refers to.
+// A geometry's arrays are in its record, or in bulk memory that the record refers to.
 #pragma once
 
 #include <algorithm>
@@ -29,19 +29,19 @@
 
 namespace voxeld::gpu {
 
-// Entries of a geometry's array of colours.
+// Returns the number of entries in a geometry's array of colours.
 uint64_t ColorCount(const GeometryRecord& g);
 
-// Where a geometry's arrays lie, in a record or in bulk memory: positions at the beginning, each
-// array padded to 16 bytes.
+// The layout of a geometry's arrays, in a record or in bulk memory: positions at the beginning,
+// each array padded to 16 bytes.
 struct ArrayLayout {
   uint64_t indices = 0, colors = 0;  // offsets
-  uint64_t size = 0;                 // of all, padding included
+  uint64_t size = 0;                 // of all arrays, padding included
 
   static ArrayLayout Of(const GeometryRecord& g);
 };
 
-// Whether two layers are drawn in the same part of the scene, as it is written.
+// Returns whether two layers are drawn in the same part of the scene, by their records' values.
 inline bool SameClip(const LayerRecord& a, const LayerRecord& b) {
   return std::equal(a.planes, a.planes + a.plane_count, b.planes, b.planes + b.plane_count) &&
          std::equal(a.cylinders, a.cylinders + a.cylinder_count, b.cylinders,
@@ -49,8 +49,8 @@ inline bool SameClip(const LayerRecord& a, const LayerRecord& b) {
          a.has_region == b.has_region && (a.has_region == 0 || a.region == b.region);
 }
 
-// Appends records to a span. Overruns are counted, not written:
-// size the span with the Size functions.
+// Appends records to a span. Overruns are counted, not written: use the SizeOf functions to size
+// the span.
 class DeltaWriter {
  public:
   explicit DeltaWriter(std::span<std::byte> out) : out_(out) {}
@@ -69,8 +69,8 @@ class DeltaWriter {
   // with kPerVertex, else empty).
   void PutGeometry(const GeometryRecord& g, std::span<const float> positions,
                    std::span<const uint32_t> indices, std::span<const uint32_t> colors);
-  // `arrays` holds them as ArrayLayout says; what they contain has been checked as ReadDelta checks
-  // those in records.
+  // `arrays` holds the arrays in the order of ArrayLayout. Their contents must already have been
+  // checked as ReadDelta checks those in records.
   void PutGeometry(const GeometryRecord& g, BulkBlock arrays);
   void PutDrawable(const DrawableRecord& d);
   void PutLayer(const LayerRecord& l);
@@ -79,7 +79,8 @@ class DeltaWriter {
 
   size_t size() const { return size_; }
   bool overrun() const { return size_ > out_.size(); }
-  // The blocks that the delta refers to, which go to the engine with it (StagingBlock::Refer).
+  // The blocks that the delta refers to. They go to the engine together with it
+  // (StagingBlock::Refer).
   std::vector<BulkBlock> TakeReferred() { return std::move(referred_); }
 
  private:
@@ -92,19 +93,20 @@ class DeltaWriter {
   std::vector<BulkBlock> referred_;
 };
 
-// A geometry as it lies in a delta: views into the block, or into bulk memory.
+// A geometry in a delta: views into the block, or into bulk memory.
 struct GeometryView {
   GeometryRecord record;
   std::span<const float> positions;  // 3 · vertex_count
   std::span<const uint32_t> indices;
   std::span<const uint32_t> colors;
   std::shared_ptr<const void> bulk;  // keeps bulk memory; null if the arrays lie in the delta
-  uint64_t bulk_segment = 0;         // in which they lie
+  uint64_t bulk_segment = 0;         // the segment that holds them
 
   bool HasArrays() const { return !positions.empty() || !indices.empty(); }
 };
 
-// What ReadDelta calls, in order. An error from any ends the reading.
+// ReadDelta calls these functions in the order of the records. An error from any of them ends the
+// reading.
 struct DeltaVisitor {
   virtual ~DeltaVisitor() = default;
   virtual absl::Status OnGeometry(const GeometryView& g) = 0;
@@ -114,10 +116,11 @@ struct DeltaVisitor {
   virtual absl::Status OnReset() = 0;
 };
 
-// Checks every record (sizes, counts, enums, indices in range, finite numbers) and hands
-// it to `visitor`. InvalidArgument with the byte offset, the value and what would be right.
-// `delta` is 16-byte aligned. `bulk` finds what lies in bulk memory: that its arrays are there, whole,
-// is checked; what they contain was, by who wrote them. Null: there is none.
+// Checks every record (sizes, counts, enums, indices in range, finite numbers) and passes it to
+// `visitor`. Requires: `delta` is 16-byte aligned. `bulk` finds arrays in bulk memory; null if
+// the delta has none. ReadDelta checks that those arrays are complete, but not their contents,
+// which their writer has checked. Errors: InvalidArgument with the byte offset, the value and the
+// values that are valid.
 absl::Status ReadDelta(std::span<const std::byte> delta, DeltaVisitor& visitor,
                        BulkSource* bulk = nullptr);
 

@@ -1,4 +1,5 @@
-// How much memory an engine takes for what it draws, so that a scene can be refused before anything is made.
+// How much memory an engine takes for what it draws, so that a scene can be rejected before
+// anything is allocated.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +10,8 @@
 
 namespace voxeld::gpu {
 
-// Returns: the bytes that the C library's allocator uses for a block of `bytes`: with its header, a multiple of 16, at least 32.
+// Returns: the bytes that the C library's allocator uses for a block of `bytes`, its header
+// included: a multiple of 16, at least 32.
 constexpr uint64_t HeapBytes(uint64_t bytes) {
   if (bytes == 0) return 0;
   const uint64_t block = (bytes + 8 + 15) / 16 * 16;
@@ -30,12 +32,14 @@ uint64_t HashBytes(const Map& map) {
   return HeapBytes(map.capacity() * (sizeof(Slot) + 1));
 }
 
-// An upper bound for a drawable without vertices: its record, its places in indexes, and the smallest lists (assemble/scene.cc checks it).
-// The CPU takes about 930 bytes; a GPU takes 1,300 on the host, and 1,300 on the device.
+// An upper bound for a drawable without vertices: its record, its entries in indexes, and the
+// smallest lists (assemble/scene.cc checks it). The CPU takes about 930 bytes; a GPU takes 1,300 on
+// the host, and 1,300 on the device.
 inline constexpr uint64_t kMostDrawableBytes = 2800;
 
-// Returns: an upper bound of the bytes that an engine holds for one drawable of this geometry, without lists of tiles and items, and
-// the pieces of curves: EngineOptions::index_bytes bounds those for all drawables together.
+// Returns: an upper bound of the bytes that an engine holds for one drawable of this geometry.
+// Lists of tiles and items, and the pieces of curves, do not count: EngineOptions::index_bytes
+// bounds those for all drawables together.
 constexpr uint64_t MostDerivedBytes(const GeometryRecord& geometry) {
   return kMostDrawableBytes + HeapBytes(uint64_t{geometry.vertex_count} * 3 * sizeof(int32_t));
 }

@@ -53,7 +53,7 @@ absl::StatusOr<std::unique_ptr<Engine>> CreateEngine(const EngineOptions& option
     case EngineKind::kAuto: {
       EngineOptions cuda = options;
       cuda.kind = EngineKind::kCuda;
-      // The loss of one that never came is nobody's.
+      // Do not report the loss of an engine that never started.
       const auto came = std::make_shared<std::atomic<bool>>(false);
       if (options.lost) {
         cuda.lost = [came, lost = options.lost](const absl::Status& status) {

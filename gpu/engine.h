@@ -1,7 +1,7 @@
-// The one door to the volume engine: a scene's deltas in, packed slices out.
+// The interface of the volume engine: it takes a scene's deltas and returns packed slice images.
 //
 //   StatusOr<unique_ptr<Engine>> engine = CreateEngine({.kind = EngineKind::kAuto});
-//   engine->SetTarget(target, done);                      // which display, which view
+//   engine->SetTarget(target, done);                      // the display and the view
 //   StagingBlock block = *engine->AcquireStaging(bytes);  // memory that may be shared
 //                                                         // with a process
 //   DeltaWriter writer(block.bytes()); …                  // gpu/delta.h
@@ -10,19 +10,19 @@
 //   engine->SubmitFrame({.frame = 7}, buffer, done);
 //
 // Contract
-// - Calls are carried out in the order in which they were made; each ends in exactly one call of
-//   its `done`, from a thread of the engine's (or inside the call, with
-//   EngineOptions::inline_execution); those not begun when the engine is destroyed end in
+// - Calls are executed in the order in which they were made. Each ends in exactly one call of its
+//   `done`, from one of the engine's threads (or inside the call, with
+//   EngineOptions::inline_execution). Calls that have not begun when the engine is destroyed end in
 //   Cancelled, before its destructor returns. `done` must only post: it must not call the engine,
 //   block, or throw.
-// - No pointer passes for keeps: the engine owns a staging block from Apply on;
-//   a FrameBuffer belongs to the caller, is written only between SubmitFrame and its `done`, and
-//   is not remembered.
-// - For any scene every engine gives the same bytes,
-//   in any number of threads, parts and frames between.
+// - The engine keeps no caller's pointer after a call: it owns a staging block from Apply on; a
+//   FrameBuffer belongs to the caller, and the engine writes it only between SubmitFrame and its
+//   `done`.
+// - Every engine produces the same bytes for a scene, with any number of threads and parts, and
+//   whichever frames were drawn in between.
 // - An error leaves the engine as it was before that call, unless the code is DataLoss: then the
-//   engine is gone, every later call ends in DataLoss, and its owner makes a new one and gives it
-//   the whole scene (what an engine holds is always derived).
+//   engine is lost and every later call ends in DataLoss. Its owner creates a new one and sends it
+//   the whole scene (everything that an engine holds is derived from it).
 // - Thread-safe.
 #pragma once
 
@@ -55,17 +55,17 @@ struct SliceRange {
   int32_t begin = 0, end = 0;
 };
 
-// The slices that an engine owns, [begin, end) of the layout's; it draws only
-// the tiles that they look at. Several engines, each with a part, make one display:
-// their slices joined equal the whole's.
+// The slices that an engine owns: [begin, end) of the layout's slices. The engine draws only the
+// tiles that those slices look at. Several engines, each with a part, can drive one display: their
+// slices together equal those of one engine for all.
 struct SlicePart {
   int32_t begin = 0;
   int32_t end = -1;  // −1: to the last
-  // Of that range, cut into `ranks` runs of equal length, give or take a slice, the one numbered
-  // `rank`; it may be empty.
+  // The range is divided into `ranks` runs whose lengths differ by at most one slice; the part is
+  // the run with number `rank`, which may be empty.
   int32_t rank = 0, ranks = 1;
 
-  // Of a layout with so many slices.
+  // Returns the slices of this part in a layout with `slices` slices.
   SliceRange Within(int32_t slices) const {
     const int64_t count = (end == -1 ? slices : end) - begin;
     return {static_cast<int32_t>(begin + count * rank / ranks),
@@ -75,37 +75,40 @@ struct SlicePart {
 
 struct EngineOptions {
   EngineKind kind = EngineKind::kAuto;
-  int threads = 0;                // worker threads of the CPU engine; 0: one a core
+  int threads = 0;                // worker threads of the CPU engine; 0: one per core
   bool inline_execution = false;  // every call finishes before it returns, in the caller's thread
-  int device = 0;                 // of the CUDA engine
-  // Several GPUs: the engine is made of ranks, one for each, which each draw their share of the
-  // slices in a process of their own (gpu/ranks). The CPU engine has ranks only with `in_worker`, as
-  // many as there are numbers. Fewer than two: none.
+  int device = 0;                 // the GPU of the CUDA engine
+  // With several GPUs, the engine consists of ranks, one for each GPU. Each draws its share of the
+  // slices in a process of its own (gpu/ranks). The CPU engine has ranks only with `in_worker`: one
+  // for each number in the list. With fewer than two entries, no ranks are used.
   std::vector<int> devices;
-  // By which a delta goes from the first of them to the others: a path of NCCL's library; empty:
-  // $VOXELD_NCCL, then where the loader looks; "off": each is sent all of it.
+  // The path of the NCCL library, over which the first rank sends a delta to the others. Empty:
+  // $VOXELD_NCCL, then where the loader looks; "off": every rank is sent the whole delta.
   std::string nccl;
-  // The CPU engine too runs in a process of its own (the CUDA engine always does).
+  // Runs the CPU engine, too, in a process of its own (the CUDA engine always does).
   bool in_worker = false;
-  std::string worker;  // the program of that process; empty: voxeld-engine, beside this one
-  // Where engines of one GPU find the process that they share; null: this one has its own.
+  std::string worker;  // the program of that process; empty: voxeld-engine, beside this program
+  // The pool in which engines of one GPU share a process; null: this engine has its own process.
   std::shared_ptr<WorkerPool> workers;
-  // After which a worker that does not answer is given up.
+  // The time after which a worker that does not answer is given up.
   int64_t worker_deadline_ns = 2'000'000'000;
-  // False, of an engine in a process of its own: CreateEngine only begins; if the engine cannot be
-  // had its calls end in DataLoss that says why. info() is for after the first call that succeeded.
+  // For an engine in a process of its own. If false, CreateEngine returns at once; if the engine
+  // cannot be started, its calls end in DataLoss that says why. info() is valid after the first
+  // call that succeeded.
   bool wait_until_ready = true;
-  // Called once, from a thread of the engine's, when an engine in a process of its own is lost, also
-  // between calls. It must only post.
+  // Called once, from one of the engine's threads, when an engine in a process of its own is lost,
+  // even between calls. It must only post.
   std::function<void(const absl::Status&)> lost;
-  // When it becomes true, the CPU engine gives up its call in DataLoss. For a daemon that stops. May be null.
+  // When it becomes true, the CPU engine aborts its call with DataLoss. For a daemon that stops.
+  // May be null.
   std::shared_ptr<const std::atomic<bool>> abandoned;
   SlicePart part;
-  uint64_t staging_limit_bytes = uint64_t{4} << 30;  // of blocks at once, until they are applied
-  // Bounds what an engine derives of items by tile (CPU), or by tile and region (CUDA, of the device's
-  // memory). The CPU engine may use a quarter more for lists of the tiles that drawables are in, and for pieces of curves.
-  // A scene that needs more is drawn in passes: more slowly, with the same result. 0: the engine's default (CPU:
-  // cpu_index_bytes; CUDA: 16 GiB or a quarter of the device, whichever is less).
+  uint64_t staging_limit_bytes = uint64_t{4} << 30;  // of all blocks together, until applied
+  // Bounds the items that an engine derives by tile (CPU), or by tile and region (CUDA, in the
+  // device's memory). The CPU engine may use a quarter more for lists of the tiles that drawables
+  // are in, and for pieces of curves. A scene that needs more is drawn in passes, more slowly but
+  // with the same result. 0: the engine's default (CPU: cpu_index_bytes; CUDA: 16 GiB or a quarter
+  // of the device, whichever is less).
   uint64_t index_bytes = 0;
   uint64_t cpu_index_bytes = 0;  // 0: 4 GiB
 };
@@ -113,7 +116,7 @@ struct EngineOptions {
 struct EngineInfo {
   EngineKind kind = EngineKind::kCpu;  // never kAuto
   std::string device;                  // "CPU, 8 threads", "NVIDIA H200"
-  std::string reason;                  // why this kind: "no CUDA driver", "asked for", …
+  std::string reason;  // why this kind was chosen: "no CUDA driver", "asked for", …
 };
 
 // The display that an engine draws for.
@@ -125,14 +128,14 @@ struct Target {
   Affine view;
 };
 
-// Staging memory, written by the caller before it goes to Apply.
-// Movable; given back on destruction.
+// Staging memory, which the caller writes before it passes the block to Apply. Movable; released on
+// destruction.
 class StagingBlock {
  public:
   struct Memory {
     virtual ~Memory() = default;
     virtual std::span<std::byte> bytes() = 0;
-    // Finds what the delta refers to, where that is not blocks that came along.
+    // Finds the data that the delta refers to, if it is not in blocks that came with the delta.
     virtual BulkSource* bulk() { return nullptr; }
   };
   StagingBlock() = default;
@@ -141,7 +144,7 @@ class StagingBlock {
   const std::shared_ptr<Memory>& memory() const { return memory_; }
   BulkSource* bulk() const { return memory_ ? memory_->bulk() : nullptr; }
 
-  // The bulk memory that the delta in it refers to. The engine holds it for as long as it reads it.
+  // Adds the bulk memory that this block's delta refers to. The engine holds it while it reads it.
   void Refer(std::vector<BulkBlock> blocks) {
     referred_ = std::make_shared<const std::vector<BulkBlock>>(std::move(blocks));
   }
@@ -155,14 +158,14 @@ class StagingBlock {
 };
 
 struct FrameRequest {
-  uint64_t frame = 0;  // ascending; recorded as the frame in which a picture's bytes changed
-  // The last frame that this very buffer held, whole; 0: none. Pictures that have not changed since
-  // then are not written again.
+  uint64_t frame = 0;  // ascending; recorded as the frame in which a slice image's bytes changed
+  // The last complete frame that this buffer held; 0: none. Slice images that have not changed
+  // since that frame are not written again.
   uint64_t buffer_holds = 0;
 };
 
-// Caller's memory. Sizes are the whole layout's, also when the engine owns a part:
-// it writes its slices.
+// The caller's memory. It has the size of the whole layout, even if the engine owns a part: the
+// engine writes only its own slices.
 struct FrameBuffer {
   std::span<std::byte> bytes;      // layout.bytes()
   std::span<uint64_t> changed_in;  // layout.pictures()
@@ -170,20 +173,20 @@ struct FrameBuffer {
 
 struct FrameResult {
   uint64_t frame = 0;
-  bool changed = false;  // some picture differs from the frame before
-  // Of the engine's tiles, less those that a rank before counts: result not black.
+  bool changed = false;  // some slice image differs from the frame before
+  // Voxels that are not black, in the engine's tiles except those that a rank before it counts.
   uint64_t lit_voxels = 0;
-  uint32_t tiles_drawn = 0;         // dirty tiles, of the engine's own size, drawn for this frame
-  uint32_t pictures_drawn = 0;      // pictures sliced again
+  uint32_t tiles_drawn = 0;         // dirty tiles, of the engine's own size, that this frame drew
+  uint32_t pictures_drawn = 0;      // slice images that were packed again
   uint32_t singular_drawables = 0;  // solids whose map has no inverse: they draw nothing
-  // Where a display's pixels are voxels, pictures may be packed as the volume is drawn; then that is
-  // all assembling. Else the volume is drawn, and sliced.
+  // If a display's pixels are voxels, slice images may be packed while the volume is drawn; both
+  // then count as assembling. Otherwise the volume is drawn first and sliced afterwards.
   bool packed_as_drawn = false;
-  // Until the volume was drawn; from there until the pictures were packed; and until they lay in the
-  // buffer, as far as that took longer than the packing.
+  // Durations of: drawing the volume; packing the slice images; and copying them into the buffer,
+  // as far as that took longer than the packing.
   int64_t assemble_ns = 0, slice_ns = 0, copy_ns = 0;
-  // What the engine holds of its own, on the device where it has one: what it derives from the scene, the volume and
-  // the pictures. Bulk memory is not its own.
+  // The memory that the engine itself owns, on the device if it has one: the data derived from the
+  // scene, the volume and the slice images. Bulk memory does not count.
   uint64_t memory_bytes = 0;
 };
 
@@ -201,30 +204,31 @@ class Engine {
 
   virtual const EngineInfo& info() const = 0;
 
-  // Sets or replaces the target; the scene stays, everything is drawn anew. InvalidArgument for a
-  // geometry or layout that does not hold together. Must come before the first frame.
+  // Sets or replaces the target. The scene stays, and everything is drawn again. Must be called
+  // before the first frame. Errors: InvalidArgument for an inconsistent geometry or layout.
   virtual void SetTarget(Target target, Done done) = 0;
 
-  // `size` bytes of staging memory. ResourceExhausted past the limit.
+  // Returns `size` bytes of staging memory. Errors: ResourceExhausted past the limit.
   virtual absl::StatusOr<StagingBlock> AcquireStaging(size_t size) = 0;
 
-  // Applies the first `size` bytes of `block`, a delta as gpu/delta.h has it. InvalidArgument for a
-  // malformed one, with the offset; then nothing of it is applied.
+  // Applies the first `size` bytes of `block`, a delta in the format of gpu/delta.h. Errors:
+  // InvalidArgument with the offset for a malformed delta, of which nothing is applied.
   virtual void Apply(StagingBlock block, size_t size, Done done) = 0;
 
   // Brings the scene up to date, and `buffer` up to `request.frame`.
   virtual void SubmitFrame(const FrameRequest& request, FrameBuffer buffer, FrameDone done) = 0;
 
-  // The blended voxels of `box`, x fastest, as 0x00RRGGBB; those outside the engine's tiles are 0.
-  // For tests and tools: brings the scene up to date first.
+  // Writes the blended voxels of `box`, x fastest, as 0x00RRGGBB; voxels outside the engine's tiles
+  // are 0. For tests and tools: brings the scene up to date first.
   virtual void ReadVoxels(VoxelBox box, std::span<uint32_t> out, Done done) = 0;
 
-  // What connects it, in a worker, with the other ranks of its display (gpu/rank_link.h); null: such
-  // an engine needs nothing. Between calls, with inline_execution.
+  // Returns the link that connects the engine, in a worker, with the other ranks of its display
+  // (gpu/rank_link.h); null if it needs none. Requires: inline_execution, and no call in progress.
   virtual RankLink* link() { return nullptr; }
 };
 
-// FailedPrecondition if the kind asked for cannot be had, with the reason; kAuto always succeeds.
+// Errors: FailedPrecondition with the reason if the requested kind is not available; kAuto always
+// succeeds.
 absl::StatusOr<std::unique_ptr<Engine>> CreateEngine(const EngineOptions& options);
 
 }  // namespace voxeld::gpu

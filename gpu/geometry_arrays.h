@@ -1,4 +1,4 @@
-// A geometry's arrays as their owner keeps them: in bulk memory, where engines read them in place,
+// A geometry's arrays as their owner stores them: in bulk memory, where engines read them in place,
 // or, if they are small, in ordinary memory.
 #pragma once
 
@@ -14,19 +14,20 @@
 
 namespace voxeld::gpu {
 
-// A handle: copies are of the same arrays. Written by who made it, before anyone else holds it.
+// A handle: copies refer to the same arrays. Only its creator writes to the arrays, before anyone
+// else holds a handle.
 class GeometryArrays {
  public:
-  // What takes less is not worth a block.
+  // Smaller arrays are not worth a block of bulk memory.
   static constexpr uint64_t kLeastBulk = 1024;
 
-  GeometryArrays() = default;  // of a geometry without vertices
+  GeometryArrays() = default;  // for a geometry without vertices
 
-  // Room for what `record` states, what is in it undefined. `pool` null: ordinary memory.
-  // ResourceExhausted if there is none.
+  // Allocates the arrays that `record` states, with undefined contents. If `pool` is null they are
+  // in ordinary memory. Errors: ResourceExhausted if memory runs out.
   static absl::StatusOr<GeometryArrays> Allocate(const GeometryRecord& record, BulkPool* pool);
-  // Copies, whose lengths are those that `record` states. Ends the process where the system has no
-  // memory: for small ones.
+  // Copies arrays, whose lengths must be those that `record` states. Terminates the process if the
+  // system is out of memory, so use it for small arrays.
   static GeometryArrays Of(const GeometryRecord& record, std::span<const float> positions,
                            std::span<const uint32_t> indices = {},
                            std::span<const uint32_t> colors = {});
@@ -38,11 +39,11 @@ class GeometryArrays {
   std::span<uint32_t> writable_indices() { return indices_; }
   std::span<uint32_t> writable_colors() { return colors_; }
 
-  const BulkBlock& block() const { return block_; }  // none: in ordinary memory
+  const BulkBlock& block() const { return block_; }  // empty if the arrays are in ordinary memory
 
  private:
   BulkBlock block_;
-  std::shared_ptr<std::byte> memory_;  // if there is no block
+  std::shared_ptr<std::byte> memory_;  // used without a block
   std::span<float> positions_;
   std::span<uint32_t> indices_, colors_;
 };

@@ -1,5 +1,5 @@
-// What lets the ranks of one display (gpu/ranks), each an engine in a process of its own, hand each
-// other what comes: one of them invites, all of them join.
+// The link over which the ranks of one display (gpu/ranks), each an engine in a process of its own,
+// send each other changes of the scene: one rank invites, and all of them join.
 #pragma once
 
 #include <array>
@@ -11,19 +11,19 @@
 
 namespace voxeld::gpu {
 
-// Thread-bound, with its engine.
+// Thread-bound, like its engine.
 class RankLink {
  public:
   using Invitation = std::array<std::byte, 128>;
 
   virtual ~RankLink() = default;
 
-  // By which all ranks join, once. `library`: where it is to be found, as EngineOptions::nccl says.
-  // FailedPrecondition if it is not.
+  // Returns the invitation with which all ranks join, once. `library` says where the library is
+  // found, as EngineOptions::nccl does. Errors: FailedPrecondition if it is not found.
   virtual absl::StatusOr<Invitation> Invite(const std::string& library) = 0;
 
   // Waits for all the others to join. From then on every rank must be given the same calls of Apply
-  // in the same order: some wait for the others. An error is for good.
+  // in the same order, because some wait for the others. An error is permanent.
   virtual absl::Status Join(const std::string& library, const Invitation& invitation, int rank,
                             int ranks) = 0;
 };

@@ -1,4 +1,5 @@
-// The records of a scene's change (delta.h): plain data, as the engines, their kernels and their callers see it.
+// The records of a scene's change (delta.h): plain data, used by the engines, their kernels and
+// their callers.
 #pragma once
 
 #include <cstddef>
@@ -11,38 +12,40 @@ namespace voxeld::gpu {
 
 enum class Op : uint32_t {
   kPutGeometry = 1,      // GeometryRecord, positions, indices, colors. The id must be new
-  kDropGeometry = 2,     // IdRecord; no drawable may use it any more at the end of the delta
+  kDropGeometry = 2,     // IdRecord; at the end of the delta no drawable may use it
   kPutDrawable = 3,      // DrawableRecord; replaces one of the same id
   kDropDrawable = 4,     // IdRecord
   kPutLayer = 5,         // LayerRecord; replaces one of the same id
-  kDropLayer = 6,        // IdRecord; no drawable may be in it any more at the end of the delta
-  kReset = 7,            // nothing follows: forget everything
+  kDropLayer = 6,        // IdRecord; at the end of the delta no drawable may be in it
+  kReset = 7,            // no body: discards everything
   kPutBulkGeometry = 8,  // GeometryRecord, BulkRef: as kPutGeometry, its arrays in bulk memory
 };
 
 enum class PrimitiveKind : uint32_t {
-  kPoints = 1,     // a voxel each, or a ball of `thickness`
+  kPoints = 1,     // one voxel each, or a ball of `thickness`
   kSegments = 2,   // list, strip or loop
   kTriangles = 3,  // indexed or not
   kBox = 4,        // centre params[0..2], full sizes params[3..5] along its own axes
   kSphere = 5,     // centre params[0..2], radius params[3] (an ellipsoid under a transform)
   kCylinder = 6,   // centre params[0..2], radius params[3], height params[4] along its own z
-  kImplicit = 7,   // its program (implicit/program.h) is the indices, its rings are positions;
-                   // with params[6] = 1 only from params[0..2] to params[3..5]
+  kImplicit = 7,   // its program (implicit/program.h) is the indices, its rings are the
+                   // positions; with params[6] = 1, only from params[0..2] to params[3..5]
   kCurves = 8,  // cubic Béziers: list (4 points each) or strip (they share ends), drawn as segments
   kPatches = 9,   // bicubic Béziers: 16 points each, along u first, drawn as triangles
-  kSamples = 10,  // a grid of samples (primitives/samples.h), which the indices hold; no positions;
-                  // of a surface coloured by its place params[0..3] say how
-  kFilled = 11,   // what triangles enclose (primitives/filled.h), indexed or not; of one colour
+  kSamples = 10,  // a grid of samples (primitives/samples.h), held in the indices; no positions;
+                  // if a surface is coloured by its place, params[0..3] say how
+  kFilled = 11,   // the inside of triangles (primitives/filled.h), indexed or not; in one colour
 };
 
-// Worked out through the inverse of its map, and kept in its parameters alone.
+// Returns whether the primitive is computed through the inverse of its map, from its parameters
+// alone.
 VOXELD_HD constexpr bool IsSolid(PrimitiveKind kind) {
   return kind == PrimitiveKind::kBox || kind == PrimitiveKind::kSphere ||
          kind == PrimitiveKind::kCylinder;
 }
 
-// Made of control points, and cut into straight pieces where it is drawn (gpu/curves/).
+// Returns whether the primitive consists of control points and is cut into straight pieces where it
+// is drawn (gpu/curves/).
 constexpr bool IsCurved(PrimitiveKind kind) {
   return kind == PrimitiveKind::kCurves || kind == PrimitiveKind::kPatches;
 }
@@ -51,11 +54,12 @@ enum class LineSampling : uint32_t { kThin = 0, kEuclidean = 1, kCover = 2 };
 enum class SurfaceRule : uint32_t { kThin = 0, kCover = 1 };
 enum class Fill : uint32_t { kSurface = 0, kSolid = 1 };
 enum class Topology : uint32_t { kList = 0, kStrip = 1, kLoop = 2 };
-// What a thick point is: a ball, one that fades out from its middle, or a cube along the voxels.
+// The shape of a thick point: a ball, a ball that fades out from its middle, a cube along the
+// voxels, or a cell (points.h).
 enum class Splat : uint32_t { kBall = 0, kSoft = 1, kCube = 2, kCell = 3 };
 enum class ColorMode : uint32_t { kUniform = 0, kPerVertex = 1 };
 enum class ThicknessUnit : uint32_t { kVoxels = 0, kUnits = 1 };
-// What covers the voxels: whatever the engine has, or its CPU even where it has a GPU.
+// Which processor draws: the engine's own, or the CPU even if the engine has a GPU.
 enum class DrawnBy : uint32_t { kEngine = 0, kCpu = 1 };
 enum class BlendMode : uint32_t { kOver = 0, kAdd = 1, kErase = 2 };
 
@@ -70,9 +74,10 @@ struct IdRecord {
   uint64_t reserved = 0;
 };
 
-// Arrays follow in this order, each padded to 16 bytes: positions f32[vertex_count][3], indices
-// u32[index_count], colors u32[ColorCount]: with kPerVertex 0x00RRGGBB of each vertex; with a texture f32[2] of each vertex,
-// its place on it, and the texture (primitives/texture.h).
+// The arrays follow in this order, each padded to 16 bytes: positions f32[vertex_count][3], indices
+// u32[index_count], colors u32[ColorCount]. The colours are, with kPerVertex, 0x00RRGGBB for each
+// vertex; with a texture, f32[2] for each vertex, its place on the texture, and then the texture
+// (primitives/texture.h).
 struct GeometryRecord {
   uint64_t id = 0;
   PrimitiveKind kind = PrimitiveKind::kPoints;
@@ -83,20 +88,20 @@ struct GeometryRecord {
   Fill fill = Fill::kSurface;                   // kBox, kSphere, kCylinder, kImplicit, kSamples
   Topology topology = Topology::kList;          // kSegments, kCurves
   ThicknessUnit thickness_unit = ThicknessUnit::kVoxels;
-  // Diameter of points and segments, of surfaces of kTriangles, kPatches, kImplicit and kSamples
-  // their thickness; 0: one voxel. kUnits: scaled by ∛|det| of the map.
+  // The diameter of points and segments; the thickness of surfaces of kTriangles, kPatches,
+  // kImplicit and kSamples. 0: one voxel. kUnits: scaled by ∛|det| of the map.
   float thickness = 0;
   uint32_t vertex_count = 0;
   uint32_t index_count = 0;  // 0: vertices as they stand
   float params[8] = {};
-  DrawnBy drawn_by = DrawnBy::kEngine;  // the same voxels
+  DrawnBy drawn_by = DrawnBy::kEngine;  // the voxels are the same either way
   Splat splat = Splat::kBall;           // kPoints
-  // Of kTriangles: a picture that colours are multiplied by; 1 to kMostTextureSide, both 0: none.
+  // For kTriangles: a texture that colours are multiplied by; 1 to kMostTextureSide, both 0: none.
   uint16_t texture_width = 0, texture_height = 0;
 };
 inline constexpr uint32_t kMostTextureSide = 8192;
 
-// Whether its points are cells (points.h).
+// Returns whether its points are cells (points.h).
 constexpr bool IsCells(const GeometryRecord& record) {
   return record.kind == PrimitiveKind::kPoints && record.splat == Splat::kCell;
 }
@@ -119,7 +124,8 @@ struct ClipPlane {
 };
 inline constexpr uint32_t kMaxClipPlanes = 20;
 
-// What is around a line of the scene: where `unit`⁻¹ takes a point to x² + y² ≤ 1, at any z. `unit` has an inverse.
+// The inside of a cylinder around a line of the scene: `unit`⁻¹ takes its points to x² + y² ≤ 1, at
+// any z. `unit` has an inverse.
 struct ClipCylinder {
   Affine unit;  // x² + y² ≤ 1 → scene
   bool operator==(const ClipCylinder&) const = default;
@@ -132,10 +138,10 @@ struct Region {
   bool operator==(const Region&) const = default;
 };
 
-// Layers combine in ascending (order, id). Where there are planes, cylinders or a region, only voxels that lie
-// inside all of them (gpu/clip.h) are the layer's: the others it does not cover. Where there is a mask, only voxels that
-// this layer covers, as its own planes, cylinders and region leave it; whether it is visible, and what its own mask is,
-// makes no difference.
+// Layers combine in ascending (order, id). With planes, cylinders or a region, the layer covers
+// only voxels that lie inside all of them (gpu/clip.h). With a mask, it covers only voxels that the
+// mask layer covers, as limited by that layer's own planes, cylinders and region. Whether the mask
+// layer is visible, and what its own mask is, makes no difference.
 struct LayerRecord {
   uint64_t id = 0;  // the number of creation
   int32_t order = 0;
@@ -146,7 +152,7 @@ struct LayerRecord {
   uint32_t has_region = 0;      // 1: `region` holds
   uint32_t cylinder_count = 0;  // 0 to kMaxClipCylinders
   uint32_t has_mask = 0;        // 1: `mask` holds
-  uint64_t mask = 0;            // the id of a layer, which need not be there
+  uint64_t mask = 0;            // the id of a layer, which need not exist
   Affine transform;             // layer's coordinates → scene's
   ClipPlane planes[kMaxClipPlanes];
   ClipCylinder cylinders[kMaxClipCylinders];

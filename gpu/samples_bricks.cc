@@ -9,12 +9,12 @@ namespace {
 
 constexpr int32_t kBrick = static_cast<int32_t>(SampleHead::kBrick);
 
-// What a brick's samples, and those next to it, are.
+// The range of the samples of a brick and of those next to it.
 struct Range {
   float least = 0, greatest = 0;
-  bool any = false;    // numbers
-  bool edge = false;   // the grid's, or that of what is none
-  bool alpha = false;  // of colours
+  bool any = false;    // there are numbers
+  bool edge = false;   // at the grid's edge, or beside samples that are NaN
+  bool alpha = false;  // for colours: some alpha is not 0
 
   void Add(float number) {
     if (implicit::IsNan(number)) {
@@ -50,7 +50,7 @@ Range RangeOf(const SampleView& view, const int32_t at[3]) {
       }
     }
   }
-  // Means of samples are rounded.
+  // Allows for the rounding of means of samples.
   constexpr float kRounding = 1e-6f;
   range.least -= implicit::Abs(range.least) * kRounding;
   range.greatest += implicit::Abs(range.greatest) * kRounding;
@@ -69,7 +69,7 @@ bool MayBeCovered(const SampleView& view, const Range& range, const GeometryReco
   }
   const bool inside = range.greatest >= head.level;
   if (record.fill == Fill::kSolid) return inside;
-  // A thick shell reaches to wherever numbers change.
+  // A thick shell can reach anywhere numbers change.
   if (record.thickness > 0) return range.least < range.greatest || inside;
   return inside && (range.least < head.level || range.edge);
 }

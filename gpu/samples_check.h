@@ -1,4 +1,4 @@
-// Whether words are a grid of samples (primitives/samples.h) that may be looked into.
+// Checks whether words are a grid of samples (primitives/samples.h) that is safe to read.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,8 @@
 
 namespace voxeld::gpu {
 
-// InvalidArgument says what is wrong, with the value. Nothing is read that has not passed this.
+// Errors: InvalidArgument that says what is wrong, with the value. Words that have not passed this
+// check are not read.
 absl::Status CheckSamples(std::span<const uint32_t> words);
 
 }  // namespace voxeld::gpu

@@ -43,7 +43,7 @@ absl::StatusOr<StagingBlock> StagingPool::Acquire(size_t size) {
                                                        "; send less at once or raise the limit"));
     }
   } while (!held_->compare_exchange_weak(held, held + size));
-  // Never 0 bytes, of which there may be none.
+  // Never ask for 0 bytes, for which the system may return no block.
   Data data(std::aligned_alloc(kAlign, (size / kAlign + 1) * kAlign));
   if (data == nullptr) {
     held_->fetch_sub(size);

@@ -1,4 +1,5 @@
-// Staging memory in ordinary memory, within a limit that counts every block still held by anyone.
+// Staging memory in ordinary memory, within a limit that counts every block that anyone still
+// holds.
 #pragma once
 
 #include <atomic>
@@ -11,11 +12,12 @@
 
 namespace voxeld::gpu {
 
-// Thread-safe. Blocks may outlive it.
+// Thread-safe. Blocks may outlive the pool.
 class StagingPool {
  public:
   explicit StagingPool(uint64_t limit_bytes);
-  // 16-byte aligned. ResourceExhausted past the limit, or if the system has no memory.
+  // Returns a 16-byte aligned block. Errors: ResourceExhausted past the limit, or if the system is
+  // out of memory.
   absl::StatusOr<StagingBlock> Acquire(size_t size);
 
  private:

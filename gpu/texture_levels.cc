@@ -8,7 +8,8 @@
 namespace voxeld::gpu {
 namespace {
 
-// Red and blue, or green, of four colours at once: sums of four fit 10 bits, which leaves each channel room.
+// The mean of red and blue, or of green, of four colours at once: sums of four fit in 10 bits, and
+// each channel has room for them.
 uint32_t MeanOf(uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
   constexpr uint32_t kOuter = 0x00FF00FF, kInner = 0x0000FF00;
   const uint32_t outer = (a & kOuter) + (b & kOuter) + (c & kOuter) + (d & kOuter) + 0x00020002;

@@ -1,4 +1,4 @@
-// The levels of a texture (gpu/primitives/texture.h), made of its first.
+// Computes the levels of a texture (gpu/primitives/texture.h) from its first level.
 #pragma once
 
 #include <cstdint>
@@ -6,8 +6,9 @@
 
 namespace voxeld::gpu {
 
-// texels: TexelCount(width, height), of which the first width × height are there, 0x00RRGGBB. Fills in the others: each is
-// the mean of the four texels, or two if a side is 1, that it stands for, halves rounded up.
+// texels: TexelCount(width, height) texels as 0x00RRGGBB, of which the first width × height are
+// filled in. Fills in the others: each is the mean, with halves rounded up, of the four texels that
+// it stands for, or of two if a side is 1.
 void FillLevels(uint32_t width, uint32_t height, std::span<uint32_t> texels);
 
 }  // namespace voxeld::gpu
