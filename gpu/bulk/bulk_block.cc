@@ -7,7 +7,7 @@
 namespace voxeld::gpu {
 namespace {
 
-// Pools may share a worker, which tells segments apart by their numbers alone.
+// Pools may share a worker, which identifies segments by their numbers alone.
 uint64_t NewId() {
   static std::atomic<uint64_t> next{1};
   return next++;
@@ -36,7 +36,7 @@ void BulkSegment::WhenGone(std::weak_ptr<void> alive, std::function<void()> gone
 }
 
 absl::StatusOr<BulkView> BlockSource::Find(const BulkRef& ref) {
-  // They come in the order in which they are referred to.
+  // Blocks usually arrive in the order in which they are referred to.
   for (size_t tried = 0; tried < blocks_.size(); ++tried) {
     const BulkBlock& block = blocks_[next_];
     next_ = (next_ + 1) % blocks_.size();

@@ -1,4 +1,4 @@
-// Immutable pieces of bulk memory, shared by all who hold them.
+// Immutable pieces of bulk memory, shared by everyone who holds them.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace voxeld::gpu {
 
-// A segment of a pool, as other processes come to know it. Thread-safe.
+// A segment of a pool, as other processes know it. Thread-safe.
 class BulkSegment {
  public:
   explicit BulkSegment(std::shared_ptr<Segment> memory);
@@ -23,11 +23,12 @@ class BulkSegment {
   BulkSegment(const BulkSegment&) = delete;
   BulkSegment& operator=(const BulkSegment&) = delete;
 
-  uint64_t id() const { return id_; }  // no other of this process ever has the same
+  uint64_t id() const { return id_; }  // never used by another segment of this process
   const std::shared_ptr<Segment>& memory() const { return memory_; }
 
-  // Has `gone` called once, on any thread, when no block is left and the pool keeps it no longer;
-  // not if `alive` is gone by then, and it is held meanwhile. It must only post.
+  // Calls `gone` once, on any thread, when no block is left and the pool no longer keeps the
+  // segment. Does not call it if `alive` has expired by then; holds `alive` during the call. `gone`
+  // must only post.
   void WhenGone(std::weak_ptr<void> alive, std::function<void()> gone);
 
  private:
@@ -42,8 +43,8 @@ class BulkSegment {
   std::vector<Watcher> watchers_ VOXELD_GUARDED_BY(mutex_);
 };
 
-// A handle: copies are of the same piece, which goes back to its pool with the last. Nobody writes
-// to it any more.
+// A handle: copies refer to the same piece, which returns to its pool when the last copy is
+// destroyed. The piece is not written again.
 class BulkBlock {
  public:
   struct Extent {
@@ -61,14 +62,14 @@ class BulkBlock {
   std::span<const std::byte> bytes() const {
     return extent_->segment->memory()->bytes().subspan(extent_->offset, extent_->size);
   }
-  // Whoever holds it holds the block.
+  // Holding the returned pointer keeps the block alive.
   std::shared_ptr<const void> owner() const { return extent_; }
 
  private:
   std::shared_ptr<const Extent> extent_;
 };
 
-// Where a piece of bulk memory lies, as deltas and other processes are told.
+// The location of a piece of bulk memory, in the form that deltas and other processes use.
 struct BulkRef {
   uint64_t segment = 0;
   uint64_t offset = 0;
@@ -80,24 +81,25 @@ inline BulkRef RefOf(const BulkBlock& block) {
   return {.segment = block.segment()->id(), .offset = block.offset(), .size = block.size()};
 }
 
-// A piece that was found, and what keeps it: as long as `owner` is held, the bytes stay as they are.
+// A piece that was found, and its owner: while `owner` is held, the bytes do not change.
 struct BulkView {
   std::span<const std::byte> bytes;
   std::shared_ptr<const void> owner;
 };
 
-// Finds what a delta refers to.
+// Finds the pieces that a delta refers to.
 class BulkSource {
  public:
   virtual ~BulkSource() = default;
-  // InvalidArgument if there is no such piece: an unknown segment, or a range beyond its end.
+  // Errors: InvalidArgument if the piece does not exist: an unknown segment, or a range beyond the
+  // segment's size.
   virtual absl::StatusOr<BulkView> Find(const BulkRef& ref) = 0;
 };
 
-// Finds blocks among those that came along with a delta.
+// Finds blocks among those that came with a delta.
 class BlockSource final : public BulkSource {
  public:
-  // `blocks` outlive it. The cost is that of looking for the block after the one found last.
+  // Requires: `blocks` outlives this object. Searches from the block after the last one found.
   explicit BlockSource(std::span<const BulkBlock> blocks) : blocks_(blocks) {}
   absl::StatusOr<BulkView> Find(const BulkRef& ref) override;
 

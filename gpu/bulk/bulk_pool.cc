@@ -13,7 +13,7 @@
 namespace voxeld::gpu {
 namespace {
 
-using Released = std::vector<std::shared_ptr<BulkSegment>>;  // let go outside the lock
+using Released = std::vector<std::shared_ptr<BulkSegment>>;  // released outside the lock
 
 }  // namespace
 
@@ -28,13 +28,13 @@ struct BulkPool::State : std::enable_shared_from_this<State> {
   };
   using Place = std::tuple<size_t, uint64_t, size_t>;  // size, segment, offset
 
-  // Null: no free place is large enough.
+  // Returns null if no free place is large enough.
   std::shared_ptr<PooledExtent> Take(size_t size) VOXELD_REQUIRES(mutex);
   absl::Status AddRoom(size_t size, Released* released) VOXELD_REQUIRES(mutex);
   void GiveBack(const BulkBlock::Extent& extent);
-  // Lets segments go in which nothing is used, until at most `most` of their bytes are left.
+  // Releases segments without used blocks until at most `most` bytes of such segments are left.
   void Trim(uint64_t most, Released* released) VOXELD_REQUIRES(mutex);
-  // Bytes that further segments may have.
+  // Returns the number of bytes that further segments may have.
   uint64_t Left() const VOXELD_REQUIRES(mutex) {
     return options.limit_bytes - std::min(held, options.limit_bytes);
   }
@@ -44,9 +44,9 @@ struct BulkPool::State : std::enable_shared_from_this<State> {
   const BulkPoolOptions options;
   mutable sync::Mutex mutex;
   std::map<uint64_t, Room> rooms VOXELD_GUARDED_BY(mutex);
-  std::set<Place> places VOXELD_GUARDED_BY(mutex);  // every free one
+  std::set<Place> places VOXELD_GUARDED_BY(mutex);  // all free places
   uint64_t held VOXELD_GUARDED_BY(mutex) = 0, used VOXELD_GUARDED_BY(mutex) = 0,
-                unused VOXELD_GUARDED_BY(mutex) = 0;  // of segments wholly free
+                unused VOXELD_GUARDED_BY(mutex) = 0;  // bytes of segments that are wholly free
 };
 
 struct BulkPool::PooledExtent final : BulkBlock::Extent {

@@ -1,11 +1,12 @@
-// Bulk memory: what a daemon decodes into, and what engines read, in this process or another,
-// without a copy between. Segments are cut into blocks; a block is written once by who asked for it,
+// Bulk memory: a daemon decodes into it, and engines read it, in this process or another, without
+// copying. Segments are divided into blocks. A block is written once, by the caller that allocated
+// it, and is shared and immutable from then on.
 // and from then on shared and immutable.
 //
 //   auto pool = BulkPool::Create({.limit_bytes = 1 << 30});
 //   BulkPool::Fresh fresh = *pool->Allocate(size);
 //   … write fresh.bytes …
-//   BulkBlock block = std::move(fresh.block);  // hand it on; nobody writes any more
+//   BulkBlock block = std::move(fresh.block);  // hand it on; from here on it must not be written
 #pragma once
 
 #include <cstddef>
@@ -20,10 +21,10 @@ namespace voxeld::gpu {
 
 struct BulkPoolOptions {
   uint64_t limit_bytes = uint64_t{1} << 30;  // of all segments together, used or not
-  size_t segment_bytes = size_t{32} << 20;   // a block that is greater has a segment to itself
-  // Of segments in which nothing is used: kept for the next block until GiveBackUnused.
+  size_t segment_bytes = size_t{32} << 20;   // a larger block has a segment to itself
+  // Limit of segments without used blocks, which are kept for the next block until GiveBackUnused.
   uint64_t keep_bytes = uint64_t{64} << 20;
-  // Can be handed to another process, which then cannot write to it.
+  // The memory can be passed to another process, which cannot write to it.
   bool shared = true;
 };
 
@@ -34,17 +35,18 @@ class BulkPool {
 
   struct Fresh {
     BulkBlock block;
-    std::span<std::byte> bytes;  // of the block, what is in them undefined
+    std::span<std::byte> bytes;  // of the block, with undefined contents
   };
 
   static std::shared_ptr<BulkPool> Create(const BulkPoolOptions& options = {});
   ~BulkPool();
 
-  // `size` bytes (at least 1), 64-byte aligned. ResourceExhausted past the limit or if the system
-  // has none left, with the figures. The smallest free place that is large enough is taken.
+  // Returns `size` bytes (at least 1), 64-byte aligned, in the smallest free place that is large
+  // enough. Errors: ResourceExhausted past the limit or if the system is out of memory, with the
+  // sizes.
   absl::StatusOr<Fresh> Allocate(size_t size);
 
-  // Returns all segments in which nothing is used to the system. For when clients have left.
+  // Returns all segments without used blocks to the system. Called when clients have left.
   void GiveBackUnused();
 
   uint64_t limit_bytes() const;

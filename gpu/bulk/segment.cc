@@ -29,7 +29,7 @@ absl::Status Failed(const char* what, size_t size) {
                                                    ": ", std::generic_category().message(errno)));
 }
 
-// A memfd of that size, its seals still to come; −1: errno says why.
+// Creates a memfd of `size` bytes, not yet sealed. Returns −1, with errno set, on failure.
 int MakeMemory(size_t size) {
   const int fd = memfd_create("voxeld-engine", MFD_CLOEXEC | MFD_ALLOW_SEALING);
   if (fd < 0 || ftruncate(fd, static_cast<off_t>(size)) == 0) return fd;
@@ -70,7 +70,7 @@ absl::StatusOr<std::shared_ptr<Segment>> Segment::CreateReadOnlyForOthers(size_t
   if (fd < 0) return Failed("memfd_create", size);
   absl::StatusOr<std::shared_ptr<Segment>> segment = Map(fd, size, PROT_READ | PROT_WRITE);
   if (!segment.ok()) return segment;
-  // What is mapped for writing already stays so.
+  // Memory that is already mapped for writing stays writable.
   if (fcntl(fd, F_ADD_SEALS, kSeals | kFutureWrite) != 0 &&
       (errno != EINVAL || fcntl(fd, F_ADD_SEALS, kSeals) != 0)) {
     return Failed("F_ADD_SEALS", size);

@@ -1,5 +1,5 @@
-// A run of memory that processes may share: a memfd that can be neither shrunk nor grown, mapped
-// where it is needed; or, where nobody else is, ordinary memory of the same shape.
+// A run of memory that processes can share: a memfd that can be neither shrunk nor grown, mapped
+// where it is needed; or, if no other process needs it, ordinary memory with the same interface.
 #pragma once
 
 #include <cstddef>
@@ -11,27 +11,27 @@
 
 namespace voxeld::gpu {
 
-// Thread-safe. The pages that were never written cost nothing.
+// Thread-safe. Pages that were never written take no memory.
 class Segment {
  public:
-  // ResourceExhausted if the system has no memory or descriptors left.
+  // Errors: ResourceExhausted if the system has no memory or descriptors left.
   static absl::StatusOr<std::shared_ptr<Segment>> Create(size_t size);
-  // The same, but nobody who is handed the descriptor can write to it (where the system knows such a
-  // seal: Linux 5.1).
+  // The same, but a process that receives the descriptor cannot write to the memory (if the system
+  // has that seal: Linux 5.1).
   static absl::StatusOr<std::shared_ptr<Segment>> CreateReadOnlyForOthers(size_t size);
-  // Without a descriptor.
+  // The same, without a descriptor.
   static absl::StatusOr<std::shared_ptr<Segment>> CreatePrivate(size_t size);
 
-  // One that the other process made: takes `fd`. InvalidArgument unless it has that size and the
-  // seals.
+  // Maps a segment that another process created. Takes ownership of `fd`. Errors: InvalidArgument
+  // unless it has that size and the seals.
   static absl::StatusOr<std::shared_ptr<Segment>> Adopt(int fd, size_t size);
-  // The same, not to be written: the system would end the process.
+  // The same, read-only: on a write, the system terminates the process.
   static absl::StatusOr<std::shared_ptr<Segment>> AdoptReadOnly(int fd, size_t size);
   ~Segment();
   Segment(const Segment&) = delete;
   Segment& operator=(const Segment&) = delete;
 
-  // Of this process: how often the system had no memory for one. Any thread.
+  // Returns how often the system was out of memory for a segment of this process. Any thread.
   static uint64_t Refused();
 
   std::span<std::byte> bytes() const { return {data_, size_}; }

@@ -1,4 +1,5 @@
-// Parallel loops that can be given up from another thread, so that a daemon that stops does not wait for a long draw.
+// Parallel loops that another thread can abort, so that a daemon that stops does not wait for a
+// long draw.
 #pragma once
 
 #include <atomic>
@@ -8,7 +9,8 @@
 
 namespace voxeld::gpu {
 
-// Runs loops on `executor`. Once `*abandoned` is true, For throws std::runtime_error before the next index.
+// Returns an executor that runs loops on `executor`. Once `*abandoned` is true, For throws
+// std::runtime_error before the next index.
 std::unique_ptr<Executor> MakeAbandonableExecutor(
     std::unique_ptr<Executor> executor, std::shared_ptr<const std::atomic<bool>> abandoned);
 

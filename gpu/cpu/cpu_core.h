@@ -1,4 +1,4 @@
-// The CPU engine's work, without its threads of control: what each call of gpu/engine.h does.
+// The work of the CPU engine, without its threads: the operations behind each call of gpu/engine.h.
 #pragma once
 
 #include <cstdint>
@@ -17,10 +17,10 @@
 
 namespace voxeld::gpu {
 
-// Thread-bound. An error leaves it as it was.
+// Thread-bound. An error leaves the core as it was.
 class CpuCore {
  public:
-  // `index_bytes`: as EngineOptions has them.
+  // `index_bytes`: see EngineOptions.
   CpuCore(std::unique_ptr<Executor> executor, SlicePart part, uint64_t index_bytes = 0);
 
   absl::Status SetTarget(Target target);
@@ -39,7 +39,7 @@ class CpuCore {
   LightPlanner lights_;
   Volume::Changes unsliced_;  // changes to the volume that no frame has shown yet
   std::vector<uint32_t>
-      unobserved_;  // of their tiles those whose drawing the pictures did not observe
+      unobserved_;  // those of its tiles whose drawing the slice images did not observe
   uint64_t last_frame_ = 0;
 };
 

@@ -8,7 +8,7 @@
 
 namespace voxeld::gpu {
 
-// `reason`: for EngineInfo. `options.kind` is not looked at.
+// `reason` is for EngineInfo. Ignores `options.kind`.
 std::unique_ptr<Engine> CreateCpuEngine(const EngineOptions& options, std::string reason);
 
 }  // namespace voxeld::gpu

@@ -36,7 +36,7 @@ class TbbExecutor final : public Executor {
 
 std::unique_ptr<Executor> MakeExecutor(int threads) {
   if (threads <= 1) return MakeSerialExecutor();
-  // The scheduler runs no more threads than there are cores, whatever it is asked for.
+  // The scheduler runs at most one thread per core, however many are requested.
   if (threads > oneapi::tbb::info::default_concurrency()) return MakeThreadExecutor(threads);
   return std::make_unique<TbbExecutor>(threads);
 }

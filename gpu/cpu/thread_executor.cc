@@ -25,7 +25,7 @@ class ThreadExecutor final : public Executor {
       for (int worker = 1; worker < threads; ++worker) {
         threads_.emplace_back([this, worker] { Run(worker); });
       }
-    } catch (...) {  // those that there are wait for work
+    } catch (...) {  // the threads that did start are waiting for work
       End();
       throw;
     }
@@ -73,7 +73,7 @@ class ThreadExecutor final : public Executor {
         for (size_t i = first; i < last; ++i) body(i, worker);
       }
     } catch (...) {
-      next_ = count;  // the others need not go on
+      next_ = count;  // stops the other workers
       sync::MutexLock lock(mutex_);
       if (thrown_ == nullptr) thrown_ = std::current_exception();
     }
@@ -106,7 +106,7 @@ class ThreadExecutor final : public Executor {
   size_t busy_ VOXELD_GUARDED_BY(mutex_) = 0;  // threads that have not finished this loop
   uint64_t loop_ VOXELD_GUARDED_BY(mutex_) = 0;
   bool stopping_ VOXELD_GUARDED_BY(mutex_) = false;
-  std::exception_ptr thrown_ VOXELD_GUARDED_BY(mutex_);  // by the first that did, in this loop
+  std::exception_ptr thrown_ VOXELD_GUARDED_BY(mutex_);  // the first exception of this loop
   size_t grain_ = 1;  // written under the lock between loops only
   std::atomic<size_t> next_{0};
   std::vector<std::thread> threads_;
