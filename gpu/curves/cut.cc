@@ -46,7 +46,7 @@ Point PointOn(const Point p[4], double t) {
 Cut CutCurved(const GeometryView& g, const Affine& map, const TileGrid& grid) {
   Cut cut;
   cut.record = g.record;
-  // A line reaches its radius beyond its middle, and a voxel.
+  // A line extends by its radius and a voxel beyond its centre line.
   const double room = static_cast<double>(RadiusOf(g.record, map)) / kUnitsPerVoxel + 2;
   const std::vector<curves::Point> points = curves::MapPoints(g, map);
   if (g.record.kind == PrimitiveKind::kPatches) {

@@ -1,11 +1,11 @@
-// Curves and curved patches, cut into segments and triangles where they are drawn: in voxel space,
-// so that the error is one of voxels whatever the transform: an eighth of one (cut_need.h). On the
-// host, in IEEE double, in the order written there; every engine draws what comes out.
+// Cuts curves and curved patches into segments and triangles for drawing. It works in voxel space,
+// so that the error is an eighth of a voxel whatever the transform (cut_need.h), on the host, in
+// IEEE double, in the order of operations written there. Every engine draws the resulting pieces.
 //
-// Guarantee: segments are within an eighth of a voxel (kCurveError) of the curve, triangles within
-// a quarter (kPatchError) of the patch, and they meet; so a thick curve is what lies within half
-// its thickness of the curve, and a thin one goes along it, but for an eighth of a voxel, without
-// gaps (EUCLIDEAN may have some) or beads.
+// Guarantee: segments are within an eighth of a voxel (kCurveError) of the curve, triangles are
+// within a quarter (kPatchError) of the patch, and adjacent pieces meet. So a thick curve covers
+// the points within half its thickness of the curve, and a thin one follows it, to within an eighth
+// of a voxel, without gaps (EUCLIDEAN may have some) or beads.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@
 
 namespace voxeld::gpu {
 
-// As a source's arrays, of kSegments or kTriangles.
+// The arrays of a source, of kSegments or kTriangles.
 struct Cut {
   GeometryRecord record;
   std::vector<Int3> vertices;  // mapped and snapped
@@ -33,14 +33,15 @@ struct Cut {
   }
 };
 
-// `g`: IsCurved. `map` takes its coordinates to the voxels of `grid`. What lies outside of it is
-// not cut finely. Of curves a list of segments, two vertices each; of patches triangles, indexed.
+// Requires: `g` IsCurved. `map` takes its coordinates to the voxels of `grid`. Parts outside the
+// grid are not cut finely. Returns, for curves, a list of segments with two vertices each; for
+// patches, indexed triangles.
 Cut CutCurved(const GeometryView& g, const Affine& map, const TileGrid& grid);
 
 namespace curves {
 
-// Whether the hull of control points is out of reach: all of it past one face of the volume,
-// widened by `room` voxels.
+// Returns whether the hull of the control points is out of reach: all of it is past one face of the
+// volume, widened by `room` voxels.
 bool IsOutside(const Point* points, int count, const TileGrid& grid, double room);
 std::vector<Point> MapPoints(const GeometryView& g, const Affine& map);
 Int3 SnapOf(const Point& p);
@@ -49,7 +50,7 @@ inline Point Mix(const Point& a, const Point& b, double t) {
   for (int i = 0; i < 3; ++i) m.at[i] = a.at[i] + (b.at[i] - a.at[i]) * t;
   return m;
 }
-// The point of a cubic Bézier at `t`, by de Casteljau; at 0 and 1 its ends.
+// Returns the point of a cubic Bézier at `t`, by de Casteljau; at 0 and 1 the end points.
 Point PointOn(const Point p[4], double t);
 
 void CutCurves(const GeometryView& g, const std::vector<Point>& points, const TileGrid& grid,

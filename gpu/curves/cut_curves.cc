@@ -1,4 +1,4 @@
-// Cubic Béziers into segments.
+// Cuts cubic Béziers into segments.
 #include <algorithm>
 #include <cmath>
 
@@ -14,14 +14,15 @@ class Cutter {
  public:
   Cutter(const TileGrid& grid, double room, Cut& cut) : grid_(grid), room_(room), cut_(cut) {}
 
-  // From `from` to `to` of the colours' way, both in 0 to 1.
+  // Adds the span; its colours run from `from` to `to` of the way between `colors`, both in 0 to 1.
   void Add(const Point p[4], double from, double to, const uint32_t* colors, int halvings) {
     const double square = SquareOfParts(p);
     if (!(square > 1) || IsOutside(p, 4, grid_, room_)) {
       Segment(p[0], p[3], from, to, colors);
       return;
     }
-    // Even parts suit what stays near; of all else only what comes near is cut finely.
+    // Equal parts suit a span that stays near the volume. Any other is halved, so that only the
+    // parts near the volume are cut finely.
     if (halvings < kMostHalvings && !IsNear(p)) {
       Point left[4], right[4];
       Halve(p, left, right);
@@ -44,7 +45,7 @@ class Cutter {
   }
 
  private:
-  // Whether all control points are within the volume, or no farther from it than it is wide.
+  // Returns whether all control points are within the volume, or no farther from it than its width.
   bool IsNear(const Point p[4]) const {
     for (int a = 0; a < 3; ++a) {
       const double beyond = grid_.voxels[a] + room_;

@@ -89,7 +89,7 @@ bool CutNeed::IsMet(double stretch) const {
   return fine && Pieces(stretch) <= static_cast<double>(Most(kind));
 }
 
-// The lesser of two norms that are no less than the greatest.
+// Returns the lesser of two norms, neither of which is less than the greatest stretch.
 double StretchOf(const Affine& map) {
   double squares = 0, row = 0, column = 0;
   for (int r = 0; r < 3; ++r) {

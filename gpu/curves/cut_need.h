@@ -1,5 +1,5 @@
-// How finely curves and curved patches have to be cut, and whether there are pieces enough: known
-// of a geometry by itself, for any map.
+// Computes how finely curves and curved patches have to be cut, and whether the limits allow as
+// many pieces. It uses a geometry alone and is valid for any map.
 #pragma once
 
 #include <cmath>
@@ -11,14 +11,15 @@
 
 namespace voxeld::gpu {
 
-// No point of a curve is farther from its segments than this, nor of a patch from its triangles,
-// voxels; snapping to a unit comes on top.
+// The greatest distance, in voxels, of a point of a curve from its segments, and of a patch from
+// its triangles. Snapping to a unit comes on top.
 inline constexpr double kCurveError = 0.125;
 inline constexpr double kPatchError = 0.25;
-// Of a patch along each of its sides, whatever its error.
+// The limit for a patch along each of its sides, whatever its error.
 inline constexpr int32_t kMostPatchPieces = 512;
-// Of a geometry, whatever its error: when so many segments have been made, each further span is
-// one; patches are cut so that there are no more vertices, unless the four corners of each are more.
+// The limit for a geometry, whatever its error: when this many segments have been made, each
+// further span becomes one segment; patches are cut so that the vertices do not exceed this, unless
+// the four corners of each patch already do.
 inline constexpr size_t kMostCurveSegments = 1u << 20;
 inline constexpr size_t kMostPatchVertices = 1u << 20;
 
@@ -28,41 +29,43 @@ struct Point {
   double at[3] = {};
 };
 
-// |a − 2b + c|.
+// Returns |a − 2b + c|.
 double SecondDifference(const Point& a, const Point& b, const Point& c);
 
-// Of a span's 4 points: the square of how many even parts are within the error. (A piece of n even
-// parts is no farther from the curve than max|B″|/(8n²), and |B″| is at most 6 times the greater of
-// the two second differences of its control points.)
+// Returns, for a span's 4 points, the square of the number of equal parts that keeps the error
+// within kCurveError. (The distance of n equal parts from the curve is at most max|B″|/(8n²), and
+// |B″| is at most 6 times the greater of the two second differences of its control points.)
 double SquareOfParts(const Point p[4]);
-// The same of a patch's 16 points, along either side. (Cut into n × n squares of two triangles each
-// it is no farther from them than (|Suu| + 2|Suv| + |Svv|)/(8n²), with 6, 9 and 6 times the
+// The same for a patch's 16 points, along either side. (The distance of a patch from n × n squares
+// of two triangles each is at most (|Suu| + 2|Suv| + |Svv|)/(8n²), with 6, 9 and 6 times the
 // greatest differences of its control points.)
 double SquareOfPatchParts(const Point p[16]);
 
 }  // namespace curves
 
-// What a geometry takes to be cut within its error, at most: what lies outside of the volume takes
+// An upper bound of what a geometry needs to be cut within its error. Parts outside the volume need
 // less.
 struct CutNeed {
   PrimitiveKind kind = PrimitiveKind::kCurves;
   double count = 0;  // spans, or patches
-  // Beyond one each, of all spans; of a patch along each side, of the one that takes most.
+  // For curves: the parts beyond one per span, over all spans. For patches: the parts along each
+  // side, for the patch that needs most.
   double parts = 0;
 
-  // `positions` as `g`, which IsCurved, states.
+  // Requires: `g` IsCurved, and `positions` has the length that it states.
   static CutNeed Of(const GeometryRecord& g, std::span<const float> positions);
 
-  // Under a map that makes no distance more than `stretch` times as long: segments, or vertices.
+  // Returns the number of segments, or vertices, under a map that makes no distance more than
+  // `stretch` times as long.
   double Pieces(double stretch) const;
   static size_t Most(PrimitiveKind kind) {
     return kind == PrimitiveKind::kPatches ? kMostPatchVertices : kMostCurveSegments;
   }
-  // Whether that many are made.
+  // Returns whether the limits allow that many.
   bool IsMet(double stretch) const;
 };
 
-// No distance becomes longer by more.
+// Returns a factor by which, at most, the map makes distances longer.
 double StretchOf(const Affine& map);
 
 }  // namespace voxeld::gpu

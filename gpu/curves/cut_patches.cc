@@ -1,5 +1,5 @@
-// Bicubic Béziers into triangles: all patches of a geometry in as many parts along u and v, so that those
-// which share a side share its vertices.
+// Cuts bicubic Béziers into triangles: all patches of a geometry into the same number of parts
+// along u and v, so that patches that share a side share its vertices.
 #include <algorithm>
 #include <cmath>
 

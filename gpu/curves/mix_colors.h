@@ -1,4 +1,4 @@
-// Between two colours. Host only.
+// Mixes two colours. Host only.
 #pragma once
 
 #include <cmath>
@@ -6,7 +6,7 @@
 
 namespace voxeld::gpu::curves {
 
-// 0xRRGGBB, at t of 1 from a to b, by channel to the nearest level.
+// Returns 0xRRGGBB between a (t = 0) and b (t = 1), each channel rounded to the nearest level.
 inline uint32_t MixColors(uint32_t a, uint32_t b, double t) {
   uint32_t rgb = 0;
   for (int shift = 16; shift >= 0; shift -= 8) {

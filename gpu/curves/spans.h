@@ -1,5 +1,5 @@
-// Cubic Béziers as they are put together: straight lines, arcs, handles. Words only; a list of 4
-// points each, as kCurves has them.
+// Builds cubic Béziers from straight lines, arcs and handles: a list of 4 points each, in the
+// format of kCurves.
 #pragma once
 
 #include <algorithm>
@@ -25,17 +25,18 @@ class Spans {
   void Line(const Vector& a, const Vector& b) {
     Curve(a, a + (1.0 / 3) * (b - a), b - (1.0 / 3) * (b - a), b);
   }
-  // The same curve as the quadratic one.
+  // Adds a quadratic curve, which a cubic one represents exactly.
   void Quadratic(const Vector& a, const Vector& b, const Vector& c) {
     Curve(a, a + (2.0 / 3) * (b - a), c + (2.0 / 3) * (b - c), c);
   }
-  // center + cos t·a + sin t·b, and `rise` per radian, from `start` on, through `sweep` radians. Of
-  // radius r it is no farther off than 7e-8·r; where it rises the place along that is.
+  // Adds the arc center + cos t·a + sin t·b, plus `rise` per radian, from `start` on, through
+  // `sweep` radians. The error of an arc of radius r is at most 7e-8·r; if it rises, the place
+  // along `rise` has that error.
   void Arc(const Vector& center, const Vector& a, const Vector& b, double start, double sweep,
            const Vector& rise = {}) {
     Spiral(center, a, b, start, sweep, rise, 0);
   }
-  // The same, a and b growing by `growth` of theirs per radian.
+  // The same, while a and b grow by the factor `growth` per radian.
   void Spiral(const Vector& center, const Vector& a, const Vector& b, double start, double sweep,
               const Vector& rise, double growth) {
     const double turns = std::fabs(sweep) / (2 * std::numbers::pi);
@@ -72,24 +73,24 @@ class Spans {
   std::vector<Vector> points_;
 };
 
-// How many even parts of a span's 4 points are no farther from it than `error`: max|B″|/(8n²),
-// where |B″| is at most 6 times the greater of the points' second differences. A whole number, at
-// least 1.
+// Returns into how many equal parts a span of 4 points is cut so that their distance from it is at
+// most `error`: max|B″|/(8n²), where |B″| is at most 6 times the greater of the points' second
+// differences. A whole number, at least 1.
 inline double PartsOfSpan(const implicit::Vector* p, double error) {
   const double bend =
       std::max(implicit::Length(p[0] - 2 * p[1] + p[2]), implicit::Length(p[1] - 2 * p[2] + p[3]));
   return std::max(1.0, std::ceil(std::sqrt(0.75 * bend / error)));
 }
 
-// The place on a span, 0 to 1 from its first point to its last.
+// Returns the point of a span at `t`, 0 to 1 from its first point to its last.
 inline implicit::Vector OnSpan(const implicit::Vector* p, double t) {
   const double s = 1 - t;
   return s * s * s * p[0] + 3 * s * s * t * p[1] + 3 * s * t * t * p[2] + t * t * t * p[3];
 }
 
-// Two unit vectors across `axis`, and across one another: the first on the side of `toward`, as far
-// as that lies across; the second a quarter turn on, counter-clockwise as seen from where the axis
-// points to. False if there is none.
+// Computes two unit vectors across `axis` and perpendicular to each other: the first on the side of
+// `toward`, as far as that lies across; the second a quarter turn on, counter-clockwise as seen
+// from where the axis points to. Returns false if no such vectors exist.
 inline bool FrameOf(const implicit::Vector& axis, const implicit::Vector& toward,
                     implicit::Vector* u, implicit::Vector* v) {
   const double length = implicit::Length(axis);

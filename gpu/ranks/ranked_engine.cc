@@ -35,7 +35,7 @@ class RankedEngine final : public Engine {
     info_.reason = std::move(reason);
   }
 
-  // One rank's thread may still call another's.
+  // Closes all ranks first, because one rank's thread may still call another.
   ~RankedEngine() override {
     for (const std::unique_ptr<RankWorker>& rank : ranks_) rank->Close();
   }
@@ -85,7 +85,7 @@ class RankedEngine final : public Engine {
     Ask<absl::Status>(std::move(done),
                       [last = options_.devices.size() - 1, block = std::move(block), size](
                           RankWorker& rank, size_t r, Done answered) mutable {
-                        // Given back before the last answer.
+                        // Release the block before the last answer.
                         rank.Apply(r == last ? std::move(block) : block, size, std::move(answered));
                       });
   }
@@ -98,7 +98,7 @@ class RankedEngine final : public Engine {
   }
 
   void ReadVoxels(VoxelBox box, std::span<uint32_t> out, Done done) override {
-    // Where several ranks draw a voxel they draw the same; where one does not it is 0.
+    // Ranks that draw the same voxel draw the same value; a rank that does not draw it gives 0.
     const auto others =
         std::make_shared<std::vector<std::vector<uint32_t>>>(options_.devices.size());
     const auto joined = [others, out, done = std::move(done)](const absl::Status& status) {
@@ -122,7 +122,7 @@ class RankedEngine final : public Engine {
                ? absl::StrCat("GPU ", options_.devices[static_cast<size_t>(rank)])
                : absl::StrCat("rank ", rank);
   }
-  // The same with the rank, and whatever marks it.
+  // Returns the same status with the rank in its message, and its payloads.
   absl::Status Named(int rank, const absl::Status& status) const {
     absl::Status named(status.code(), absl::StrCat(NameOf(rank), ": ", status.message()));
     status.ForEachPayload([&](absl::string_view type, const absl::Cord& payload) {
@@ -131,7 +131,7 @@ class RankedEngine final : public Engine {
     return named;
   }
 
-  // Of each rank once, and of Open itself (−1), when all have been made.
+  // Called once for each rank, and once by Open itself (−1) when all have been created.
   void OnOpened(int rank, const absl::Status& status) {
     absl::Status failed;
     {
@@ -172,7 +172,7 @@ class RankedEngine final : public Engine {
     }
   }
 
-  // All ranks have joined, or one cannot: then the others would wait for it.
+  // Called when all ranks have joined, or when one cannot: the others would wait for it.
   void OnJoined() {
     absl::Status failed;
     {
@@ -196,7 +196,7 @@ class RankedEngine final : public Engine {
     Settle(absl::OkStatus());
   }
 
-  // From now on calls go out, those that have waited first.
+  // From now on calls are sent, those that have waited first.
   void Settle(const absl::Status& status) {
     if (!status.ok()) GiveUp(absl::DataLossError(status.message()));
     sync::MutexLock order(order_mutex_);
@@ -221,9 +221,9 @@ class RankedEngine final : public Engine {
     size_t left VOXELD_GUARDED_BY(mutex);
   };
 
-  // Has every rank asked by `each(rank, its number, answered)`, all of them in the same order of
-  // calls, and `done` told what their answers come to: on the thread of the one that answers last,
-  // or in this one if calls are inline.
+  // Calls `each(rank, its number, answered)` for every rank, in the same order of calls on all of
+  // them, and `done` with the joined answers: on the thread of the rank that answers last, or in
+  // this one if calls are inline.
   template <typename Result, typename Each>
   void Ask(std::function<void(Result)> done, Each each) {
     if (!options_.inline_execution) return Send<Result>(std::move(done), std::move(each));
@@ -246,7 +246,7 @@ class RankedEngine final : public Engine {
             for (std::optional<Result>& one : joint->results) all.push_back(*std::move(one));
           }
           Result joined = Join(all);
-          all.clear();  // whoever is told has the only copy of an error
+          all.clear();  // `done` gets the only copy of an error
           done(std::move(joined));
         }));
       }
@@ -298,7 +298,7 @@ class RankedEngine final : public Engine {
       sum.pictures_drawn += one.pictures_drawn;
       // Every rank has the whole scene.
       sum.singular_drawables = std::max(sum.singular_drawables, one.singular_drawables);
-      // Those of the rank that took longest, so that together they are a frame's.
+      // Use the times of the slowest rank, so that they all belong to the same frame.
       if (TimeOf(one) > TimeOf(sum)) {
         sum.assemble_ns = one.assemble_ns;
         sum.slice_ns = one.slice_ns;
@@ -312,7 +312,7 @@ class RankedEngine final : public Engine {
 
   // -------------------------------------------------------------------------------------- loss
 
-  // What the loss of this engine is called: as the first that knew of it said.
+  // Returns why this engine was lost: the first reason that was reported.
   absl::Status Lost(const absl::Status& why) {
     sync::MutexLock lock(state_mutex_);
     if (lost_.ok()) lost_ = why;
@@ -323,19 +323,20 @@ class RankedEngine final : public Engine {
     const absl::Status lost = Lost(why);
     {
       sync::MutexLock lock(state_mutex_);
-      if (ranks_.empty()) return;  // Open will, when all have been made
+      if (ranks_.empty()) return;  // Open does it, when all have been created
     }
     for (const std::unique_ptr<RankWorker>& rank : ranks_) rank->GiveUp(lost);
   }
 
-  // On the thread of that rank, of each once: the others are ended, so that none waits for it.
+  // Called on the thread of that rank, once for each rank: ends the other ranks, so that none waits
+  // for it.
   void OnLost(int rank, const absl::Status& status) {
     const absl::Status why = Lost(Named(rank, status));
     bool last = false, told = false;
     {
       sync::MutexLock lock(state_mutex_);
       last = ++gone_ == options_.devices.size();
-      // Who waits for the beginning is told by its answer.
+      // A caller that waits for the start gets the error as its answer.
       told = !options_.wait_until_ready || (setup_.has_value() && setup_->ok());
     }
     GiveUp(why);
@@ -346,20 +347,20 @@ class RankedEngine final : public Engine {
   EngineInfo info_;
   const std::shared_ptr<WorkerStaging> staging_;
 
-  // Taken before the other: all ranks get their calls in one order.
+  // Locked before state_mutex_: all ranks get their calls in one order.
   sync::Mutex order_mutex_;
   bool sending_ VOXELD_GUARDED_BY(order_mutex_) = false;
   std::deque<std::function<void()>> waiting_ VOXELD_GUARDED_BY(order_mutex_);
 
   sync::Mutex state_mutex_;
   sync::CondVar settled_;
-  std::optional<absl::Status> setup_ VOXELD_GUARDED_BY(state_mutex_);  // what the beginning came to
-  absl::Status failed_ VOXELD_GUARDED_BY(state_mutex_);                // in it
+  std::optional<absl::Status> setup_ VOXELD_GUARDED_BY(state_mutex_);  // the result of the start
+  absl::Status failed_ VOXELD_GUARDED_BY(state_mutex_);                // its first error
   absl::Status lost_ VOXELD_GUARDED_BY(state_mutex_);
   size_t opened_ VOXELD_GUARDED_BY(state_mutex_) = 0;
   size_t joined_ VOXELD_GUARDED_BY(state_mutex_) = 0;
   size_t gone_ VOXELD_GUARDED_BY(state_mutex_) = 0;
-  // Set once, before anybody else looks at it. Last: their threads use the others.
+  // Set once, before anyone else reads it. Last, because the ranks' threads use the other members.
   std::vector<std::unique_ptr<RankWorker>> ranks_;
 };
 
@@ -371,7 +372,7 @@ absl::Status CheckDevices(const EngineOptions& options) {
     return absl::InvalidArgumentError(
         absl::StrCat("GPU ", *twice, " is there twice; the ranks of a display need a GPU each"));
   }
-  constexpr size_t kLongestPath = 2048;  // it goes in a message
+  constexpr size_t kLongestPath = 2048;  // it must fit in a message
   if (options.nccl.size() > kLongestPath) {
     return absl::InvalidArgumentError(absl::StrCat("the path of NCCL's library has ",
                                                    options.nccl.size(), " bytes; give one of ",

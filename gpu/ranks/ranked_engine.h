@@ -1,5 +1,6 @@
-// One display over several GPUs of one host: an engine made of ranks, each the engine of one GPU, in a
-// process of its own, with its share of the slices. To its owner it is an engine like any other.
+// One display over several GPUs of one host. The engine consists of ranks, each the engine of one
+// GPU, in a process of its own, with its share of the slices. To its owner it is an engine like any
+// other.
 #pragma once
 
 #include <memory>
@@ -10,25 +11,25 @@
 
 namespace voxeld::gpu {
 
-// A rank for each of options.devices (two at least). Waits until all are there, and linked, unless
-// options.wait_until_ready says otherwise; `reason`: for EngineInfo, which also says how what comes
-// reaches the GPUs. InvalidArgument for numbers that cannot be, FailedPrecondition, with the rank and
-// its GPU, if one cannot be had. Where the ranks cannot be linked (no NCCL) each is sent everything
-// by itself.
+// Creates a rank for each of options.devices (at least two). Waits until all have started and are
+// linked, unless options.wait_until_ready is false. `reason` is for EngineInfo, which also says how
+// deltas reach the GPUs. If the ranks cannot be linked (no NCCL), each is sent everything
+// separately. Errors: InvalidArgument for invalid numbers; FailedPrecondition, with the rank and
+// its GPU, if a GPU is not available.
 //
 // Contract, beyond gpu/engine.h's and gpu/worker/worker_engine.h's:
 // - A call is done when all ranks have done it. Staging is written once: all ranks map it.
-// - What one rank refuses all refuse, with nothing changed. Where they differ (memory that runs out
-//   on one GPU in the middle of a call), and where one is lost, all are: their processes are ended,
-//   and EngineOptions::lost is told once, when the last has gone.
-// - FrameResult: `changed` if one says so, `packed_as_drawn` if all do; times are those of the rank
-//   that took longest; `singular_drawables` is every rank's; the rest are sums. A voxel counts once,
-//   but a tile as often as ranks draw it.
+// - A call that one rank rejects is rejected by all, with nothing changed. If the ranks disagree
+//   (one GPU runs out of memory in the middle of a call), or if one is lost, all are lost: their
+//   processes are ended, and EngineOptions::lost is called once, when the last has gone.
+// - FrameResult: `changed` if any rank says so, `packed_as_drawn` if all do; times are those of the
+//   slowest rank; `singular_drawables` is the same for every rank; the rest are sums. A voxel
+//   counts once, but a tile as often as ranks draw it.
 absl::StatusOr<std::unique_ptr<Engine>> CreateRankedEngine(const EngineOptions& options,
                                                            std::string reason);
 
-// Whether a DataLoss says that some GPU of a display had no memory for what the others did: none is
-// faulty, and nothing in the scene is.
+// Returns whether a DataLoss means that some GPU of a display had no memory for a call that others
+// completed: then neither a GPU nor the scene is faulty.
 bool IsOutOfMemory(const absl::Status& status);
 inline constexpr char kOutOfMemoryPayload[] = "voxeld.dev/out-of-memory";
 
