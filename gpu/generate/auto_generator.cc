@@ -19,7 +19,8 @@ std::string TextOf(const std::string& file) {
   return text.str();
 }
 
-// The processor and how much of it; what else there is, the candidates' names say.
+// Returns the processor's model and number of processors. The candidates' names identify the rest
+// of the machine.
 std::string Machine() {
   std::istringstream cpuinfo(TextOf("/proc/cpuinfo"));
   std::string line, model = "unknown";
@@ -31,7 +32,7 @@ std::string Machine() {
   return absl::StrCat(model, ", ", sysconf(_SC_NPROCESSORS_ONLN), " processors");
 }
 
-// Whole or not at all.
+// Writes the whole file or nothing.
 void Write(const std::string& file, const std::string& text) {
   std::error_code error;
   std::filesystem::create_directories(std::filesystem::path(file).parent_path(), error);
@@ -99,7 +100,7 @@ size_t AutoGenerator::Choose(uint64_t voxels, uint64_t segments, Format format) 
 }
 
 absl::StatusOr<Plan> AutoGenerator::Prepare(const Batch& batch, Format format) {
-  // How many voxels there are is known afterwards.
+  // The number of voxels is known only after planning.
   return candidates_[Choose(1, batch.size())].generator->Prepare(batch, format);
 }
 

@@ -1,5 +1,5 @@
-// The generator that is the fastest for each batch: a few segments are made before a GPU has begun (the
-// paper's conclusion 2), many are not.
+// Chooses the fastest generator for each batch: a few segments are done before a GPU has started
+// (the paper's conclusion 2); many are not.
 #pragma once
 
 #include <memory>
@@ -19,18 +19,22 @@ struct Candidate {
 
 class AutoGenerator final : public Generator {
  public:
-  // The last one's memory is what Allocate gives: GPUs last. Reads what they cost from `cache_file`, or measures it and writes that there; empty: measures. A file that
-  // cannot be written is no error.
+  // Allocate returns the memory of the last candidate, so put GPUs last. Reads the candidates'
+  // costs from `cache_file`, or measures and writes them there. If it is empty, always measures. A
+  // file that cannot be written is not an error.
   static absl::StatusOr<std::unique_ptr<AutoGenerator>> Make(std::vector<Candidate> candidates,
                                                              const std::string& cache_file);
-  // With costs that are known; two curves a candidate: of steps (EUCLIDEAN, THIN), of COVER.
+  // With known costs. Each candidate has two curves: one for steps (EUCLIDEAN, THIN), one for
+  // COVER.
   AutoGenerator(std::vector<Candidate> candidates, std::vector<CostCurve> curves)
       : candidates_(std::move(candidates)), curves_(std::move(curves)) {}
 
-  // Where costs are kept, by default: $XDG_CACHE_HOME/voxeld or ~/.cache/voxeld; empty without either.
+  // Returns the default path of the file with costs: in $XDG_CACHE_HOME/voxeld or ~/.cache/voxeld;
+  // empty without either.
   static std::string DefaultCacheFile();
 
-  // The candidate for a batch of that size; voxels count by their bytes, as they are written.
+  // Returns the index of the candidate for a batch of that size. Voxels count by their bytes in
+  // `format`.
   size_t Choose(uint64_t voxels, uint64_t segments, Format format = {}) const;
 
   std::string name() const override { return "auto"; }

@@ -1,4 +1,4 @@
-// What is asked of a generator: segments, a sampling, and the form of the voxels.
+// The input of a generator: segments, a sampling, and the format of the voxels.
 #pragma once
 
 #include <array>
@@ -13,13 +13,14 @@
 
 namespace voxeld::gpu::generate {
 
-// End points in voxels; the voxel of p is ⌊p⌋. Real ones count to the nearest 2⁻¹⁶, halves up.
+// End points in voxels; the voxel of p is ⌊p⌋. Real coordinates are rounded to the nearest 2⁻¹⁶,
+// halves up.
 template <typename T>
 struct Segment {
   std::array<T, 3> start = {}, end = {};
 };
 
-// Looks at the caller's segments, which stay where they are.
+// A view of the caller's segments, which are not copied.
 class Batch {
  public:
   // Segments of int32_t, float or double.
@@ -42,7 +43,7 @@ class Batch {
       segments_;
 };
 
-// To the nearest unit, halves up; both steps are exact. No number stays none.
+// Rounds to the nearest unit, halves up; both steps are exact. NaN stays NaN.
 inline double RoundedUnits(double voxels) {
   const double units = voxels * static_cast<double>(kUnits);
   const double whole = std::floor(units);
@@ -62,7 +63,7 @@ FixedSegment ToFixed(const Segment<T>& segment) {
   return g;
 }
 
-// A voxel's form, in the machine's byte order, x first.
+// The format of a voxel, in the machine's byte order, x first.
 enum class Output : uint8_t {
   kI32x3,   // 12 bytes
   kF32x3,   // 12 bytes; coordinates within ±2²⁴

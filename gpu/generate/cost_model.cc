@@ -15,14 +15,15 @@
 namespace voxeld::gpu::generate {
 namespace {
 
-// The number grows with what generators cost: old files are measured anew.
+// Increase the number when the generators' costs change: files with an older one are measured
+// again.
 constexpr std::string_view kHeader = "voxeld generator costs 1";
 constexpr double kSecondsAPoint = 0.005;
 constexpr int kLeastCalls = 3;
 constexpr uint64_t kMostMeasured = 8 << 20;  // voxels
 
-// The least of several: what else the machine does only adds.
-// Voxels and seconds.
+// Returns the number of voxels, and the least of several durations in seconds: other work of the
+// machine only adds to them.
 absl::StatusOr<std::pair<double, double>> SecondsOf(Generator& generator,
                                                     const std::vector<Segment<float>>& segments,
                                                     Sampling sampling, std::span<std::byte> out) {
@@ -37,7 +38,7 @@ absl::StatusOr<std::pair<double, double>> SecondsOf(Generator& generator,
       return status;
     const double seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    if (call == 0) continue;  // wakes what sleeps
+    if (call == 0) continue;  // the first call starts idle threads and devices
     least = call == 1 ? seconds : std::min(least, seconds);
     sum += seconds;
   }
@@ -46,7 +47,8 @@ absl::StatusOr<std::pair<double, double>> SecondsOf(Generator& generator,
 
 std::vector<Segment<float>> Segments(size_t count, uint64_t voxels) {
   const float length = static_cast<float>(voxels - 1);
-  // Neither along an axis nor between whole voxels; two of three of it along x.
+  // The direction is neither along an axis nor between whole voxels; two thirds of the length are
+  // along x.
   constexpr float kX = 2.0F / 3, kY = 2.0F / 3, kZ = 1.0F / 3;
   return std::vector<Segment<float>>(
       count, {{0.3F, 0.4F, 0.6F}, {0.3F + length * kX, 0.4F + length * kY, 0.6F + length * kZ}});
@@ -60,7 +62,7 @@ double CostCurve::SecondsFor(uint64_t voxels, uint64_t segments) const {
   while (i + 1 < points.size() && points[i].first < v) ++i;
   const auto& [v0, s0] = points[i - 1];
   const auto& [v1, s1] = points[i];
-  // Below the least size nothing gets cheaper.
+  // A batch below the least measured size costs no less.
   const double at = std::max(0.0, std::log(v / v0) / std::log(v1 / v0));
   return std::exp(std::log(s0) + at * std::log(s1 / s0)) +
          seconds_a_segment * static_cast<double>(segments > 0 ? segments - 1 : 0);
@@ -68,7 +70,7 @@ double CostCurve::SecondsFor(uint64_t voxels, uint64_t segments) const {
 
 absl::StatusOr<CostCurve> MeasureCost(Generator& generator, Sampling sampling) {
   CostCurve curve;
-  // COVER crosses more faces than a segment has steps, twice as many at most here.
+  // COVER crosses more faces than a segment has steps, here at most twice as many.
   const size_t bytes = 2 * kMostMeasured * BytesOf(Output::kI32x3);
   absl::StatusOr<HostMemory> memory = generator.Allocate(bytes);
   if (!memory.ok()) return memory.status();

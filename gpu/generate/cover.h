@@ -1,9 +1,10 @@
-// COVER: the k-th of the cells that a segment crosses, 6-connected, for any k on its own.
+// COVER: computes the k-th of the cells that a segment crosses, 6-connected, independently for any
+// k.
 //
-// Crossing i = 0..n_a−1 of axis a takes place at t = (p_a + i)/|D_a| (in units of 2⁻¹⁶), p_a units to the
-// first face; crossings are ordered by (t, axis), x before y before z, and the k-th cell is what the
-// first k of them lead to. The three sequences are merged by rank: of each axis as many come among the
-// first k as t = k/N, corrected, says.
+// Crossing i = 0..n_a−1 of axis a takes place at t = (p_a + i)/|D_a| (in units of 2⁻¹⁶), where p_a
+// is the distance to the first face. Crossings are ordered by (t, axis), x before y before z, and
+// the k-th cell is reached after the first k of them. The three sequences are merged by rank: t =
+// k/N, corrected, says how many crossings of each axis are among the first k.
 //
 // Host and device.
 #pragma once
@@ -38,29 +39,31 @@ struct Cover {
 
   VOXELD_HD int64_t steps() const { return count[0] + count[1] + count[2]; }
 
-  // Whether crossing i of axis a comes before crossing j of axis b.
+  // Returns whether crossing i of axis a comes before crossing j of axis b.
   VOXELD_HD bool Before(int a, int64_t i, int b, int64_t j) const {
     const Wide left = static_cast<Wide>(first[a] + i * kUnits) * length[b];
     const Wide right = static_cast<Wide>(first[b] + j * kUnits) * length[a];
     return left < right || (left == right && a < b);
   }
 
-  // How many crossings of each axis are among the first k; 0 ≤ k ≤ steps().
+  // Computes how many crossings of each axis are among the first k. Requires: 0 ≤ k ≤ steps().
   VOXELD_HD void Find(int64_t k, int64_t (&taken)[3]) const {
-    // The point at which about k faces have been crossed; of each axis that is right but for one or two.
+    // The guess is the point at which about k faces have been crossed. For each axis it is off by
+    // at most one or two.
     int64_t sum = 0;
     const int64_t all = length[0] + length[1] + length[2];
     for (int a = 0; a < 3; ++a) {
       int64_t guess = 0;
       if (all > 0) {
-        // Units of this axis at that point, less those to its first face.
+        // The units of this axis at that point, minus those to its first face.
         const Wide units = static_cast<Wide>(length[a]) * k * kUnits / all;
         guess = units < first[a] ? 0 : static_cast<int64_t>((units - first[a]) / kUnits) + 1;
       }
       taken[a] = Min(guess, count[a]);
       sum += taken[a];
     }
-    // Until they are the first `sum` ones: none taken comes after one that is left.
+    // Exchange crossings until those taken are the first `sum`: no taken crossing comes after one
+    // that is left.
     for (;;) {
       const int last = Last(taken), next = Next(taken);
       if (last < 0 || next < 0 || !Before(next, taken[next], last, taken[last] - 1)) break;
@@ -70,7 +73,7 @@ struct Cover {
     for (; sum > k; --sum) --taken[Last(taken)];
     for (; sum < k; ++sum) ++taken[Next(taken)];
   }
-  // From the first k to the first k + 1.
+  // Advances from the first k crossings to the first k + 1.
   VOXELD_HD void Step(int64_t (&taken)[3]) const {
     const int next = Next(taken);
     if (next >= 0) ++taken[next];
@@ -82,7 +85,7 @@ struct Cover {
   }
 
  private:
-  // The axis of the last crossing among those taken; −1: none is.
+  // Returns the axis of the last crossing among those taken; −1 if none is taken.
   VOXELD_HD int Last(const int64_t (&taken)[3]) const {
     int last = -1;
     for (int a = 0; a < 3; ++a) {
@@ -91,7 +94,7 @@ struct Cover {
     }
     return last;
   }
-  // The axis of the first one left; −1: none is.
+  // Returns the axis of the first crossing that is left; −1 if none is left.
   VOXELD_HD int Next(const int64_t (&taken)[3]) const {
     int next = -1;
     for (int a = 0; a < 3; ++a) {

@@ -1,5 +1,5 @@
-// Blocks of segments, whose arithmetic is done together: units, counts, short segments. One instruction set's share
-// of cpu_kernel.cc.
+// Blocks of segments whose arithmetic is done together: units, counts, short segments. Part of
+// cpu_kernel.cc, compiled for each instruction set.
 #if defined(VOXELD_GPU_GENERATE_CPU_BLOCKS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef VOXELD_GPU_GENERATE_CPU_BLOCKS_INL_H_
 #undef VOXELD_GPU_GENERATE_CPU_BLOCKS_INL_H_
@@ -17,7 +17,7 @@ using DF = hn::ScalableTag<double>;
 using VF = hn::Vec<DF>;
 constexpr size_t kBlock = 64;  // segments whose arithmetic is done together
 
-// Coordinates as they lie in memory, in units, as RoundedUnits.
+// Loads consecutive coordinates from memory, in units, rounded as by RoundedUnits.
 template <typename T>
 HWY_ATTR HWY_INLINE VF LoadUnits(const T* from) {
   const DF d;
@@ -38,11 +38,11 @@ HWY_ATTR HWY_INLINE VF LoadUnits(const T* from) {
   }
 }
 
-// Sixes of start and end, in units, and what they have in common.
+// The start and end coordinates of segments (six each), in units, and their common properties.
 struct UnitBlock {
   HWY_ALIGN double q[6 * kBlock + 64];
-  bool whole;   // all are whole voxels
-  bool within;  // all are coordinates
+  bool whole;   // all coordinates are whole voxels
+  bool within;  // all coordinates are in range
   double lo[3], hi[3];
 
   template <typename T>
@@ -54,15 +54,14 @@ struct UnitBlock {
     const T* from = segments[begin].start.data();
     const size_t values = 6 * (end - begin), lanes = hn::Lanes(d);
     const VF far = hn::Set(d, kFar), most = hn::Set(d, kMost), voxel = hn::Set(d, 1.0 / 65536);
-    // Lane l of vector i is axis (lanes·i + l) mod 3: three vectors later it is so again.
+    // Lane l of vector i is axis (lanes·i + l) mod 3: the pattern repeats after three vectors.
     VF least[3] = {far, far, far}, greatest[3] = {hn::Neg(far), hn::Neg(far), hn::Neg(far)};
     auto all_whole = hn::Eq(far, far), all_within = all_whole;
     const auto take = [&](VF units, size_t i, size_t phase) HWY_ATTR {
       hn::Store(units, d, q + i);
       const VF voxels = hn::Mul(units, voxel);
       all_whole = hn::And(all_whole, hn::Eq(voxels, hn::Floor(voxels)));
-      all_within =
-          hn::And(all_within, hn::Le(hn::Abs(units), most));  // false for what is no number
+      all_within = hn::And(all_within, hn::Le(hn::Abs(units), most));  // false for NaN
       least[phase] = hn::Min(least[phase], units);
       greatest[phase] = hn::Max(greatest[phase], units);
     };
@@ -82,7 +81,7 @@ struct UnitBlock {
       for (size_t l = a; l < 3 * lanes; l += 3)
         lo[a] = std::min(lo[a], edge[0][l]), hi[a] = std::max(hi[a], edge[1][l]);
     }
-    // Nothing beyond the last one is loaded.
+    // Handles the rest one by one, so that nothing beyond the last coordinate is loaded.
     for (; i < values; ++i) {
       q[i] = RoundedUnits(static_cast<double>(from[i]));
       whole &= q[i] * (1.0 / 65536) == std::floor(q[i] * (1.0 / 65536));
@@ -111,7 +110,7 @@ HWY_ATTR bool CountBlock(std::span<const Segment<T>> segments, Sampling sampling
   for (size_t i = begin; i < end; ++i) {
     const double* const q = block.q + 6 * (i - begin);
     if (sampling == Sampling::kEuclidean) {
-      // A sum of squares below 2⁵² is exact, and its root is rounded correctly.
+      // A sum of squares below 2⁵² is exact, and its root is correctly rounded.
       constexpr double kExact = static_cast<double>(int64_t{1} << 52);
       const double x = q[3] - q[0], y = q[4] - q[1], z = q[5] - q[2];
       const double square = x * x + y * y + z * z;
@@ -128,12 +127,12 @@ HWY_ATTR bool CountBlock(std::span<const Segment<T>> segments, Sampling sampling
   return true;
 }
 
-// The same for whole segments of few steps, whose arithmetic is done together: what EmitShort works out of
-// each, in three of four places.
+// The same for whole segments of few steps, whose arithmetic is done together. Holds the values
+// that EmitShort computes for each segment, in three of every four elements.
 struct ShortBlock {
   HWY_ALIGN int32_t cell[4 * kBlock + 16], begin[4 * kBlock + 16], step[4 * kBlock + 16];
 
-  // `zone`, `too_large`: of the block's longest; `apart`: so are all.
+  // `zone` and `too_large` are those of the block's longest segment; `apart` holds for all of them.
   HWY_ATTR void Set(const UnitBlock& block, const uint64_t* offsets, size_t count, uint32_t zone,
                     uint32_t too_large, bool apart) {
     const hn::CappedTag<double, 4> d;
@@ -147,7 +146,7 @@ struct ShortBlock {
         const auto s = hn::LoadU(d, block.q + 6 * i + a), e = hn::LoadU(d, block.q + 6 * i + 3 + a);
         const auto cells = hn::Floor(hn::Mul(s, hn::Set(d, 1.0 / 65536)));
         const auto fraction = hn::Sub(s, hn::Mul(cells, hn::Set(d, 65536.0)));
-        // A quotient of so small numbers is rounded to a whole one only if it is one.
+        // A quotient of such small numbers is rounded to a whole number only if it is whole.
         const auto quotient = hn::Div(hn::Mul(hn::Sub(e, s), hn::Set(d, 64.0)), n);
         const auto one = hn::Ceil(quotient);
         const auto from = hn::Add(hn::Mul(fraction, hn::Set(d, 64.0)),
@@ -216,7 +215,8 @@ HWY_ATTR void EmitShortBlock(const Spread& spread, const UnitBlock& units, const
   }
 }
 
-// How many of the segments from `i` on, all of whose voxels are wanted, are short; and their longest.
+// Returns how many of the segments from `i` on are short, of those whose voxels are all wanted, and
+// the steps of the longest in `longest`.
 inline size_t ShortFrom(std::span<const uint64_t> offsets, size_t i, uint64_t end,
                         uint32_t* longest) {
   size_t count = 0;

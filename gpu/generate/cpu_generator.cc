@@ -10,9 +10,9 @@
 namespace voxeld::gpu::generate {
 namespace {
 
-// Voxels that are worth another thread.
+// The number of voxels that justifies another thread.
 constexpr uint64_t kTaskVoxels = 64 << 10;
-// What a core's own cache may keep for whoever reads it next.
+// The bytes that a core's own cache may still hold for the next reader.
 constexpr uint64_t kCachedBytes = 4 << 20;
 
 class CpuGenerator final : public Generator {
@@ -61,7 +61,7 @@ class CpuGenerator final : public Generator {
     if (threads == 1 || count < 2 * kTaskVoxels) {
       return EmitVoxels(batch, format, plan.offsets, first, count, past_caches, out);
     }
-    // A few tasks a thread, in case threads are not equally fast.
+    // Make a few tasks per thread, in case threads are not equally fast.
     const uint64_t tasks = std::min(count / kTaskVoxels, threads * 4);
     const uint64_t each = (count / tasks + 15) / 16 * 16;  // whole lines of memory
     executor_->For(tasks, 1, [&](size_t task, int) {
@@ -73,7 +73,7 @@ class CpuGenerator final : public Generator {
   }
 
   const std::unique_ptr<Executor> executor_;
-  std::vector<std::byte> chunk_;  // of Stream
+  std::vector<std::byte> chunk_;  // used by Stream
 };
 
 }  // namespace

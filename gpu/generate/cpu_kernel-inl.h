@@ -1,4 +1,4 @@
-// What cpu_kernel.cc calls, once for each instruction set.
+// The entry points that cpu_kernel.cc calls, compiled once for each instruction set.
 #if defined(VOXELD_GPU_GENERATE_CPU_KERNEL_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef VOXELD_GPU_GENERATE_CPU_KERNEL_INL_H_
 #undef VOXELD_GPU_GENERATE_CPU_KERNEL_INL_H_

@@ -11,7 +11,7 @@
 #include "gpu/generate/cover.h"
 #include "gpu/generate/stride.h"
 
-// Vectors are kept in structs, whose size is known when this is compiled.
+// Vectors are members of structs, so their size must be known at compile time.
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "gpu/generate/cpu_kernel.cc"

@@ -1,5 +1,5 @@
-// How the CPU writes voxels: staged in the cache, past it, and how they lie in vectors. One instruction set's share
-// of cpu_kernel.cc.
+// How the CPU writes voxels: staged in the cache, past the caches, and their layout in vectors.
+// Part of cpu_kernel.cc, compiled for each instruction set.
 #if defined(VOXELD_GPU_GENERATE_CPU_STAGE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef VOXELD_GPU_GENERATE_CPU_STAGE_INL_H_
 #undef VOXELD_GPU_GENERATE_CPU_STAGE_INL_H_
@@ -19,19 +19,20 @@ using VU = hn::Vec<DU>;
 constexpr int kVectorSteps = 1024;  // from one exact beginning
 constexpr size_t kMostLanes = HWY_MAX_BYTES / 4;
 constexpr int64_t kShortSteps = 192;
-constexpr uint64_t kDirect = 256;  // voxels that are worth a line's beginning
+constexpr uint64_t kDirect = 256;  // the number of voxels that justifies aligning to a line
 using Rules = WalkRules<kVectorSteps + 64>;
 static_assert(HWY_MAX_BYTES > 256 || kMostLanes <= 64, "a walk begins at each lane");
 
-// Voxels on their way to memory: made in the cache, written in whole lines.
+// Voxels on their way to memory: they are staged in the cache and written in whole lines.
 class Stage {
  public:
   static constexpr size_t kBytes = 16 << 10;
 
   Stage(std::byte* out, uint64_t bytes, bool past_caches) : out_(out), stream_(past_caches) {
-    // Lines begin where the output's do.
+    // Lines of the buffer begin where those of the output do.
     used_ = begin_ = stream_ ? reinterpret_cast<uintptr_t>(out) % kLine : 0;
-    // Where the caches keep it, what follows in the output itself may be written over while there is some.
+    // If the caches keep the output, voxels are written to it directly, and the bytes after them
+    // may be overwritten while enough are left.
     if (!stream_ && bytes > kSlack) direct_until_ = out + (bytes - kSlack);
   }
   ~Stage() {
@@ -41,8 +42,8 @@ class Stage {
   Stage(const Stage&) = delete;
   Stage& operator=(const Stage&) = delete;
 
-  // Bytes, a multiple of `each`, after which the output is at the beginning of a line; none: it never is, or
-  // stores do not go past the caches.
+  // Returns the number of bytes, a multiple of `each`, after which the output is at the beginning
+  // of a line; nullopt if it never is, or if stores do not go past the caches.
   std::optional<size_t> ToLine(size_t each) const {
     const size_t over = (reinterpret_cast<uintptr_t>(out_) + used_ - begin_) % kLine;
     if (!stream_ || over % 4 != 0) return std::nullopt;
@@ -50,7 +51,8 @@ class Stage {
     while ((over + bytes) % kLine != 0) bytes += each;
     return bytes;
   }
-  // Writes all that is held. What follows may be written to where it says, as far as Skip is then told.
+  // Writes everything that is held. The caller may write further bytes at the returned address, and
+  // then reports their number with Skip.
   std::byte* Drain() {
     std::memcpy(out_, buffer_ + begin_, used_ - begin_);
     out_ += used_ - begin_;
@@ -62,7 +64,7 @@ class Stage {
     used_ = begin_ = reinterpret_cast<uintptr_t>(out_) % kLine;
   }
 
-  // Where the next voxels go: a vector of them, or kShortSteps + 1 and one.
+  // Returns where the next voxels go: a vector of them, or kShortSteps + 1 and one vector.
   std::byte* next() { return out_ < direct_until_ ? out_ : buffer_ + used_; }
   HWY_ATTR void Add(size_t bytes) {
     if (out_ < direct_until_) {
@@ -107,8 +109,9 @@ class Stage {
   const bool stream_;
 };
 
-// Three vectors hold as many voxels as one has lanes, laid out as they go to memory: lane l of vector v is
-// axis (L·v + l) mod 3 of voxel ⌊(L·v + l)/3⌋. What is kept of each axis is spread over them once.
+// Three vectors hold as many voxels as one vector has lanes, in their layout in memory: lane l of
+// vector v is axis (L·v + l) mod 3 of voxel ⌊(L·v + l)/3⌋. Values of each axis are spread over them
+// once.
 constexpr size_t kLanes = hn::MaxLanes(DU());
 constexpr int kLaneBits = std::countr_zero(kLanes);
 

@@ -1,4 +1,5 @@
-// Segments as walks in vectors (stride.h), one segment at a time. One instruction set's share of cpu_kernel.cc.
+// Segments as walks in vectors (stride.h), one segment at a time. Part of cpu_kernel.cc, compiled
+// for each instruction set.
 #if defined(VOXELD_GPU_GENERATE_CPU_WALKS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef VOXELD_GPU_GENERATE_CPU_WALKS_INL_H_
 #undef VOXELD_GPU_GENERATE_CPU_WALKS_INL_H_
@@ -16,7 +17,7 @@ namespace HWY_NAMESPACE {
 struct LaneWalks {
   VU whole, fraction, step_whole, step_fraction;
 
-  // `all`: the step of as many steps as there are lanes.
+  // `all`: the combined step of as many steps as there are lanes.
   HWY_ATTR HWY_INLINE void Begin(const Walk& walk, uint64_t all) {
     const DU d;
 #if HWY_TARGET == HWY_SCALAR
@@ -50,14 +51,15 @@ struct LaneWalks {
   }
 };
 
-// Voxels on which the vectors leave a doubt, one by one.
+// Computes voxels for which the vectors are doubtful, one by one.
 template <Output kOut, class Exact>
 HWY_NOINLINE void StoreExact(uint32_t k, uint32_t count, std::byte* at, const Exact& exact) {
   for (uint32_t i = 0; i < count; ++i) StoreVoxel<kOut>(exact(k + i), at + i * BytesOf(kOut));
 }
 
-// `count` voxels from three walks' beginnings. `exact(k)` gives the voxel where the walks leave a doubt.
-// kStream: straight to `to`, which begins a line; `count` is a multiple of kLanes.
+// Emits `count` voxels from the beginnings of three walks. `exact(k)` returns the voxel if the
+// walks are doubtful. kStream: writes directly to `to`, which begins a line; `count` is a multiple
+// of kLanes.
 template <Output kOut, bool kStream, class Exact>
 HWY_ATTR HWY_INLINE void EmitWalks(const Spread& spread, const Walk (&walks)[3],
                                    const uint64_t (&all)[3], uint32_t k, uint32_t count,
@@ -68,7 +70,7 @@ HWY_ATTR HWY_INLINE void EmitWalks(const Spread& spread, const Walk (&walks)[3],
   if constexpr (kOut == Output::kPacked) {
     for (size_t a = 0; a < 3; ++a) p[a].Begin(walks[a], all[a]);
   } else {
-    // Lane by lane: a walk is long.
+    // Store lane by lane: this takes little time compared with a walk.
     HWY_ALIGN uint32_t whole[3 * kLanes], fraction[3 * kLanes];
     for (size_t a = 0; a < 3; ++a) {
       uint64_t at = walks[a].at;
@@ -118,7 +120,7 @@ HWY_ATTR HWY_INLINE void EmitWalks(const Spread& spread, const Walk (&walks)[3],
   }
 }
 
-// Voxels k to k + count − 1 of a segment of n > 0 steps.
+// Emits voxels k to k + count − 1 of a segment of n > 0 steps.
 template <Output kOut>
 HWY_ATTR void EmitLong(const Spread& spread, const FixedSegment& g, int64_t n, uint32_t k,
                        uint64_t count, Stage& stage) {
@@ -169,8 +171,8 @@ HWY_ATTR void EmitLong(const Spread& spread, const FixedSegment& g, int64_t n, u
   }
 }
 
-// The same for few steps: 32 bits hold where a voxel lies from the segment's first one, with 22 of
-// fraction. Rounding and zones are those of a walk (stride.h), in units of 2⁻²².
+// The same for few steps: 32 bits hold a voxel's offset from the segment's first one, with a
+// fraction of 22 bits. Rounding and zones are those of a walk (stride.h), in units of 2⁻²².
 template <Output kOut>
 HWY_ATTR HWY_INLINE void EmitShort(const Spread& spread, const FixedSegment& g, int64_t n,
                                    uint32_t k, uint32_t count, Stage& stage) {

@@ -10,7 +10,7 @@
 namespace voxeld::gpu::generate {
 namespace {
 
-constexpr size_t kBlock = 8192;  // segments that one worker looks through at a time
+constexpr size_t kBlock = 8192;  // segments that one worker checks at a time
 constexpr char kAxes[] = "xyz";
 
 struct Bounds {
@@ -58,10 +58,10 @@ const char* NameOf(Output output) {
 bool InRange(double voxels) {
   constexpr double kMost = static_cast<double>(kMostCoordinate * kUnits);
   const double units = RoundedUnits(voxels);
-  return units >= -kMost && units <= kMost;  // false for what is no number
+  return units >= -kMost && units <= kMost;  // false for NaN
 }
 
-// What is wrong with a segment, if anything is.
+// Returns an error that describes the first invalid value of a segment, if any.
 template <typename T>
 absl::Status Check(const Segment<T>& segment, size_t index, Sampling sampling) {
   for (size_t a = 0; a < 3; ++a) {
@@ -79,7 +79,8 @@ absl::Status Check(const Segment<T>& segment, size_t index, Sampling sampling) {
       "segments[%d] has %d steps; at most 2^30 (%d) are allowed", index, steps, kMostSteps));
 }
 
-// Counts the voxels of segments[begin, end) into counts. False: one of them is wrong.
+// Counts the voxels of segments[begin, end) into counts. Returns false if one of the segments is
+// invalid.
 template <typename T>
 bool Count(std::span<const Segment<T>> segments, Sampling sampling, size_t begin, size_t end,
            uint64_t* counts, Bounds& bounds) {
@@ -115,7 +116,7 @@ absl::StatusOr<Plan> MakePlanOf(std::span<const Segment<T>> segments, Format for
                                 Executor& executor) {
   Plan plan;
   plan.extent.format = format;
-  // offsets[i + 1] is segment i's count first.
+  // At first, offsets[i + 1] holds segment i's count.
   plan.offsets.resize(segments.size() + 1);
   uint64_t* const counts = plan.offsets.data() + 1;
   const size_t blocks = (segments.size() + kBlock - 1) / kBlock;

@@ -1,14 +1,14 @@
-// One segment as the generator counts it: end points in units of 2⁻¹⁶ voxel, a number of steps, and the
-// exact voxel at any step.
+// One segment in the generator's units: end points in units of 2⁻¹⁶ voxel, a number of steps, and
+// the exact voxel at any step.
 //
 //   voxel_k = ⌊S + (E−S)·k/N⌋, k = 0..N, in exact rational arithmetic (the paper's equation (3));
 //   EUCLIDEAN  N = ⌊|E−S|⌋ (the paper's (2))
 //   THIN       N = max over axes of |⌊E⌋−⌊S⌋|: 26-connected, no voxel twice
 //   COVER      the cells crossed from the lexicographically smaller end on (cover.h)
 //
-// N = 0 gives the voxels of S and E: two of them are one step, one of them none.
+// If N = 0, the voxels of S and E are generated: two voxels are one step, a single one is none.
 //
-// Host and device; no floating point decides anything.
+// Host and device. No decision uses floating point.
 #pragma once
 
 #include <cstdint>
@@ -44,7 +44,7 @@ VOXELD_HD inline int64_t FloorSqrt64(uint64_t x) {
   return r;
 }
 
-// ⌊|E−S|⌋ in voxels. ⌊√(q/2³²)⌋ = ⌊√⌊q/2³²⌋⌋.
+// Returns ⌊|E−S|⌋ in voxels. ⌊√(q/2³²)⌋ = ⌊√⌊q/2³²⌋⌋.
 VOXELD_HD inline int64_t FloorLength(const FixedSegment& g) {
   unsigned __int128 sum = 0;
   for (int a = 0; a < 3; ++a) {
@@ -56,7 +56,7 @@ VOXELD_HD inline int64_t FloorLength(const FixedSegment& g) {
   return FloorSqrt64(static_cast<uint64_t>(whole));
 }
 
-// The number of its voxels is one more.
+// Returns the number of steps, which is one less than the number of voxels.
 VOXELD_HD inline int64_t StepsOf(const FixedSegment& g, Sampling sampling) {
   int64_t most = 0, sum = 0;
   for (int a = 0; a < 3; ++a) {
@@ -70,7 +70,7 @@ VOXELD_HD inline int64_t StepsOf(const FixedSegment& g, Sampling sampling) {
   return n == 0 && most > 0 ? 1 : n;
 }
 
-// One coordinate of voxel_k by the definition itself; 0 ≤ k ≤ n, n > 0.
+// Computes one coordinate of voxel_k from the definition. Requires: 0 ≤ k ≤ n, n > 0.
 VOXELD_HD inline int32_t ExactCoordinate(int64_t s, int64_t e, int64_t n, int64_t k) {
   const Wide numerator = static_cast<Wide>(s) * n + (static_cast<Wide>(e) - s) * k;
   return static_cast<int32_t>(FloorDiv<Wide>(numerator, static_cast<Wide>(n) << kFractionBits));

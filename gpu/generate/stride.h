@@ -1,17 +1,19 @@
-// voxel_k without a division for each k, and still exact.
+// Computes voxel_k exactly, without a division for each k.
 //
-// Three nested forms of S + (E−S)·k/N on one axis. Each is rounded up by a known amount, so its whole
-// part can only be wrong where its fraction is smaller than that: there the next one is asked.
+// There are three nested forms of S + (E−S)·k/N on one axis. Each is rounded up by a known amount,
+// so its whole part can only be wrong if its fraction is smaller than that amount: then the next
+// form is used.
 //
 //   Walk    32 fraction bits, one addition a step      start 1, each step 1 too large, in 2⁻³²
 //   Stride  64 fraction bits, two multiplications      k·2⁻⁶⁴ too large; exact for N < 2²⁴, since
 //           for any k                                  exact values are multiples of 1/(N·2¹⁶)
 //   ExactCoordinate (segment.h)                        128 bits and a division
 //
-// A walk is biased by kWalkZone, so that values just below a whole number, which rounding could carry
-// over it, end with a fraction below kWalkZone, and whole numbers do not: `Doubtful`. Where no value can
-// lie so close below one (N small, or end points on whole voxels), or the steps are exact, the bias is
-// the whole zone; else whole numbers are doubtful too.
+// A walk is biased by kWalkZone, so that values just below a whole number, which rounding could
+// carry over it, end with a fraction below kWalkZone, and whole numbers do not: see `Doubtful`. If
+// no value can lie so close below a whole number (N is small, or the end points are on whole
+// voxels), or if the steps are exact, the bias is the whole zone; otherwise whole numbers are
+// doubtful too.
 //
 // Host and device.
 #pragma once
@@ -37,7 +39,7 @@ struct Stride {
   int32_t whole = 0, step_whole = 0;
   bool exact = true;  // 32 fraction bits hold the step
 
-  // n = 0: it stays.
+  // If n = 0, the stride does not move.
   VOXELD_HD static Stride Of(int64_t s, int64_t e, int64_t n) {
     Stride r;
     r.whole = static_cast<int32_t>(CellOf(s));
@@ -51,7 +53,7 @@ struct Stride {
     return r;
   }
 
-  // The whole part at k; `at_fraction`: what is beyond it.
+  // Returns the whole part at k; `at_fraction` receives the fraction.
   VOXELD_HD int32_t At(uint32_t k, uint64_t* at_fraction) const {
     const uint64_t low = static_cast<uint64_t>(static_cast<uint32_t>(step_fraction)) * k;
     const uint64_t high = (step_fraction >> 32) * k;
@@ -66,7 +68,7 @@ struct Stride {
   }
 };
 
-// Coordinate of voxel_k: from the stride where that is exact, else from the definition.
+// Returns a coordinate of voxel_k: from the stride if that is exact, otherwise from the definition.
 VOXELD_HD inline int32_t CoordinateAt(const Stride& stride, int64_t s, int64_t e, int64_t n,
                                       int64_t k) {
   uint64_t fraction = 0;
@@ -75,15 +77,15 @@ VOXELD_HD inline int32_t CoordinateAt(const Stride& stride, int64_t s, int64_t e
   return whole;
 }
 
-// How a walk of at most `longest` steps is biased.
+// How a walk of at most kLongest steps is biased.
 template <uint32_t kLongest>
 struct WalkRules {
-  static constexpr uint32_t kTooLarge = kLongest + 3;   // in 2⁻³², at most, at its end
-  static constexpr uint32_t kWalkZone = 2 * kTooLarge;  // doubtful fractions are below
+  static constexpr uint32_t kTooLarge = kLongest + 3;  // greatest error in 2⁻³², at its last step
+  static constexpr uint32_t kWalkZone = 2 * kTooLarge;  // fractions below it are doubtful
 
   // `grain`: end points are multiples of it, in units of 2⁻¹⁶ (65,536: whole voxels; 1: any).
-  // Values are multiples of grain/(N·2¹⁶): no walk can leave a doubt if N is so small that none of them lies
-  // within the zone and all rounding below a whole number.
+  // Values are multiples of grain/(N·2¹⁶): a walk cannot be doubtful if N is so small that none of
+  // them lies within the zone and all rounding below a whole number.
   VOXELD_HD static bool Apart(int64_t n, int64_t grain) {
     return (static_cast<uint64_t>(n) << kFractionBits) * (kWalkZone + kTooLarge) <
            (static_cast<uint64_t>(grain) << 32);
@@ -91,7 +93,7 @@ struct WalkRules {
   VOXELD_HD static uint32_t BiasOf(const Stride& stride, int64_t n, int64_t grain) {
     return stride.exact || Apart(n, grain) ? kWalkZone : kWalkZone - kTooLarge;
   }
-  // From step k on, in steps of one.
+  // Returns a walk from step k on, in steps of one.
   VOXELD_HD static Walk From(const Stride& stride, uint32_t k, uint32_t bias) {
     uint64_t fraction = 0;
     const int32_t whole = stride.At(k, &fraction);
@@ -107,7 +109,7 @@ struct WalkRules {
     return (static_cast<uint64_t>(static_cast<uint32_t>(stride.step_whole)) << 32) +
            (stride.step_fraction >> 32) + up;
   }
-  // The step of `times` steps at once: 1 too large, in 2⁻³².
+  // Returns `times` steps as one step: 1 too large, in 2⁻³².
   VOXELD_HD static uint64_t StepOfMany(const Stride& stride, uint32_t times) {
     const uint64_t low = static_cast<uint64_t>(static_cast<uint32_t>(stride.step_fraction)) * times;
     const uint64_t high = (stride.step_fraction >> 32) * times + (low >> 32);
@@ -118,7 +120,7 @@ struct WalkRules {
   VOXELD_HD static bool Doubtful(uint32_t fraction) { return fraction < kWalkZone; }
 };
 
-// 65,536 if all end points are whole voxels, else 1.
+// Returns 65,536 if all end points are whole voxels, otherwise 1.
 VOXELD_HD inline int64_t GrainOf(const FixedSegment& g) {
   uint64_t any = 0;
   for (int a = 0; a < 3; ++a) any |= static_cast<uint64_t>(g.s[a]) | static_cast<uint64_t>(g.e[a]);
