@@ -1,6 +1,6 @@
-// Forward-mode derivatives: a value and its gradient along the three axes of voxel space, over
-// single precision or over intervals of it. Over intervals the same operations are taken in the
-// same order, so that the intervals hold what single precision computes.
+// Forward-mode derivatives: a value and its gradient along the three axes of voxel space, in single
+// precision or in intervals of it. With intervals the same operations are done in the same order,
+// so that the intervals contain the values that single precision computes.
 #pragma once
 
 #include "gpu/implicit/interval.h"
@@ -47,7 +47,7 @@ VOXELD_HD Dual<N> Div(const Dual<N>& a, const Dual<N>& b) {
   return WithGradient(quotient,
                       [&](int i) { return Div(Sub(a.d[i], Mul(quotient, b.d[i])), b.value); });
 }
-// Of f(a) with f'(a) = slope.
+// Returns the dual of f(a), where f'(a) = slope.
 template <class N>
 VOXELD_HD Dual<N> Chain(const N& value, const N& slope, const Dual<N>& a) {
   return WithGradient(value, [&](int i) { return Mul(slope, a.d[i]); });
@@ -102,13 +102,13 @@ VOXELD_HD Dual<N> Atan2(const Dual<N>& y, const Dual<N>& x) {
   });
 }
 
-// |∇p|.
+// Returns |∇p|.
 template <class N>
 VOXELD_HD N SlopeOf(const Dual<N>& p) {
   return Sqrt(Add(Add(Square(p.d[0]), Square(p.d[1])), Square(p.d[2])));
 }
 
-// Of functions that take one of two branches: the gradient is that of the branch taken.
+// For functions that take one of two branches, the gradient is that of the branch taken.
 VOXELD_HD inline Dual<float> Abs(const Dual<float>& a) { return a.value < 0 ? Neg(a) : a; }
 VOXELD_HD inline Dual<float> Min(const Dual<float>& a, const Dual<float>& b) {
   return FirstIsMin(a.value, b.value) ? a : b;

@@ -1,22 +1,22 @@
-// An implicit shape in voxel space: which voxels it covers, in which colours, and what is known of
-// a box of voxels without looking at each. Host and device.
+// An implicit shape in voxel space: the voxels that it covers, their colours, and what can be said
+// about a box of voxels without testing each of them. Host and device.
 //
 // P, Φ and the colour are functions of the shape's own coordinates at a voxel's centre (solid.h). A
-// voxel is inside if P ≤ 0; what is not a number is outside. The solid is what is inside. The
-// surface, of half-width h voxels, is each voxel with
+// voxel is inside if P ≤ 0; NaN is outside. The solid consists of the voxels that are inside. The
+// surface, of half-width h voxels, consists of each voxel with
 //   |P| ≤ h·|∇P|, the gradient in voxel space; for h = 0: P = 0; or with
-//   a neighbour on the other side whose |P| is not less (what is not a number is infinite),
+// a neighbour on the other side whose |P| is not less (NaN is infinite),
 // among the 6 neighbours that share a face (THIN) or all 26 (COVER). Of any two neighbours on
 // different sides one is covered, so no path of such steps leads from one side to the other past
-// the surface. Of either only those voxels are covered at whose centre Φ ≤ 0 and which lie within
-// the rings: the closed curves, projected along an axis, by the even-odd rule.
+// the surface. Solids and surfaces cover only voxels at whose centre Φ ≤ 0 and which lie within the
+// rings: the closed curves, projected along an axis, by the even-odd rule.
 //
-// Guarantee: where P is the distance, a solid is the voxels whose centres the shape holds, but for
-// 0.006 voxel (its origin is snapped to 2⁻⁸), and its volume is right within 1 % at a radius of 20
-// voxels; of a surface no voxel nearer than h is missing, and none farther than h and half a
-// voxel's diagonal (√¾) is lit. Past edges shells are mitred. At any thickness no path of steps
-// across faces gets through a THIN surface (6-separating), no path at all through a COVER one
-// (26-separating). A shift by whole voxels shifts the result.
+// Guarantee: if P is the distance, a solid consists of the voxels whose centres are inside the
+// shape, to within 0.006 voxel (its origin is snapped to 2⁻⁸), and its volume is right within 1 %
+// at a radius of 20 voxels. A surface misses no voxel nearer than h and covers none farther than h
+// plus half a voxel's diagonal (√¾). Past edges shells are mitred. At any thickness no path of
+// steps across faces passes through a THIN surface (6-separating), and no path at all through a
+// COVER one (26-separating). A shift by whole voxels shifts the result.
 #pragma once
 
 #include "gpu/implicit/hoisted.h"
@@ -27,11 +27,11 @@ namespace voxeld::gpu::implicit {
 
 enum class Side : uint8_t { kOutside, kInside, kMixed };
 
-// Of all voxels in a box.
+// The state of all voxels in a box.
 struct BoxState {
-  Side side = Side::kMixed;  // of all of them, and of those around it if they matter
-  bool none = false;         // nothing in it is covered
-  bool all = false;          // of a solid: everything is
+  Side side = Side::kMixed;  // of all voxels, and of those around the box if they matter
+  bool none = false;         // nothing in the box is covered
+  bool all = false;          // for a solid: everything is covered
 };
 
 class Field {
@@ -49,14 +49,14 @@ class Field {
   VOXELD_HD bool cover() const { return record_.rule == SurfaceRule::kCover; }
   VOXELD_HD float half() const { return place_.half; }
 
-  // The shape's coordinates at offsets from its origin, in voxels.
+  // Computes the shape's coordinates at offsets from its origin, in voxels.
   template <class N>
   VOXELD_HD void Coordinates(const N& dx, const N& dy, const N& dz, N q[3]) const {
     for (int r = 0; r < 3; ++r) {
       const float* const row = solid_.inverse[r];
       const N sum = Add(Add(Mul(ConstantLike(dx, row[0]), dx), Mul(ConstantLike(dx, row[1]), dy)),
                         Mul(ConstantLike(dx, row[2]), dz));
-      // No zero is negative: it would tell of an axis that the coordinate does not depend on.
+      // Turn −0 into 0: its sign would depend on an axis that the coordinate does not depend on.
       q[r] = Add(sum, ConstantLike(dx, 0.0f));
     }
   }
@@ -84,11 +84,11 @@ class Field {
     return slots[program_.bound_slot()];
   }
 
-  // As neighbours compare it.
+  // Returns |P| as neighbours compare it.
   VOXELD_HD static float Magnitude(float p) { return IsNan(p) ? Infinity() : Abs(p); }
   VOXELD_HD static bool IsInside(float p) { return p <= 0; }
 
-  // |P| ≤ h·|∇P|.
+  // Returns whether |P| ≤ h·|∇P|.
   template <class N>
   VOXELD_HD static N Slope(const Dual<N>& p) {
     return SlopeOf(p);
@@ -97,7 +97,7 @@ class Field {
     return Abs(p.value) <= place_.half * Slope(p);
   }
 
-  // Φ and the rings.
+  // Tests Φ and the rings.
   VOXELD_HD bool IsBounded(const float q[3]) const {
     if (program_.bound() != 0 && !(Bound(q) <= 0)) return false;
     return program_.rings() == 0 || IsInRings(q);
@@ -118,11 +118,12 @@ class Field {
 
   VOXELD_HD bool is_bounded() const { return program_.bound() != 0 || program_.rings() != 0; }
   VOXELD_HD bool is_uniform() const { return program_.color_by() == ColorBy::kUniform; }
-  // Whether every voxel that P says to be covered is, in the record's colour.
+  // Returns whether every voxel that P selects is covered, in the record's colour.
   VOXELD_HD bool is_plain() const { return !is_bounded() && is_uniform(); }
 
   VOXELD_HD const HoistedView& hoisted() const { return hoisted_; }
-  // Along an axis at `d` voxels from the origin: f(value, number of the hoisted value).
+  // Evaluates the hoisted values of an axis at `d` voxels from the origin: calls f(value, number of
+  // the hoisted value).
   template <class N, class F>
   VOXELD_HD void HoistedAlong(int axis, const N& d, F&& f) const {
     const N zero = ConstantLike(d, 0.0f);
@@ -146,7 +147,8 @@ class Field {
       f(slots[hoisted_.slot(v)], v);
     }
   }
-  // P of hoisted values; `q` counts only if they do not suffice (HoistedView::needs_coordinates).
+  // Returns P from hoisted values. `q` is used only if they do not suffice
+  // (HoistedView::needs_coordinates).
   template <class N, class Values>
   VOXELD_HD N Rest(const N q[3], Values&& values) const {
     N slots[kMostSlots];
@@ -154,7 +156,7 @@ class Field {
     return slots[hoisted_.rest_slot()];
   }
 
-  // Of voxels where P lies in there.
+  // Returns the state of voxels whose P lies in the interval.
   VOXELD_HD BoxState StateOf(const Interval& p) const {
     BoxState state;
     if (p.lo > 0) {
@@ -166,10 +168,11 @@ class Field {
     state.all = solid() && state.side == Side::kInside;
     return state;
   }
-  // A surface's sides matter one voxel beyond a box.
+  // For surfaces, the sides of voxels up to one beyond a box matter.
   VOXELD_HD int32_t rim() const { return solid() ? 0 : 1; }
 
-  // What is known of the voxels in a box, of which each axis has at least one.
+  // Returns what is known about the voxels in a box. Requires: the box has at least one voxel along
+  // each axis.
   VOXELD_HD VOXELD_DEVICE_NOINLINE BoxState StateOf(const Box3& box) const {
     Interval q[3];
     if (program_.bound() != 0) {
@@ -184,7 +187,8 @@ class Field {
     if (state.none && !solid() && place_.half != 0) state.none = Abs(p).lo > ReachIn(box);
     return state;
   }
-  // No voxel in the box of a greater |P| is covered by |P| ≤ h·|∇P|; 0 < h.
+  // Returns a bound: no voxel in the box with a greater |P| is covered by |P| ≤ h·|∇P|. Requires: 0
+  // < h.
   VOXELD_HD VOXELD_DEVICE_NOINLINE float ReachIn(const Box3& box) const {
     Interval q[3];
     CoordinatesOf(box, 0, q);
@@ -196,7 +200,7 @@ class Field {
   }
 
  private:
-  // Steps of 0 to 1, the last one included in the one before it.
+  // Maps 0 to 1 onto steps; 1 itself belongs to the last step.
   VOXELD_HD static uint32_t Level(float value, float steps) {
     if (!(value > 0)) return 0;
     if (value >= 1) return 255;

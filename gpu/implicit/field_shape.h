@@ -1,6 +1,6 @@
-// A primitive that is drawn by the general method: its surface and bounds as nodes of a graph,
-// where it lies, and the curves that bound it. The headers of such primitives (gpu/primitives/)
-// make these.
+// A primitive that is drawn by the general method: its surface and bounds as nodes of a graph, its
+// extent, and the curves that bound it. The headers of such primitives (gpu/primitives/) create
+// these.
 #pragma once
 
 #include <algorithm>
@@ -35,20 +35,21 @@ inline double Length(const Vector& a) { return std::sqrt(Dot(a, a)); }
 
 struct FieldShape {
   Node surface = -1, bound = -1;
-  // A box that holds it, shells and what is drawn thicker than it is left out.
+  // A box that contains it; shells and thickness beyond its own size are not included.
   Vector min, max;
   std::vector<float> ring_points;  // x y z
   std::vector<uint32_t> ring_ends;
   uint32_t ring_axis = 2;
 };
 
-// What a thinner solid, or a smaller surface, is drawn as, so that it is not lost between the
-// voxels' centres: no point is farther from one of these than √¾ voxel.
+// Returns the radius, but at least 0.87 voxel: a thinner solid or a smaller surface is drawn
+// larger, so that it is not lost between the voxels' centres. No point is farther than √¾ voxel
+// from a centre.
 inline Node AtLeastAVoxel(Graph& g, double radius) {
   return g.Max(g.Constant(radius), g.Mul(g.Constant(0.87), g.Voxel()));
 }
 
-// p·v − offset, of the point p.
+// Returns p·v − offset for the point p.
 inline Node Along(Graph& g, const Vector& v, double offset) {
   Node sum = -1;
   for (int a = 0; a < 3; ++a) {
@@ -59,15 +60,15 @@ inline Node Along(Graph& g, const Vector& v, double offset) {
   if (sum < 0) return g.Constant(-offset);
   return offset == 0 ? sum : g.Sub(sum, g.Constant(offset));
 }
-// |p − center|.
+// Returns |p − center|.
 inline Node DistanceFrom(Graph& g, const Vector& center) {
   const Node d[3] = {Along(g, {1, 0, 0}, center.x), Along(g, {0, 1, 0}, center.y),
                      Along(g, {0, 0, 1}, center.z)};
   return g.Length(d);
 }
-// Of the point from the line through `center` along the unit vector `axis`.
+// Returns the distance of the point from the line through `center` along the unit vector `axis`.
 inline Node DistanceFromAxis(Graph& g, const Vector& center, const Vector& axis) {
-  // The two other axes of a frame.
+  // Choose the two other axes of a frame.
   const Vector least =
       std::fabs(axis.x) < std::fabs(axis.y)
           ? (std::fabs(axis.x) < std::fabs(axis.z) ? Vector{1, 0, 0} : Vector{0, 0, 1})

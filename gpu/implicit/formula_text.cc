@@ -60,7 +60,8 @@ const char* FunctionOf(Op op) {
   return "";
 }
 
-// About, in simple operations: what takes branches and polynomials, or double precision.
+// Returns the approximate cost in simple operations; branches, polynomials and double precision
+// cost more.
 uint64_t WeightOf(Op op) {
   switch (op) {
     case Op::kSin:
@@ -81,10 +82,10 @@ uint64_t WeightOf(Op op) {
   }
 }
 
-// Where the value of an instruction is worked out.
+// Where the value of an instruction is computed.
 enum class Where : uint8_t {
-  kAnywhere,  // a leaf that is the same everywhere
-  kRow,       // once a row
+  kAnywhere,  // nowhere in particular: a leaf that is the same everywhere
+  kRow,       // once per row
   kVoxel,
 };
 
@@ -154,7 +155,7 @@ class Writer {
   }
   void Keep(uint32_t i) { kept_[i] = where_[i] == Where::kRow; }
 
-  // As it is called within the row's working out (`once`), or a voxel's.
+  // Returns the expression for a value, within the row's code (`once`) or a voxel's.
   std::string Argument(uint32_t i, bool once) const {
     if (where_[i] == Where::kAnywhere) return ValueOf(i, once);
     if (where_[i] == Where::kRow && !once) return absl::StrCat("Spread(row.n", i, ", M())");
@@ -187,8 +188,8 @@ class Writer {
   const HoistedView view_;
   const uint32_t first_word_;
   std::vector<Where> where_;
-  std::vector<std::array<uint32_t, 2>> arguments_;  // by instruction: which ones' values it takes
-  std::vector<bool> kept_;                          // of the row's: voxels ask for them
+  std::vector<std::array<uint32_t, 2>> arguments_;  // by instruction: those it takes values of
+  std::vector<bool> kept_;                          // of the row's values: voxels use them
   uint32_t root_ = 0;
 };
 

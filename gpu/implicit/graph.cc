@@ -16,7 +16,7 @@ bool Graph::IsConstant(Node a, float* value) const {
   return true;
 }
 
-// A node over constants is their value, as the program would compute it.
+// A node over constants becomes their value, as the program would compute it.
 Graph::Node Graph::Make(const Content& content) {
   float a = 0, b = 0;
   const bool constant = !IsLeaf(content.op) && IsConstant(content.a, &a) &&
@@ -70,7 +70,7 @@ Graph::Node Graph::Mod(Node a, Node b) { return Sub(a, Mul(b, Floor(Div(a, b))))
 
 Graph::Node Graph::SmoothMin(Node a, Node b, Node k) {
   const Node overlap = Max(Sub(k, Abs(Sub(a, b))), Constant(0));
-  // Where k is 0 nothing overlaps.
+  // If k is 0 nothing overlaps, and this avoids a division by 0.
   const Node share = Max(Mul(Constant(4), k), Constant(std::numeric_limits<float>::min()));
   return Sub(Min(a, b), Div(Square(overlap), share));
 }
@@ -82,8 +82,8 @@ Graph::Node Graph::Length(std::span<const Node> of) {
   return Sqrt(sum);
 }
 
-// Orders the nodes under some roots, children first, the one that needs more slots before the other,
-// and gives each a slot until it has been read for the last time.
+// Orders the nodes under the roots, children first, and of two children the one that needs more
+// slots first. Gives each node a slot until it has been read for the last time.
 class Compiler {
  public:
   explicit Compiler(const Graph& graph) : graph_(graph) {}
@@ -108,7 +108,8 @@ class Compiler {
         if (last[PlaceOf(child)] == i) taken[slots[PlaceOf(child)]] = false;
       });
       const uint32_t a = c.a < 0 ? 0 : slots[PlaceOf(c.a)], b = c.b < 0 ? a : slots[PlaceOf(c.b)];
-      // Not one that is read by the same instruction: it may be written before the other is read.
+      // Do not reuse a slot that the same instruction reads: it may be written before the other
+      // argument is read.
       uint32_t to = 0;
       while (to < taken.size() && (taken[to] || (c.a >= 0 && to == a) || (c.b >= 0 && to == b))) {
         ++to;
@@ -141,7 +142,7 @@ class Compiler {
   size_t PlaceOf(Graph::Node node) const {
     return static_cast<size_t>(place_[static_cast<size_t>(node)]);
   }
-  // How many slots a tree would take; children have smaller numbers than their parents.
+  // Computes how many slots a tree would take. Children have smaller numbers than their parents.
   int Weight(Graph::Node root) {
     for (; weighed_ <= root; ++weighed_) {
       const Graph::Node n = weighed_;
@@ -153,7 +154,7 @@ class Compiler {
     }
     return weight_[static_cast<size_t>(root)];
   }
-  // Without recursion: graphs may be deep.
+  // Not recursive, because graphs may be deep.
   void Visit(Graph::Node root) {
     std::vector<std::pair<Graph::Node, bool>> stack = {{root, false}};
     while (!stack.empty()) {
@@ -179,7 +180,7 @@ class Compiler {
   std::vector<Graph::Node> order_;
   std::vector<int32_t> place_;
   std::vector<int> weight_;
-  Graph::Node weighed_ = 0;  // those before have their weights
+  Graph::Node weighed_ = 0;  // nodes below this number have their weights
 };
 
 absl::StatusOr<uint32_t> CompilePart(const Graph& graph, std::span<const Graph::Node> roots,

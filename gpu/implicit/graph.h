@@ -1,5 +1,5 @@
-// Expressions as graphs: made node by node, with what is alike made once and constants computed,
-// and compiled into programs (program.h).
+// Expressions as graphs. They are built node by node: equal nodes are created once, constants are
+// computed, and graphs are compiled into programs (program.h).
 #pragma once
 
 #include <cstdint>
@@ -12,15 +12,15 @@
 
 namespace voxeld::gpu::implicit {
 
-// Thread-compatible. A node is an index, valid for this graph alone.
+// Thread-compatible. A node is an index that is valid for this graph only.
 class Graph {
  public:
   using Node = int32_t;
 
-  // Any operation that a program may have; −1 for arguments that it has not.
+  // Adds any operation that a program may have; −1 stands for arguments that it does not have.
   Node Operation(Op op, uint32_t immediate, Node a, Node b) { return Make({op, immediate, a, b}); }
 
-  // The nearest that single precision has, finite for what is.
+  // Adds the nearest value in single precision; it stays finite if `value` is finite.
   Node Constant(double value);
   Node Axis(int axis) { return Leaf(static_cast<Op>(static_cast<int>(Op::kX) + axis), 0); }
   Node Voxel() { return Leaf(Op::kVoxel, 0); }
@@ -44,8 +44,8 @@ class Graph {
   Node Max(Node a, Node b) { return Binary(Op::kMax, a, b); }
   Node Atan2(Node y, Node x) { return Binary(Op::kAtan2, y, x); }
 
-  // a^b: by squaring where b is a whole constant, a root where it is ½ or ⅓, else exp(b·log a),
-  // which is not a number for a < 0.
+  // Computes a^b: by squaring if b is a whole constant, as a root if it is ½ or ⅓, otherwise as
+  // exp(b·log a), which is NaN for a < 0.
   Node Pow(Node a, Node b);
   Node Tan(Node a) { return Div(Sin(a), Cos(a)); }
   Node Asin(Node a);
@@ -54,7 +54,8 @@ class Graph {
   Node Cosh(Node a);
   Node Tanh(Node a);
   Node Mod(Node a, Node b);  // a − b·⌊a/b⌋
-  // Minimum and maximum rounded off within k of equality: min(a, b) − max(k − |a − b|, 0)²/(4k).
+  // Minimum and maximum, rounded off where the values differ by less than k: min(a, b) − max(k − |a
+  // − b|, 0)²/(4k).
   Node SmoothMin(Node a, Node b, Node k);
   Node SmoothMax(Node a, Node b, Node k);
   Node Length(std::span<const Node> of);  // √ of the sum of squares
@@ -84,23 +85,23 @@ class Graph {
   absl::flat_hash_map<Content, Node> made_;
 };
 
-// What a program is compiled from.
+// The input from which a program is compiled.
 struct ProgramSource {
   Graph::Node surface = -1;
   Graph::Node bound = -1;                // −1: none
-  Graph::Node color[3] = {-1, -1, -1};   // three of them, one, with a table, or none
+  Graph::Node color[3] = {-1, -1, -1};   // three of them; one, with a table; or none
   std::span<const uint32_t> table = {};  // kTableColors, or none
   std::span<const uint32_t> ring_ends = {};
   uint32_t ring_axis = 2;
 };
 
-// Appends instructions that leave `roots` in `root_slots`, and answers how many; errors as
+// Appends instructions that leave `roots` in `root_slots`, and returns how many. Errors: as
 // Compile's.
 absl::StatusOr<uint32_t> CompilePart(const Graph& graph, std::span<const Graph::Node> roots,
                                      std::span<uint32_t> root_slots, std::vector<uint32_t>& words);
 
-// ResourceExhausted if one of the three takes more than kMostInstructions or kMostSlots: says how
-// many.
+// Errors: ResourceExhausted, with the numbers, if one of the three parts takes more than
+// kMostInstructions or kMostSlots.
 absl::StatusOr<std::vector<uint32_t>> Compile(const Graph& graph, const ProgramSource& source);
 
 }  // namespace voxeld::gpu::implicit

@@ -13,7 +13,7 @@ namespace {
 
 using Node = Graph::Node;
 
-// An operation of the program, by number; its arguments are earlier ones.
+// An operation of the program, by number; its arguments are earlier operations.
 struct Operation {
   Op op;
   uint32_t immediate;
@@ -49,11 +49,11 @@ std::vector<Operation> OperationsOf(const ProgramView& program, const uint32_t d
 
 bool IsOfOneAxis(const Operation& o) { return std::has_single_bit(o.axes); }
 
-// Marks what of one axis is asked for by what is not, or is the whole; the dearest where there are too
-// many.
+// Marks the operations that depend on one axis only and that are used by an operation which depends
+// on more, or are the root. If there are too many, marks the most expensive ones.
 void ChooseHoisted(std::vector<Operation>& operations, int root) {
   std::vector<bool> wanted(operations.size());
-  // Only what the root asks for.
+  // Visit only operations that the root uses.
   std::vector<int> open = {root};
   std::vector<bool> seen(operations.size());
   while (!open.empty()) {
@@ -86,7 +86,8 @@ void ChooseHoisted(std::vector<Operation>& operations, int root) {
   }
 }
 
-// The nodes of all operations; where there are numbers, hoisted values stand for theirs.
+// Creates the nodes of all operations. If there are `numbers`, hoisted values replace the
+// operations that they stand for.
 std::vector<Node> NodesOf(const std::vector<Operation>& operations, Graph& graph,
                           const std::vector<int>* numbers) {
   std::vector<Node> made(operations.size(), -1);
@@ -115,7 +116,7 @@ struct Parts {
   }
 };
 
-// None if some part has no room.
+// Returns nullopt if some part does not fit.
 std::optional<Parts> Part(const std::vector<Operation>& operations, int root) {
   Parts parts;
   std::vector<int> numbers(operations.size(), -1);

@@ -1,6 +1,6 @@
-// A program's surface parted by the axes of voxel space: what depends on one axis alone is computed
-// once for each place along it, rather than for each voxel. The operations and their arguments stay the
-// same, so every value does.
+// Splits a program's surface by the axes of voxel space: parts that depend on one axis alone are
+// computed once for each place along it, rather than for each voxel. The operations and their
+// arguments stay the same, so every value does too.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 
 namespace voxeld::gpu::implicit {
 
-// `depends[r]`: bits of the axes of voxel space that the shape's coordinate r depends on. What hoisted.h
-// says, as words.
+// Returns the hoisted program as words (hoisted.h). `depends[r]`: bits of the axes of voxel space
+// that the shape's coordinate r depends on.
 std::vector<uint32_t> Hoist(const ProgramView& program, const uint32_t depends[3]);
 
 }  // namespace voxeld::gpu::implicit

@@ -1,6 +1,6 @@
-// What hoist.h leaves of a program, in place. As words: HoistedHeader; for each value hoisted the slot that
-// it is left in (hoisted values come axis by axis); instructions, two words each, of the three axes and of
-// the rest, in which Op::kHoisted stands for a value.
+// The program that hoist.h produces, read in place. As words: HoistedHeader; for each hoisted value
+// the slot that it is left in (hoisted values are ordered by axis); instructions, two words each,
+// of the three axes and of the rest, in which Op::kHoisted stands for a value.
 #pragma once
 
 #include "gpu/implicit/program.h"
@@ -11,10 +11,10 @@ inline constexpr uint32_t kMostHoisted = 16;
 inline constexpr uint32_t kMostHoistedOfAxis = 8;
 
 struct HoistedHeader {
-  uint32_t end[3] = {};             // of each axis' hoisted values: the first axis' begin at 0
-  uint32_t axis[3] = {}, rest = 0;  // instructions
+  uint32_t end[3] = {};             // of each axis' hoisted values; the first axis' begin at 0
+  uint32_t axis[3] = {}, rest = 0;  // numbers of instructions
   uint32_t rest_slot = 0;
-  uint32_t needs_coordinates = 0;  // 1: the rest asks for x, y or z
+  uint32_t needs_coordinates = 0;  // 1: the rest uses x, y or z
 };
 inline constexpr uint32_t kHoistedWords = sizeof(HoistedHeader) / sizeof(uint32_t);
 

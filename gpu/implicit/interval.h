@@ -1,19 +1,20 @@
-// Interval arithmetic that holds what single precision computes.
+// Interval arithmetic that contains the results of single precision.
 //
-// An interval holds every value that the functions of number.h may give for arguments within the
-// given intervals: if `nan` is false all lie in [lo, hi]; if it is true some may be no numbers as
-// well. The four operations, squares, roots and floors are rounded correctly, so they are monotonic
-// where the exact ones are, and their values at the ends bound those within: nothing need be
-// widened. What is a polynomial is widened by more than twice its error, kSlack. Where an exact
-// function would be undefined or unbounded the answer is everything.
+// An interval contains every value that the functions of number.h may return for arguments within
+// the given intervals: if `nan` is false all lie in [lo, hi]; if it is true some may also be NaN.
+// The four operations, squares, roots and floors are correctly rounded, so they are monotonic where
+// the exact ones are, and their values at the ends bound those within without widening. Results of
+// polynomials are widened by more than twice their error, kSlack. Where an exact function would be
+// undefined or unbounded, the result is everything.
 //
 // Ends may be infinite, and are never NaN.
 #pragma once
 
 #include "gpu/implicit/number.h"
 
-// The operations that are long. A source whose kernels need them only where speed does not matter defines
-// VOXELD_INTERVALS_OUT_OF_LINE: nvcc then compiles each once, not wherever an expression may call for it.
+// Marks the long operations. A source whose kernels need them only where speed does not matter
+// defines VOXELD_INTERVALS_OUT_OF_LINE: nvcc then compiles each of them once, and not at every call
+// in an expression.
 #if defined(VOXELD_INTERVALS_OUT_OF_LINE)
 #define VOXELD_INTERVAL VOXELD_HD VOXELD_DEVICE_NOINLINE inline Interval
 #else
@@ -41,12 +42,11 @@ VOXELD_HD inline Interval Hull(const Interval& a, const Interval& b) {
   return {a.lo < b.lo ? a.lo : b.lo, a.hi > b.hi ? a.hi : b.hi, a.nan || b.nan};
 }
 
-// Of ends that were computed: everything if one of them is not a number.
+// Makes an interval of computed ends: everything if one of them is NaN.
 VOXELD_HD inline Interval Checked(float lo, float hi, bool nan) {
   return IsNan(lo) || IsNan(hi) ? Interval::Everything() : Interval{lo, hi, nan};
 }
-// Ends of monotonic sums of infinities of both signs may come out as numbers though what lies
-// between does not.
+// Sums of infinities of both signs may have numbers as ends although values in between are NaN.
 VOXELD_HD inline bool Bounded(const Interval& a) { return IsFinite(a.lo) && IsFinite(a.hi); }
 
 VOXELD_HD inline Interval Add(const Interval& a, const Interval& b) {
@@ -59,7 +59,7 @@ VOXELD_HD inline Interval Sub(const Interval& a, const Interval& b) {
 }
 VOXELD_HD inline Interval Neg(const Interval& a) { return {-a.hi, -a.lo, a.nan}; }
 
-// Of four corners; NaN among them: everything.
+// Returns the hull of four corners; everything if one of them is NaN.
 VOXELD_HD inline Interval OfCorners(float a, float b, float c, float d, bool nan) {
   if (IsNan(a) || IsNan(b) || IsNan(c) || IsNan(d)) return Interval::Everything();
   const float lo1 = a < b ? a : b, hi1 = a < b ? b : a;
@@ -69,7 +69,7 @@ VOXELD_HD inline Interval OfCorners(float a, float b, float c, float d, bool nan
 VOXELD_HD inline bool HasZero(const Interval& a) { return a.lo <= 0 && a.hi >= 0; }
 
 VOXELD_INTERVAL Mul(const Interval& a, const Interval& b) {
-  // Zero times infinity.
+  // Zero times infinity is undefined.
   const bool undefined = (HasZero(a) && !Bounded(b)) || (HasZero(b) && !Bounded(a));
   if (undefined) return Interval::Everything();
   return OfCorners(a.lo * b.lo, a.lo * b.hi, a.hi * b.lo, a.hi * b.hi, a.nan || b.nan);
@@ -94,11 +94,10 @@ VOXELD_HD inline Interval Sqrt(const Interval& a) {
 }
 VOXELD_HD inline Interval Floor(const Interval& a) { return {Floor(a.lo), Floor(a.hi), a.nan}; }
 
-// Down and up in proportion, by kSlack.
+// Move a bound down or up in proportion, by kSlack.
 VOXELD_HD inline float Below(float x) { return x - (Abs(x) * kSlack + 1.0e-44f); }
 VOXELD_HD inline float Above(float x) { return x + (Abs(x) * kSlack + 1.0e-44f); }
-// Infinite ends stay as they are; no more than that is left of one that was infinite by rounding
-// alone.
+// Infinite ends stay as they are. An end that became infinite by rounding alone becomes finite.
 VOXELD_HD inline float BelowEnd(float x) {
   return x == Infinity() ? 3.0e38f : (x == -Infinity() ? x : Below(x));
 }
@@ -110,7 +109,7 @@ VOXELD_INTERVAL Cbrt(const Interval& a) {
   return {BelowEnd(Cbrt(a.lo)), AboveEnd(Cbrt(a.hi)), a.nan};
 }
 
-// Products of monotonic factors of one sign, rounded, are monotonic.
+// Rounded products of monotonic factors of one sign are monotonic.
 VOXELD_INTERVAL PowI(const Interval& a, int32_t n) {
   const int32_t m = n < 0 ? -n : n;
   const Interval b = m % 2 != 0 ? a : Abs(a);
@@ -130,20 +129,21 @@ VOXELD_INTERVAL Log(const Interval& a) {
   return {BelowEnd(lo) - kSlack, AboveEnd(hi) + kSlack, a.nan || a.lo < 0};
 }
 
-// Of x + quarters·π/2.
+// Returns the sine of x + quarters·π/2.
 VOXELD_INTERVAL SineOf(const Interval& a, int32_t quarters) {
   const float lo = a.lo, hi = a.hi;
   const bool lost = !(lo >= -kMostAngle && hi <= kMostAngle);
   const Interval all = {-1.0f - kSlack, 1.0f + kSlack, a.nan || lost};
   if (lost) return all;
-  // In quarter turns, with more room than rounding takes.
+  // The angle in quarter turns, with a margin that exceeds rounding.
   constexpr double kTurns = 0.63661977236758134, kRoom = 1e-6;
   const double from = static_cast<double>(lo) * kTurns + quarters - kRoom;
   const double to = static_cast<double>(hi) * kTurns + quarters + kRoom;
   if (to - from >= 4) return all;
   const float s = SineOf(lo, quarters), t = SineOf(hi, quarters);
   Interval result = {(s < t ? s : t) - kSlack, (s < t ? t : s) + kSlack, a.nan};
-  // Whether 1 + 4i or 3 + 4i lies between: i.e. whether the number of such below differs.
+  // Tests whether 1 + 4i or 3 + 4i lies between the ends, that is, whether the number of such
+  // angles below them differs.
   const auto below = [](double quarter, double phase) {
     const double q = (quarter - phase) * 0.25;
     int64_t i = static_cast<int64_t>(q);
@@ -158,7 +158,7 @@ VOXELD_HD inline Interval Sin(const Interval& a) { return SineOf(a, 0); }
 VOXELD_HD inline Interval Cos(const Interval& a) { return SineOf(a, 1); }
 
 VOXELD_HD inline Interval Min(const Interval& a, const Interval& b) {
-  // Where one is not a number it is the other.
+  // If one of the values is NaN, the result is the other.
   float hi = a.hi < b.hi ? a.hi : b.hi;
   if (a.nan && b.hi > hi) hi = b.hi;
   if (b.nan && a.hi > hi) hi = a.hi;
@@ -168,7 +168,7 @@ VOXELD_HD inline Interval Max(const Interval& a, const Interval& b) {
   return {a.lo > b.lo ? a.lo : b.lo, a.hi > b.hi ? a.hi : b.hi, a.nan || b.nan};
 }
 
-// Extreme at corners, unless the box meets the cut along the negative x axis.
+// The extremes are at corners, unless the box meets the cut along the negative x axis.
 VOXELD_INTERVAL Atan2(const Interval& y, const Interval& x) {
   const bool nan = x.nan || y.nan;
   if (x.lo <= 0 && HasZero(y)) return {-3.14159274f - kSlack, 3.14159274f + kSlack, nan};

@@ -1,7 +1,7 @@
-// The functions of expressions on IEEE single, the same bits on host and device: no contraction, no
-// libm. Square roots and the four operations are the machine's, rounded correctly; the others are
-// polynomials, whose relative errors (absolute ones of sine, cosine and arc tangent) are below 2⁻²¹
-// (tests/gpu/implicit/number_test.cc says so against double precision).
+// The functions of expressions in IEEE single precision, with the same bits on host and device: no
+// contraction, no libm. Square roots and the four operations are the machine's, correctly rounded.
+// The others are polynomials whose relative errors (absolute errors of sine, cosine and arc
+// tangent) are below 2⁻²¹ (tests/gpu/implicit/number_test.cc checks this against double precision).
 #pragma once
 
 #include <cstdint>
@@ -34,8 +34,8 @@ VOXELD_HD inline float Neg(float a) { return -a; }
 VOXELD_HD inline float Abs(float a) { return a < 0 ? -a : a; }
 VOXELD_HD inline float Square(float a) { return a * a; }
 
-// What is not a number counts as outside: greater than everything. So a union has what the other
-// part has, and an intersection nothing.
+// NaN counts as outside: greater than everything. So a union has the other part's value, and an
+// intersection has none.
 VOXELD_HD inline bool FirstIsMin(float a, float b) { return !IsNan(a) && (IsNan(b) || a <= b); }
 VOXELD_HD inline float Min(float a, float b) { return FirstIsMin(a, b) ? a : b; }
 VOXELD_HD inline bool FirstIsMax(float a, float b) { return IsNan(a) || (!IsNan(b) && a >= b); }
@@ -55,7 +55,7 @@ VOXELD_HD inline float Floor(float x) {
   return t > x ? t - 1.0f : t;
 }
 
-// By Newton's steps in double, rounded once.
+// Uses Newton's steps in double precision and rounds once.
 VOXELD_HD inline float Cbrt(float x) {
   const float a = Abs(x);
   if (!(a > 0) || !IsFinite(a)) return x;
@@ -69,7 +69,7 @@ VOXELD_HD inline float Cbrt(float x) {
   return x < 0 ? -static_cast<float>(y) : static_cast<float>(y);
 }
 
-// x^n by squaring; a negative exponent is one divided by that.
+// Computes x^n by squaring; for a negative exponent, the reciprocal of that.
 VOXELD_HD inline float PowI(float x, int32_t n) {
   uint32_t left = n < 0 ? 0u - static_cast<uint32_t>(n) : static_cast<uint32_t>(n);
   const bool negative = x < 0 && (left & 1) != 0;
@@ -82,17 +82,18 @@ VOXELD_HD inline float PowI(float x, int32_t n) {
   return n < 0 ? 1.0f / result : result;
 }
 
-// Beyond this sine and cosine are not numbers: single precision has lost the angle.
+// Beyond this angle sine and cosine are NaN: single precision has lost the angle.
 inline constexpr float kMostAngle = 1048576.0f;
 
-// x = quarter·π/2 + rest, |rest| ≤ π/4 and a little; |x| ≤ kMostAngle.
+// x = quarter·π/2 + rest, |rest| is at most slightly more than π/4; |x| ≤ kMostAngle.
 struct Angle {
   float rest;
   int32_t quarter;
   VOXELD_HD static Angle Of(float x) {
     Angle angle;
     if (x > -8192.0f && x < 8192.0f) {
-      // π/2 in parts whose products with the quarter, of 13 bits, are exact but for the last.
+      // π/2 is split into parts whose products with the quarter, of 13 bits, are exact except for
+      // the last.
       const float k = Floor(x * 0.636619772f + 0.5f);
       angle.rest = ((x - k * 1.5703125f) - k * 4.8375129699707031e-4f) - k * 7.5497899548918821e-8f;
       angle.quarter = static_cast<int32_t>(k);
@@ -108,7 +109,7 @@ struct Angle {
   }
 };
 
-// Of an angle of π/4 at most, and a little.
+// Returns the sine of an angle of at most slightly more than π/4.
 VOXELD_HD inline float SineOfRest(float r) {
   const float z = r * r;
   return r + (r * z) * (-0.166666552f + z * (0.00833217241f + z * -0.000195164801f));
@@ -119,7 +120,7 @@ VOXELD_HD inline float CosineOfRest(float r) {
          (z * z) * (0.0416666456f + z * (-0.00138873595f + z * 2.44375333e-05f));
 }
 
-// Sine of x + quarters·π/2.
+// Returns the sine of x + quarters·π/2.
 VOXELD_HD inline float SineOf(float x, int32_t quarters) {
   if (!(Abs(x) <= kMostAngle)) return NotANumber();
   const Angle angle = Angle::Of(x);
@@ -173,7 +174,7 @@ VOXELD_HD inline float Log(float x) {
   return ((f * z) * p + n * -2.12194440e-4f - 0.5f * z) + f + n * 0.693359375f;
 }
 
-// The angle of (x, y), −π to π; 0 at the origin.
+// Returns the angle of (x, y), −π to π; 0 at the origin.
 VOXELD_HD inline float Atan2(float y, float x) {
   if (IsNan(x) || IsNan(y)) return NotANumber();
   const float ax = Abs(x), ay = Abs(y);

@@ -23,7 +23,7 @@ enum class Token : uint8_t { kEnd, kNumber, kName, kSymbol };
 struct Symbol {
   absl::string_view text, means;
 };
-// Longer ones first.
+// Longer symbols come first.
 constexpr Symbol kSymbols[] = {{"**", "^"},
                                {"<=", "<="},
                                {">=", ">="},
@@ -48,7 +48,7 @@ constexpr Symbol kSymbols[] = {{"**", "^"},
 
 struct Function {
   absl::string_view name;
-  int least, most;  // arguments
+  int least, most;  // numbers of arguments
   Node (*make)(Graph& g, std::span<const Node> a);
 };
 constexpr int kAny = 64;
@@ -104,10 +104,10 @@ constexpr Function kFunctions[] = {
     {"union", 2, kAny, Fold<&Graph::Min>},
 };
 
-// What a part of the text stands for.
+// The value of a part of the text.
 struct Value {
   enum class Is : uint8_t { kNumber, kEquation, kTruth };
-  Node node = -1;  // an equation's two sides' difference; a truth is ≤ 0
+  Node node = -1;  // an equation: the difference of its sides; a truth: ≤ 0 if true
   Is is = Is::kNumber;
 };
 using MaybeValue = absl::StatusOr<Value>;
@@ -147,7 +147,7 @@ class Parser {
 
  private:
   absl::Status Wrong(absl::string_view what) const {
-    // Characters, not bytes.
+    // Count characters, not bytes.
     size_t character = 1;
     for (size_t i = 0; i < token_begin_; ++i) character += (text_[i] & 0xC0) != 0x80;
     return absl::InvalidArgumentError(absl::StrCat("at character ", character, ": ", what));
@@ -157,7 +157,7 @@ class Parser {
                ? "the end"
                : absl::StrCat("'", Shown(text_.substr(token_begin_, at_ - token_begin_)), "'");
   }
-  // As it stands, if it is no longer than a word that somebody typed.
+  // Returns the text, shortened if it is longer than a word that a person would type.
   static std::string Shown(absl::string_view text) {
     constexpr size_t kMost = 64;
     return text.size() <= kMost ? std::string(text) : absl::StrCat(text.substr(0, kMost), "…");
@@ -221,7 +221,7 @@ class Parser {
     return token_ == Token::kSymbol && symbol_ == symbol;
   }
 
-  // Entered once for each level of what may nest.
+  // Created once for each level of nesting.
   class Level {
    public:
     explicit Level(int& depth) : depth_(depth) { ++depth_; }
@@ -244,7 +244,7 @@ class Parser {
     return absl::OkStatus();
   }
 
-  // first {word first}, of truths.
+  // Parses first {word first}, of truths.
   template <typename First>
   MaybeValue Joined(absl::string_view word, First&& first, Node (Graph::*join)(Node, Node)) {
     MaybeValue left = first();
@@ -311,7 +311,7 @@ class Parser {
     return whole;
   }
 
-  // first {symbol first}, of numbers.
+  // Parses first {symbol first}, of numbers.
   template <typename First, typename Join>
   MaybeValue Chain(absl::string_view one, absl::string_view other, First&& first, Join&& join) {
     MaybeValue left = first();
@@ -401,7 +401,7 @@ class Parser {
                        })));
     }
     const auto number = [](Node node) { return Value{node, Value::Is::kNumber}; };
-    // A caller's parameter comes before a constant of the same name.
+    // A caller's parameter takes precedence over a constant of the same name.
     if (name.size() == 1 && name[0] >= 'x' && name[0] <= 'z')
       return number(graph_.Axis(name[0] - 'x'));
     if (const auto it = parameters_.find(std::string(name)); it != parameters_.end()) {
@@ -432,7 +432,7 @@ class Parser {
       if (absl::Status s = Next(); !s.ok()) return s;
       const MaybeValue argument = Condition();
       if (!argument.ok()) return argument;
-      // Unions and the like are of conditions, too.
+      // Unions and the like also combine conditions.
       conditions += argument->is == Value::Is::kTruth;
       if (argument->is == Value::Is::kEquation)
         return Require(*argument, Value::Is::kNumber, "within ( )");
@@ -456,7 +456,7 @@ class Parser {
   const Parameters& parameters_;
   const ParseLimits& limits_;
   Graph& graph_;
-  size_t at_ = 0;  // behind the token
+  size_t at_ = 0;  // after the token
   size_t token_begin_ = 0;
   Token token_ = Token::kEnd;
   double number_ = 0;

@@ -1,12 +1,12 @@
-// Programs of expressions: what both engines run, whatever numbers they run them on.
+// Programs of expressions, which both engines run, on whatever number type.
 //
-// A program is a row of 32-bit words, as it travels in a geometry's indices:
+// A program is a sequence of 32-bit words, which is stored in a geometry's indices:
 //   header        ProgramHeader's fields
 //   instructions  two words each: of the surface P, of the bound Φ, of the colour, in this order
 //   rings         the end of each closed curve of the boundary, among the geometry's positions
 //   table         256 colours 0x00RRGGBB, with kTable
-// Each of the three runs by itself, over kMostSlots slots, and leaves its results in slots that the
-// header names. Every slot is written before it is read.
+// Each of the three parts runs by itself, over kMostSlots slots, and leaves its results in slots
+// that the header names. Every slot is written before it is read.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ enum class Op : uint8_t {
   kY,
   kZ,
   kVoxel,    // the edge of a voxel in the shape's own units
-  kHoisted,  // a value of a row: immediate; within engines only (hoist.h)
+  kHoisted,  // a value of a row: immediate; only within engines (hoist.h)
   kNeg,
   kAbs,
   kSquare,
@@ -46,10 +46,10 @@ VOXELD_HD constexpr bool IsLeaf(Op op) { return op <= Op::kHoisted; }
 VOXELD_HD constexpr bool IsBinary(Op op) { return op >= Op::kAdd; }
 
 inline constexpr uint32_t kMostSlots = 24;
-inline constexpr uint32_t kMostInstructions = 1024;  // of each of the three
+inline constexpr uint32_t kMostInstructions = 1024;  // of each of the three parts
 inline constexpr int32_t kMostExponent = 1024;
 
-// op, slot written, slots read, in bytes from the lowest; then the immediate.
+// From the lowest byte: op, slot written, slots read; then the immediate.
 struct Instruction {
   uint32_t word, immediate;
 
@@ -69,13 +69,13 @@ struct ProgramHeader {
   uint32_t surface = 0, bound = 0, color = 0;  // instructions; the surface has some
   ColorBy color_by = ColorBy::kUniform;
   uint32_t surface_slot = 0, bound_slot = 0;
-  uint32_t color_slots[3] = {};  // red, green, blue, 0 to 1; or in the first the place in the table
+  uint32_t color_slots[3] = {};  // red, green, blue, 0 to 1; or the first is the place in the table
   uint32_t rings = 0, ring_axis = 0;  // the axis along which the boundary is projected: 0 to 2
   uint32_t reserved = 0;
 };
 inline constexpr uint32_t kHeaderWords = sizeof(ProgramHeader) / sizeof(uint32_t);
 
-// A program in place.
+// A program, read in place.
 struct ProgramView {
   const uint32_t* words = nullptr;
 
@@ -97,7 +97,7 @@ struct ProgramView {
 };
 
 // Runs `count` instructions over `slots`, which has room for kMostSlots. `at`: x, y and z;
-// hoisted(i): what stands for Op::kHoisted.
+// hoisted(i): the value for Op::kHoisted.
 template <class N, class Hoisted>
 VOXELD_HD void Run(const uint32_t* code, uint32_t count, const N at[3], float voxel, N* slots,
                    Hoisted&& hoisted) {
@@ -183,7 +183,7 @@ VOXELD_HD void Run(const uint32_t* code, uint32_t count, const N at[3], float vo
   }
 }
 
-// Of a program without hoisted values.
+// Runs a program without hoisted values.
 template <class N>
 VOXELD_HD void Run(const uint32_t* code, uint32_t count, const N at[3], float voxel, N* slots) {
   Run(code, count, at, voxel, slots, [&](uint32_t) { return at[0]; });

@@ -1,4 +1,4 @@
-// Whether words are a program (program.h) that may be run.
+// Checks whether words are a program (program.h) that is safe to run.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,8 @@
 
 namespace voxeld::gpu::implicit {
 
-// Over so many positions of rings. InvalidArgument says what is wrong, with the value. Nothing is
-// run that has not passed this.
+// `positions`: the number of positions for rings. Errors: InvalidArgument says what is wrong, with
+// the value. Programs that have not passed this check are not run.
 absl::Status CheckProgram(std::span<const uint32_t> words, uint32_t positions);
 
 }  // namespace voxeld::gpu::implicit

@@ -1,5 +1,5 @@
-// Several numbers side by side, each what single precision gives by itself: what expressions are
-// computed on, so that an instruction is decoded once for all of them.
+// Several numbers side by side, each with the result that single precision gives for it alone.
+// Expressions are computed on them, so that an instruction is decoded once for all of them.
 #pragma once
 
 #include <cstddef>
@@ -65,7 +65,7 @@ VOXELD_HD Lanes<n> PowI(const Lanes<n>& a, int32_t exponent) {
   return EachOf<n>([&](size_t i) { return PowI(a.at[i], exponent); });
 }
 
-// A value that is the same in all lanes, or stands by itself.
+// Returns a value that is the same in all lanes, or a single one.
 template <class N>
 VOXELD_HD N Spread(const N& value, const N&) {
   return value;

@@ -1,5 +1,5 @@
-// The voxels of an implicit shape in a tile, on the CPU: parts of 4³ voxels that may have some are
-// found by intervals, and P is computed row by row where they lie.
+// The voxels of an implicit shape in a tile, on the CPU: intervals find the parts of 4³ voxels that
+// may contain some, and P is computed row by row in those parts.
 #pragma once
 
 #include <cstdint>
@@ -12,13 +12,13 @@ namespace voxeld::gpu::implicit {
 
 class TileField {
  public:
-  // `box`: not empty, kTileSize along each axis at most.
+  // Requires: `box` is not empty and at most kTileSize along each axis.
   TileField(const Field& field, const Source& source, const Box3& box)
       : field_(field), hoisted_(field.hoisted()), solid_(source.solid), box_(box) {
     for (int a = 0; a < 3; ++a) size_[a] = box.hi[a] - box.lo[a];
   }
 
-  // f(x, y, z, rgb) for each voxel covered.
+  // Calls f(x, y, z, rgb) for each voxel covered.
   template <class Emit>
   void EmitVoxels(Emit&& emit) {
     if (!FindParts()) return;
@@ -36,7 +36,7 @@ class TileField {
 
   bool is_shell() const { return !field_.solid() && field_.half() != 0; }
 
-  // False if no part has anything.
+  // Returns false if no part has anything.
   bool FindParts() {
     if (is_shell()) reach_ = field_.ReachIn(box_);
     // P's hoisted values in each of the parts along each axis.
@@ -72,7 +72,7 @@ class TileField {
     return any;
   }
 
-  // P in rows that parts with anything, or their neighbours, have.
+  // Computes P in the rows of parts with anything, and of their neighbours.
   void FindRows() {
     const int32_t rim = field_.rim();
     bool needed[kRows][kRows] = {};
@@ -113,7 +113,7 @@ class TileField {
     }
   }
 
-  // Of the row's voxels from one before the box on, if they are needed.
+  // Computes the coordinates of the row's voxels, from one before the box on, if they are needed.
   void RowCoordinates(int32_t y, int32_t z, Row q[3]) const {
     if (!hoisted_.needs_coordinates()) return;
     const Row dy = ConstantLike(dx_, solid_.Distance(1, int64_t{box_.lo[1]} + y));
@@ -123,7 +123,7 @@ class TileField {
 
   float ValueAt(int32_t x, int32_t y, int32_t z) const { return values_[z + 1][y + 1].at[x + 1]; }
 
-  // Whether a neighbour on the other side has no less |P|.
+  // Returns whether a neighbour on the other side has no smaller |P|.
   bool IsBetweenSides(int32_t x, int32_t y, int32_t z, float p) const {
     const bool inside = Field::IsInside(p);
     const float magnitude = Field::Magnitude(p);
@@ -145,7 +145,7 @@ class TileField {
     return false;
   }
 
-  // Hoisted values with their gradients.
+  // Computes the hoisted values with their gradients.
   void FindDuals() {
     duals_known_ = true;
     field_.DualHoistedAlong(0, dx_,
@@ -159,7 +159,7 @@ class TileField {
     }
   }
 
-  // Of the row's voxels, a bit each: |P| ≤ h·|∇P|.
+  // Returns a bit for each voxel of the row: |P| ≤ h·|∇P|.
   uint32_t FindShell(int32_t y, int32_t z) {
     if (!duals_known_) FindDuals();
     Row q[3];
@@ -212,7 +212,7 @@ class TileField {
     }
   }
 
-  // If it is bounded.
+  // Emits a voxel if it is within the bounds.
   template <class Emit>
   void EmitCovered(int32_t x, int32_t y, int32_t z, Emit&& emit) {
     float q[3] = {};
@@ -225,7 +225,7 @@ class TileField {
   const Solid& solid_;
   const Box3 box_;
   int32_t size_[3];
-  float reach_ = 0;  // of a shell: Field::ReachIn the box
+  float reach_ = 0;  // for a shell: Field::ReachIn of the box
   BoxState parts_[kParts][kParts][kParts];
   Row dx_;                             // from the origin
   Row along_x_[kMostHoisted];          // P's hoisted values: in a row,
