@@ -1,6 +1,6 @@
 // A shaft with a conical head: the union of two cones (cone.h).
 //
-// Guarantee: as gpu/implicit/field.h has it, with shells mitred past the head's rim and the tip.
+// Guarantee: as in gpu/implicit/field.h, with shells mitred past the head's rim and the tip.
 #pragma once
 
 #include "gpu/primitives/cone.h"
@@ -8,16 +8,16 @@
 namespace voxeld::gpu {
 
 struct Arrow {
-  implicit::Vector start, end;                   // apart
-  double shaft_radius = 0;                       // drawn a voxel thick at least
-  double head_length = 0.25, head_radius = 0.1;  // > 0, the length no more than all of it
+  implicit::Vector start, end;                   // must differ
+  double shaft_radius = 0;                       // drawn at least a voxel thick
+  double head_length = 0.25, head_radius = 0.1;  // > 0, the length at most the whole length
 
   implicit::FieldShape Make(implicit::Graph& g) const {
     const double length = implicit::Length(end - start);
     const implicit::Vector neck = end - (head_length / length) * (end - start);
     implicit::FieldShape head = Cone{neck, end, head_radius, 0}.Make(g);
     if (!(head_length < length)) return head;
-    // The shaft goes into the head, so that no wall is between them.
+    // The shaft extends into the head, so that no wall is between them.
     const implicit::Vector into = end - (head_length / length / 2) * (end - start);
     const implicit::FieldShape shaft = Cone{start, into, shaft_radius, shaft_radius}.Make(g);
     head.surface = g.Min(head.surface, shaft.surface);

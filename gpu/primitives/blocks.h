@@ -1,4 +1,4 @@
-// Items of drawables that fill space: blocks of tiles, in the box in which they are looked for.
+// Items of drawables that fill space: blocks of tiles, in the box that may hold the drawable.
 #pragma once
 
 #include "gpu/primitives/grid.h"
@@ -6,8 +6,8 @@
 
 namespace voxeld::gpu {
 
-// Cuts `box`, the part of the volume that may hold the drawable, into blocks of `tiles` tiles along
-// an edge.
+// Divides `box`, the part of the volume that may hold the drawable, into blocks of `tiles` tiles
+// along an edge.
 inline void SetBlocks(const Box3& box, int32_t tiles, Solid& solid, ImplicitPlace& place) {
   solid.bounds = box;
   place.edge = tiles * kTileSize;
@@ -23,7 +23,7 @@ VOXELD_HD inline uint32_t CountBlocks(const Source& source) {
   return static_cast<uint32_t>(n[0]) * static_cast<uint32_t>(n[1]) * static_cast<uint32_t>(n[2]);
 }
 
-// The voxels of an item.
+// Returns the voxels of an item.
 VOXELD_HD inline Box3 BlockOf(const Source& source, uint32_t i) {
   const ImplicitPlace& place = source.implicit;
   const uint32_t nx = static_cast<uint32_t>(place.blocks[0]),
@@ -37,8 +37,8 @@ VOXELD_HD inline Box3 BlockOf(const Source& source, uint32_t i) {
   return Intersect(box, source.solid.bounds);
 }
 
-// Voxels around a box of the geometry's coordinates, two of room on each side, that lie in the
-// volume.
+// Returns the voxels of the volume that lie in or around a box of the geometry's coordinates, with
+// a margin of two voxels on each side.
 inline Box3 VoxelsAround(const double low[3], const double high[3], const Affine& map,
                          const TileGrid& grid, double more) {
   const Box3 all{{0, 0, 0}, {grid.voxels[0], grid.voxels[1], grid.voxels[2]}};

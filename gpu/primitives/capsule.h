@@ -1,12 +1,12 @@
-// Thick points and lines: all voxels whose centre lies within a radius
-// of a segment (closed), in voxel space.
+// Thick points and lines: all voxels whose centre lies within a radius of a (closed) segment, in
+// voxel space.
 //
 // Evaluated in IEEE double, in the order written here, relative to the voxel that holds the
-// lexicographically smaller end: the same from both ends, and a shift by whole voxels shifts the
-// result. Positions are in units; up to 2²⁶ they and their squares are exact.
+// lexicographically smaller end: the result is the same from both ends, and a shift by whole voxels
+// shifts it. Positions are in units; up to 2²⁶ they and their squares are exact.
 //
-// Guarantee: thick ones are exactly the voxels whose centres lie within half the thickness, in
-// double precision, round at ends and joints.
+// Guarantee: a thick point or line covers exactly the voxels whose centres lie within half the
+// thickness, in double precision; ends and joints are round.
 #pragma once
 
 #include "gpu/primitives/fixed.h"
@@ -14,8 +14,8 @@
 
 namespace voxeld::gpu {
 
-// Whether a point, `w` from where a segment starts, lies within `r` of it. `axis`: the segment's
-// end from there; `length2`: |axis|².
+// Returns whether a point, at `w` from the start of a segment, lies within `r` of the segment.
+// `axis`: the segment's end minus its start; `length2`: |axis|².
 VOXELD_HD inline bool IsNearSegment(const double w[3], const double axis[3], double length2,
                                     double r) {
   const double dot = (w[0] * axis[0] + w[1] * axis[1]) + w[2] * axis[2];
@@ -38,7 +38,7 @@ struct Capsule {
   double radius;      // units, a whole number
   uint32_t color_start, color_end;
 
-  // `radius` in units, 1 or more.
+  // Requires: `radius` is in units, at least 1.
   VOXELD_HD static Capsule Of(const Line& line, int64_t radius) {
     const Line ordered = Ordered(line);
     Capsule c;
@@ -54,7 +54,8 @@ struct Capsule {
     return c;
   }
 
-  // From the axis' start to a point (the origin's voxel, offset units).
+  // Computes the vector from the start of the axis to the point `units` beyond the lower corner of
+  // voxel (x, y, z).
   VOXELD_HD void Offset(int64_t x, int64_t y, int64_t z, int64_t units, double w[3]) const {
     const int64_t p[3] = {x, y, z};
     for (int a = 0; a < 3; ++a) {
@@ -62,7 +63,7 @@ struct Capsule {
     }
   }
 
-  // Whether offset `w` lies within `r` of the axis.
+  // Returns whether the point at offset `w` lies within `r` of the axis.
   VOXELD_HD bool Within(const double w[3], double r) const {
     return IsNearSegment(w, axis, length2, r);
   }
@@ -73,7 +74,7 @@ struct Capsule {
     return Within(w, radius);
   }
 
-  // By the nearest parameter on the axis, in steps of 2⁻¹⁶.
+  // Returns the colour at the nearest parameter on the axis, in steps of 2⁻¹⁶.
   VOXELD_HD uint32_t ColorAt(int64_t x, int64_t y, int64_t z) const {
     if (color_start == color_end) return color_start;
     constexpr int64_t kSteps = 65536;
@@ -85,7 +86,7 @@ struct Capsule {
     return MixColors(color_start, color_end, FloorToInt(dot / length2 * 65536.0), kSteps);
   }
 
-  // Holds every voxel covered.
+  // Returns a box that holds every covered voxel.
   VOXELD_HD Box3 Bounds() const {
     Box3 b;
     for (int a = 0; a < 3; ++a) {
@@ -101,8 +102,8 @@ struct Capsule {
 template <class Emit>
 VOXELD_HD VOXELD_DEVICE_NOINLINE void EmitCapsule(const Capsule& capsule, const Box3& box,
                                                   Emit emit) {
-  // Blocks of 4³ voxels whose middle is farther from the axis than any centre of theirs can be are
-  // passed over: 1.5·√3 voxels and some.
+  // Skips blocks of 4³ voxels whose middle is farther from the axis than any of their centres can
+  // be from their middle: 1.5·√3 voxels and a margin.
   constexpr int32_t kBlock = 4;
   constexpr double kReach = 720;
   const Box3 b = Intersect(box, capsule.Bounds());

@@ -6,17 +6,17 @@
 // of them are below 2¹⁴, and they are less than 2¹⁴ + 2⁸ away from the centre of any voxel in the
 // bounds, so that normals and edge functions are below 2²⁹·⁵.
 //
-// Sides. In the projection along an axis a triangle of normal n_a ≠ 0 is what is on the inner side
-// of its three edges: edge functions ≥ 0, with the sign of n_a. A square of one voxel meets it if
-// their bounds meet and each edge function, raised by half a voxel's extent along the edge's
-// normal, is ≥ 0 at its centre: two convex sets that are apart are so by an edge of one of them,
-// beyond it. triangle.h bounds each of the nine functions on both sides; together with the bounds
-// both say that the projections meet. Where n_a = 0 the projection is a piece of a line, in which
-// all edges lie, and any of them bounds it on both sides.
+// Sides. In the projection along an axis, a triangle of normal n_a ≠ 0 consists of the points on
+// the inner side of its three edges: edge functions ≥ 0, with the sign of n_a. A square of one
+// voxel meets it if their bounds meet and each edge function, raised by half a voxel's extent along
+// the edge's normal, is ≥ 0 at its centre: if two convex sets are apart, an edge of one of them
+// separates them. triangle.h bounds each of the nine functions on both sides; together with the
+// bounds, both tests mean that the projections meet. If n_a = 0 the projection is a piece of a line
+// that contains all edges, and any of them bounds it on both sides.
 //
 // Depths. ⌊x / d⌋ of whole numbers is ⌊(x + ½) / d⌋, whose argument is at least ½/d from any whole
-// number. Here |x| < 2⁴⁶, so x + ½ and its sums are exact in double, and the product with 1/d,
-// rounded, is off by less than |x|·2⁻⁵²/d < ½/d. ⌈x / d⌉ is ⌊(x − 1) / d⌋ + 1.
+// number. Here |x| < 2⁴⁶, so x + ½ and its sums are exact in double, and the rounded product with
+// 1/d has an error less than |x|·2⁻⁵²/d < ½/d. ⌈x / d⌉ is ⌊(x − 1) / d⌋ + 1.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@
 
 namespace voxeld::gpu {
 
-// 32 bytes, read as two times 16.
+// 32 bytes, read as two times 16 bytes.
 struct alignas(16) CompactTriangle {
   static constexpr int64_t kMostExtent = (int64_t{1} << 14) - kUnitsPerVoxel;
   static constexpr int64_t kMostUnits = int64_t{1} << 22;
@@ -40,8 +40,8 @@ struct alignas(16) CompactTriangle {
   uint32_t flags;
 };
 
-// Whether all triangles whose vertices lie in such a box of positions (in voxels, closed), and none
-// further apart than `extent` on an axis, can be compact.
+// Returns whether all triangles whose vertices lie in such a box of positions (in voxels, closed),
+// and are at most `extent` apart on each axis, can be compact.
 VOXELD_HD inline bool AreCompact(const double lo[3], const double hi[3], const double extent[3]) {
   for (int a = 0; a < 3; ++a) {
     if (!(lo[a] > -16383.0 && hi[a] < 16383.0 && extent[a] < 62.9)) return false;
@@ -58,7 +58,7 @@ VOXELD_HD inline bool IsCompact(const Triangle& t) {
   return Extent(t) <= CompactTriangle::kMostExtent;
 }
 
-// A triangle that IsCompact. `mixed`: its colours matter, and differ.
+// Requires: the triangle IsCompact. `mixed`: its colours matter, and differ.
 VOXELD_HD inline CompactTriangle MakeCompact(const Triangle& t, uint32_t word, bool mixed) {
   CompactTriangle c;
   int32_t p[3][3];
@@ -86,7 +86,7 @@ VOXELD_HD inline CompactTriangle MakeCompact(const Triangle& t, uint32_t word, b
 struct CompactAxis {
   int32_t p[3], origin;
 
-  // Of any axis, without memory that is addressed by it.
+  // Reads the vertices of any axis, without indexed memory accesses.
   VOXELD_HD static CompactAxis Of(const CompactTriangle& t, int a) {
     const uint32_t low = a == 0 ? t.corners[0][0] : a == 1 ? t.corners[1][0] : t.corners[2][0];
     const uint32_t high = a == 0 ? t.corners[0][1] : a == 1 ? t.corners[1][1] : t.corners[2][1];
@@ -94,19 +94,19 @@ struct CompactAxis {
              static_cast<int16_t>(high & 0xFFFF)},
             static_cast<int32_t>(high) >> 16};
   }
-  // Voxels that the triangle may cover, relative, half-open.
+  // The bounds of the voxels that the triangle may cover, relative, half-open.
   VOXELD_HD int32_t lo(uint32_t flags) const {
     return (Min(p[0], Min(p[1], p[2])) - ((flags & CompactTriangle::kCover) != 0 ? 1 : 0)) >> 8;
   }
   VOXELD_HD int32_t hi() const { return (Max(p[0], Max(p[1], p[2])) >> 8) + 1; }
 };
 
-// Component a of the normal, by the two axes that follow it.
+// Returns component a of the normal, from the two axes that follow a.
 VOXELD_HD inline int32_t CompactNormal(const CompactAxis& b, const CompactAxis& c) {
   return (b.p[1] - b.p[0]) * (c.p[2] - c.p[0]) - (c.p[1] - c.p[0]) * (b.p[2] - b.p[0]);
 }
 
-// The triangle as it was; of one colour.
+// Returns the original triangle, with the given colours.
 VOXELD_HD inline Triangle TriangleOf(const CompactTriangle& t, const uint32_t color[3]) {
   Triangle wide;
   for (int a = 0; a < 3; ++a) {
@@ -120,13 +120,14 @@ VOXELD_HD inline Triangle TriangleOf(const CompactTriangle& t, const uint32_t co
   return wide;
 }
 
-// What of a triangle's bounds lies in a region, and how many rows that is to look through.
+// The part of a triangle's bounds that lies in a region, and how many rows of it have to be
+// visited.
 struct CompactPart {
   int32_t lo[3], hi[3];  // voxels relative to the triangle's
-  int32_t base;          // the place of the triangle's voxel, as if it were in the region
-  int32_t rows[3];       // along each axis; of a flat one: one
+  int32_t base;          // the index of the triangle's voxel, as if it were in the region
+  int32_t rows[3];       // along each axis; a flat triangle has one
 
-  // Of a voxel in its region: x | y << 5 | z << 10.
+  // The index of a voxel in its region is x | y << 5 | z << 10.
   VOXELD_HD static int32_t Stride(int a) { return 1 << (5 * a); }
 
   // at: coordinates of the region's first voxel.
@@ -159,7 +160,7 @@ struct CompactPart {
     return part;
   }
   VOXELD_HD int32_t row_count() const { return rows[0] + rows[1] + rows[2]; }
-  // Where a voxel, relative to the triangle's, lies in the region.
+  // Returns the index in the region of a voxel that is given relative to the triangle's.
   VOXELD_HD int32_t PlaceOf(int32_t x, int32_t y, int32_t z) const {
     return base + x * Stride(0) + y * Stride(1) + z * Stride(2);
   }
@@ -168,17 +169,18 @@ struct CompactPart {
   }
 };
 
-// By axis, from its number.
+// Selects a component by the number of its axis.
 VOXELD_HD inline int32_t PickAxis(const int32_t v[3], int a) {
   return a == 0 ? v[0] : a == 1 ? v[1] : v[2];
 }
 
-// In the projection along an axis: three functions of a voxel that are ≥ 0 where the triangle is.
+// In the projection along an axis: three functions of a voxel that are ≥ 0 inside the triangle.
 struct CompactSides {
   int32_t at[3], step_b[3], step_c[3];  // at one voxel; to the next along either axis
 
-  // b and c: the axes that follow; n: the normal's component. At voxel (vb, vc), relative.
-  // `kCover`: where the voxel meets it, not the voxel's centre.
+  // b and c: the axes that follow; n: the normal's component. Evaluates the functions at voxel (vb,
+  // vc), relative. `kCover`: they are ≥ 0 where the voxel meets the triangle, instead of the
+  // voxel's centre.
   template <bool kCover>
   VOXELD_HD static CompactSides Of(const CompactAxis& b, const CompactAxis& c, int32_t n,
                                    int32_t vb, int32_t vc) {
@@ -194,7 +196,7 @@ struct CompactSides {
     }
     if constexpr (kCover) {
       if (n == 0) {
-        // Edge 0, or edge 1 if that has no length here, from either side.
+        // Use edge 0, or edge 1 if edge 0 has no length here, from both sides.
         const bool first = s.step_b[0] != 0 || s.step_c[0] != 0;
         s.at[0] = first ? s.at[0] : s.at[1];
         s.step_b[0] = first ? s.step_b[0] : s.step_b[1];
@@ -212,7 +214,7 @@ struct CompactSides {
   }
 };
 
-// |x| < 2³¹.
+// Requires: |x| < 2³¹.
 VOXELD_HD inline int32_t FloorOf(double x) {
 #if defined(__CUDA_ARCH__)
   return __double2int_rd(x);
@@ -221,7 +223,7 @@ VOXELD_HD inline int32_t FloorOf(double x) {
 #endif
 }
 
-// One row of columns along axis a, vc of its axis c: f(place) for each voxel.
+// Calls f(place) for each voxel of one row of columns along axis a, at vc on its axis c.
 template <class F>
 VOXELD_HD void EmitCompactThinRow(const CompactTriangle& t, const CompactPart& part, int a,
                                   int32_t row, F&& f) {
@@ -235,7 +237,7 @@ VOXELD_HD void EmitCompactThinRow(const CompactTriangle& t, const CompactPart& p
   int32_t outside = 0;
   for (int i = 0; i < 3; ++i) outside |= sides.at[i] + Max(0, sides.step_b[i] * (width - 1));
   if (outside < 0) return;
-  // Depth times |n_a|.
+  // The depth times |n_a|.
   const int32_t sign = na < 0 ? -1 : 1;
   const int32_t nb = CompactNormal(along_c, along_a) * sign;
   const int32_t nc = CompactNormal(along_a, along_b) * sign;
@@ -258,7 +260,8 @@ VOXELD_HD void EmitCompactThinRow(const CompactTriangle& t, const CompactPart& p
   }
 }
 
-// The same of a triangle to be covered; a is the axis of the normal's greatest component.
+// The same for a triangle that is drawn with COVER; a is the axis of the normal's greatest
+// component.
 template <class F>
 VOXELD_HD void EmitCompactCoverRow(const CompactTriangle& t, const CompactPart& part, int a,
                                    int32_t row, F&& f) {
@@ -276,7 +279,7 @@ VOXELD_HD void EmitCompactCoverRow(const CompactTriangle& t, const CompactPart& 
   if (outside < 0) return;
   const CompactSides from_b = CompactSides::Of<true>(along_c, along_a, nb, vc, lo_a);
   CompactSides from_c = CompactSides::Of<true>(along_a, along_b, nc, lo_a, lo_b);
-  // The plane is met from ⌈(−r − rest) / den⌉ to ⌊(r − rest) / den⌋.
+  // The voxels from ⌈(−r − rest) / den⌉ to ⌊(r − rest) / den⌋ meet the plane.
   const int32_t sign = na < 0 ? -1 : 1;
   const int64_t rest = static_cast<int64_t>(nb * sign) * (lo_b * 256 + 128 - along_b.p[0]) +
                        static_cast<int64_t>(nc * sign) * (vc * 256 + 128 - along_c.p[0]) -
@@ -307,7 +310,7 @@ VOXELD_HD void EmitCompactCoverRow(const CompactTriangle& t, const CompactPart& 
   }
 }
 
-// Row `row` of part.row_count() of a triangle that is not flat: f(place) for each voxel.
+// Calls f(place) for each voxel of row `row` of part.row_count(), for a triangle that is not flat.
 template <class F>
 VOXELD_HD void EmitCompactRow(const CompactTriangle& t, const CompactPart& part, int32_t row,
                               F&& f) {
@@ -324,7 +327,8 @@ VOXELD_HD void EmitCompactRow(const CompactTriangle& t, const CompactPart& part,
   }
 }
 
-// The voxels of the vertices, which all have but those to be covered with area: f(place, vertex).
+// Calls f(place, vertex) for the voxels of the vertices. All triangles have them, except those with
+// an area that are drawn with COVER.
 template <class F>
 VOXELD_HD void EmitCompactVertices(const CompactTriangle& t, const CompactPart& part, F&& f) {
   if ((t.flags & (CompactTriangle::kCover | CompactTriangle::kFlat)) == CompactTriangle::kCover) {
@@ -337,8 +341,9 @@ VOXELD_HD void EmitCompactVertices(const CompactTriangle& t, const CompactPart& 
   }
 }
 
-// The colour of a voxel, relative, of a triangle with area: as TriangleSetup::ColorAt has it. The
-// sum of the weights is below 2³², and totals with a half are exact in double.
+// Returns the colour of a voxel, given relative, for a triangle with an area: the same as
+// TriangleSetup::ColorAt. The sum of the weights is below 2³², and totals with a half are exact in
+// double.
 VOXELD_HD inline uint32_t CompactColorAt(const CompactTriangle& t, const uint32_t color[3],
                                          const int32_t voxel[3]) {
   const CompactAxis x = CompactAxis::Of(t, 0), y = CompactAxis::Of(t, 1), z = CompactAxis::Of(t, 2);
@@ -365,7 +370,7 @@ VOXELD_HD inline uint32_t CompactColorAt(const CompactTriangle& t, const uint32_
   return rgb;
 }
 
-// A flat one's voxels in a box inside the volume: f(x, y, z, rgb).
+// Calls f(x, y, z, rgb) for a flat triangle's voxels in a box inside the volume.
 template <class F>
 VOXELD_HD void EmitCompactFlat(const CompactTriangle& t, const uint32_t color[3], const Box3& box,
                                F&& f) {

@@ -1,8 +1,9 @@
 // A disc across its normal, or a ring: its plane, bounded by the distance from its axis.
 //
-// Guarantee: lit voxels lie within h of the plane, or half a voxel (COVER: half a voxel's
-// diagonal) where that is more, and within the rim; all that lies within h and the rim is lit, but
-// for 0.02 voxel at the rim; within the rim no step gets through. The rim is cut along the normal.
+// Guarantee: covered voxels lie within h of the plane, or half a voxel (COVER: half a voxel's
+// diagonal) if that is more, and within the rim. All voxels within h and the rim are covered, to
+// within 0.02 voxel at the rim; within the rim no step passes through. The rim is cut along the
+// normal.
 #pragma once
 
 #include "gpu/implicit/field_shape.h"

@@ -1,7 +1,7 @@
 // An ellipsoid along the axes: √((x/a)² + (y/b)² + (z/c)²) = 1.
 //
 // Guarantee: P / |∇P| is the distance to first order: inside, a shell of half-width h is thinner by
-// up to h²/2ρ, ρ being the least radius of curvature; else as gpu/implicit/field.h has it.
+// up to h²/2ρ, where ρ is the least radius of curvature; otherwise as in gpu/implicit/field.h.
 #pragma once
 
 #include "gpu/implicit/field_shape.h"

@@ -1,16 +1,17 @@
 // The inside of triangles, by parity: a voxel is covered if the ray from its centre towards −x
-// meets an odd number of them. Of a closed mesh that is what it encloses, whichever way its
-// triangles are turned; where parts of it overlap, every second layer. (Schwarz and Seidel, "Fast
-// parallel surface and solid voxelization on GPUs", 2010, flip voxels so.)
+// meets an odd number of them. For a closed mesh that is its inside, whichever way its triangles
+// face; where parts of it overlap, every second layer is covered. (Schwarz and Seidel, "Fast
+// parallel surface and solid voxelization on GPUs", 2010, flip voxels in this way.)
 //
-// Exact, in whole numbers. A row of voxels, (y, z), meets a triangle if its centres' line lies
-// inside of the triangle as seen along x; lines through an edge or a corner count as if they were
-// moved by a little along y and by much less along z, so of triangles that share it one is met, or
-// none, or both. From the first voxel on whose centre is not before the triangle's plane, the row's
-// parity is the other one. Rows that meet an odd number of triangles, as an open mesh has them,
-// have no inside.
+// Exact, in whole numbers. A row of voxels, (y, z), meets a triangle if the line through its
+// centres lies inside the triangle as seen along x. Lines through an edge or a corner are treated
+// as if they were moved by a little along y and by much less along z, so of the triangles that
+// share it, one is met, or none, or both. The row's parity changes at the first voxel whose centre
+// is not before the triangle's plane. Rows that meet an odd number of triangles, which an open mesh
+// can have, have no inside.
 //
-// Guarantee: what is filled is exact too, and its volume right within 1 % at a radius of 20 voxels.
+// Guarantee: the filled voxels are exact too, and the volume is right within 1 % at a radius of 20
+// voxels.
 #pragma once
 
 #include "gpu/primitives/blocks.h"
@@ -19,8 +20,8 @@
 
 namespace voxeld::gpu {
 
-// Of the voxels of a box, a bit each, by row: x in words of 32 from the multiple of 32 that holds
-// the box's first on, up to the one that holds the voxel after its last; then y, then z.
+// A bit for each voxel of a box, by row: x in words of 32 bits, from the multiple of 32 that holds
+// the box's first voxel to the one that holds the voxel after its last; then y, then z.
 struct InsideRows {
   Box3 box;
 
@@ -33,7 +34,7 @@ struct InsideRows {
   VOXELD_HD uint64_t size() const {
     return IsEmpty(box) ? 0 : rows() * static_cast<uint64_t>(words());
   }
-  // The word that holds a voxel of the box, or the one after its row.
+  // Returns the index of the word that holds a voxel of the box, or the voxel after its row.
   VOXELD_HD uint64_t PlaceOf(int32_t x, int32_t y, int32_t z) const {
     const uint64_t row =
         static_cast<uint64_t>(z - box.lo[2]) * static_cast<uint64_t>(box.hi[1] - box.lo[1]) +
@@ -42,21 +43,22 @@ struct InsideRows {
   }
 };
 
-// Bit i is the parity of bits 0 to i.
+// Returns a word whose bit i is the parity of bits 0 to i.
 VOXELD_HD constexpr uint32_t ParityUntil(uint32_t bits) {
   for (int shift = 1; shift < 32; shift <<= 1) bits ^= bits << shift;
   return bits;
 }
 
-// A triangle as rows meet it. I: whole numbers that hold (its extent + 1 voxel)³ units, four times.
+// The crossings of rows with a triangle. I: an integer type that holds (the triangle's extent + 1
+// voxel)³ units, four times.
 template <class I>
 struct RowCrossings {
-  int64_t y[3], z[3];  // corners, turned so that area > 0
+  int64_t y[3], z[3];  // corners, ordered so that area > 0
   I area, by_y, by_z;  // its normal, in units²
-  int64_t tie[3];      // edges: 0 if their line is inside, 1 if not
+  int64_t tie[3];      // edges: 0 if points on their line are inside, 1 if not
   int64_t x_voxel, x_rest;
 
-  // False if no row meets it.
+  // Returns false if no row meets it.
   VOXELD_HD bool Set(const Int3 (&v)[3]) {
     area = I(v[1][1] - v[0][1]) * (v[2][2] - v[0][2]) - I(v[1][2] - v[0][2]) * (v[2][1] - v[0][1]);
     if (area == 0) return false;
@@ -76,7 +78,7 @@ struct RowCrossings {
     return true;
   }
 
-  // Whether a row meets it; then *x is the first voxel beyond.
+  // Returns whether a row meets the triangle; then *x is the first voxel beyond it.
   VOXELD_HD bool Find(int32_t row_y, int32_t row_z, int64_t* x) const {
     const int64_t py = row_y * kUnitsPerVoxel + kHalfVoxel,
                   pz = row_z * kUnitsPerVoxel + kHalfVoxel;
@@ -92,7 +94,7 @@ struct RowCrossings {
   }
 };
 
-// The rows of a box whose centres' lines may meet a triangle.
+// Returns the rows of a box whose centre lines may meet a triangle.
 VOXELD_HD inline Box3 RowsOf(const Int3 (&v)[3], const Box3& box) {
   Box3 rows = box;
   for (int a = 1; a < 3; ++a) {
@@ -104,8 +106,8 @@ VOXELD_HD inline Box3 RowsOf(const Int3 (&v)[3], const Box3& box) {
   return rows;
 }
 
-// f(y, z, x) for rows number first, first + step, … of those of the box that meet the triangle; x
-// is the first voxel beyond it, or box.lo[0] or box.hi[0] if that lies beyond these.
+// Calls f(y, z, x) for the rows with numbers first, first + step, … of those rows of the box that
+// meet the triangle; x is the first voxel beyond the triangle, clamped to box.lo[0] and box.hi[0].
 template <class F>
 VOXELD_HD void EmitCrossings(const Int3 (&v)[3], const Box3& box, uint32_t first, uint32_t step,
                              F&& f) {
@@ -134,8 +136,8 @@ VOXELD_HD void EmitCrossings(const Int3 (&v)[3], const Box3& box, uint32_t first
 struct Filled {
   static constexpr PrimitiveKind kKind = PrimitiveKind::kFilled;
 
-  // Where it may be, in blocks of `tiles` tiles along an edge: `bounds` in the volume, which need
-  // not be tight.
+  // Sets the place of the shape, in blocks of `tiles` tiles along an edge, from `bounds` in the
+  // volume, which need not be tight.
   static void Place(const Box3& bounds, int32_t tiles, Solid& solid, ImplicitPlace& place) {
     SetBlocks(bounds, tiles, solid, place);
     solid.drawable = true;
@@ -151,8 +153,9 @@ struct Filled {
     }
   }
 
-  // Of the 32 voxels from a multiple of 32 on that hold (x, y, z), which lies in the bounds: those
-  // that are inside, a bit each. Without `source.inside` by looking at every triangle.
+  // Returns a bit for each of the 32 voxels, from a multiple of 32 on, that contain (x, y, z): 1 if
+  // it is inside. Requires: (x, y, z) lies in the bounds. Without `source.inside` it tests every
+  // triangle.
   VOXELD_HD static uint32_t InsideAround(const Source& source, int32_t x, int32_t y, int32_t z) {
     const InsideRows rows{source.solid.bounds};
     if (source.inside != nullptr) return source.inside[rows.PlaceOf(x, y, z)];
@@ -173,8 +176,8 @@ struct Filled {
     return open ? 0 : ParityUntil(flips);
   }
 
-  // Of a box that lies in the bounds, 16 voxels of a tile along x at most: bit i is voxel box.lo[0]
-  // + i.
+  // Returns the bits of a row of a box, where bit i is voxel box.lo[0] + i. Requires: the box lies
+  // in the bounds and has at most a tile's 16 voxels along x.
   VOXELD_HD static uint32_t RowIn(const Source& source, const Box3& box, int32_t y, int32_t z) {
     const uint32_t bits = InsideAround(source, box.lo[0], y, z) >> (box.lo[0] & 31);
     const int32_t n = box.hi[0] - box.lo[0];
@@ -192,7 +195,7 @@ struct Filled {
     });
   }
 
-  // A box within a tile: none crosses words.
+  // Requires: the box lies within a tile, so no row crosses words.
   template <class Emit>
   VOXELD_HD static void EmitVoxels(const Source& source, uint32_t i, const Box3& box, Emit&& emit) {
     const Box3 block = Intersect(box, BlockOf(source, i));
@@ -211,7 +214,7 @@ struct Filled {
   VOXELD_HD static bool HasAny(const Source& source, const Box3& box) {
     if (IsEmpty(box)) return false;
     for (int32_t z = box.lo[2]; z < box.hi[2]; ++z) {
-      uint32_t any = 0;  // rows that do not wait for each other
+      uint32_t any = 0;  // the rows do not depend on each other
       for (int32_t y = box.lo[1]; y < box.hi[1]; ++y) any |= RowIn(source, box, y, z);
       if (any != 0) return true;
     }

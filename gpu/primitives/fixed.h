@@ -11,7 +11,7 @@ inline constexpr int64_t kUnitsPerVoxel = 256;
 inline constexpr int64_t kHalfVoxel = kUnitsPerVoxel / 2;
 inline constexpr int64_t kMaxUnits = int64_t{1} << 38;  // positions saturate at ±2³⁰ voxels
 
-// Where 64 bits do not suffice.
+// For values that do not fit in 64 bits.
 using Wide = __int128;
 
 // A position in units, or a difference of two.
@@ -43,7 +43,7 @@ VOXELD_HD constexpr I Clamp(I v, I lo, I hi) {
   return v < lo ? lo : (hi < v ? hi : v);
 }
 
-// Empty boxes have no negative sizes.
+// Returns the intersection; an empty one has no negative sizes.
 VOXELD_HD inline Box3 Intersect(const Box3& a, const Box3& b) {
   Box3 r;
   for (int i = 0; i < 3; ++i) {
@@ -62,7 +62,7 @@ VOXELD_HD constexpr bool Contains(const Box3& box, int64_t x, int64_t y, int64_t
          z < box.hi[2];
 }
 
-// Rounded towards −∞ and +∞; b > 0.
+// Divides and rounds towards −∞ or +∞. Requires: b > 0.
 template <class I>
 VOXELD_HD constexpr I FloorDiv(I a, I b) {
   const I q = a / b;
@@ -74,17 +74,17 @@ VOXELD_HD constexpr I CeilDiv(I a, I b) {
   return q + static_cast<I>(q * b < a);
 }
 
-// The voxel that holds a coordinate in units.
+// Returns the voxel that holds a coordinate in units.
 VOXELD_HD constexpr int64_t VoxelOf(int64_t units) { return units >> 8; }
 
-// The next whole number at or below; |x| < 2⁶².
+// Returns the next whole number at or below x. Requires: |x| < 2⁶².
 VOXELD_HD constexpr int64_t FloorToInt(double x) {
   const int64_t t = static_cast<int64_t>(x);
   return t - static_cast<int64_t>(static_cast<double>(t) > x);
 }
 
-// A coordinate in voxels to the nearest unit, halves up;
-// saturates at ±kMaxUnits (NaN: at −kMaxUnits).
+// Rounds a coordinate in voxels to the nearest unit, halves up; saturates at ±kMaxUnits (NaN: at
+// −kMaxUnits).
 VOXELD_HD constexpr int64_t Snap(double voxels) {
   const double x = voxels * 256.0 + 0.5;
   if (!(x > -static_cast<double>(kMaxUnits))) return -kMaxUnits;
@@ -96,7 +96,7 @@ VOXELD_HD constexpr int32_t ToVoxel32(int64_t v) {
   return static_cast<int32_t>(Clamp<int64_t>(v, INT32_MIN, INT32_MAX));
 }
 
-// IEEE, correctly rounded on both machines.
+// IEEE, correctly rounded on host and device.
 VOXELD_HD inline double SquareRoot(double x) {
 #if defined(__CUDA_ARCH__)
   return __dsqrt_rn(x);
@@ -105,7 +105,7 @@ VOXELD_HD inline double SquareRoot(double x) {
 #endif
 }
 
-// ⌊√x⌋ for x ≥ 0.
+// Returns ⌊√x⌋. Requires: x ≥ 0.
 VOXELD_HD inline int64_t FloorSqrt(Wide x) {
   int64_t r = static_cast<int64_t>(SquareRoot(static_cast<double>(x)));
   while (static_cast<Wide>(r) * r > x) --r;
@@ -113,11 +113,11 @@ VOXELD_HD inline int64_t FloorSqrt(Wide x) {
   return r;
 }
 
-// ⌊(start + step·k) / modulus⌋ for consecutive k, exactly and without division.
+// Computes ⌊(start + step·k) / modulus⌋ for consecutive k, exactly and without division.
 struct Stepper {
   int64_t value, rest, value_step, rest_step, modulus;
 
-  // `numerator` at the first k; |step| is a small multiple of `modulus` at most.
+  // `numerator` is the value at the first k; |step| is at most a small multiple of `modulus`.
   template <class I>
   VOXELD_HD static Stepper At(I numerator, int64_t step, int64_t modulus) {
     Stepper s;
@@ -140,8 +140,8 @@ struct Stepper {
   }
 };
 
-// A voxel's colour k parts of n along from c0 to c1 (0x00RRGGBB):
-// (C0·(n−k) + C1·k + ⌊n/2⌋)/n a channel.
+// Returns the colour k parts of n along from c0 to c1 (0x00RRGGBB): (C0·(n−k) + C1·k + ⌊n/2⌋)/n for
+// each channel.
 VOXELD_HD inline uint32_t MixColors(uint32_t c0, uint32_t c1, int64_t k, int64_t n) {
   if (c0 == c1 || n == 0) return c0;
   uint32_t rgb = 0;

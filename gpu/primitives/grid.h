@@ -1,4 +1,4 @@
-// The grid of tiles that a volume is assembled in, and which tiles a line may touch.
+// The grid of tiles in which a volume is assembled, and the tiles that a line may touch.
 #pragma once
 
 #include "gpu/primitives/fixed.h"
@@ -10,15 +10,15 @@ inline constexpr uint32_t kTileBits = 4;
 inline constexpr int32_t kTileSize = 1 << kTileBits;
 inline constexpr int32_t kTileVoxels = kTileSize * kTileSize * kTileSize;
 
-// Whether an engine draws a tile. One that an engine of a rank before draws too has its lit voxels
-// counted there.
+// Whether an engine draws a tile. If the engine of an earlier rank also draws it, its lit voxels
+// are counted there.
 enum TileOwner : uint8_t { kNotOwned = 0, kOwned = 1, kOwnedAndCountedElsewhere = 2 };
 
 struct TileGrid {
-  int32_t voxels[3] = {};  // the volume; its last tiles may stand over
+  int32_t voxels[3] = {};  // the volume; its last tiles may extend beyond it
   int32_t tiles[3] = {};
-  // Of a tile's memory: an axis' coordinate counts 2^shift words. Whatever walks along an axis is
-  // best off if that one comes first.
+  // The layout of a tile's memory: a coordinate of an axis counts 2^shift words. Loops along an
+  // axis are fastest if that axis comes first.
   uint32_t shift[3] = {};
 
   VOXELD_HD static TileGrid Of(int32_t nx, int32_t ny, int32_t nz, int fastest_axis = 0) {
@@ -50,7 +50,7 @@ struct TileGrid {
     ijk[1] = static_cast<int32_t>(tile % static_cast<uint32_t>(tiles[1]));
     ijk[2] = static_cast<int32_t>(tile / static_cast<uint32_t>(tiles[1]));
   }
-  // Where a voxel lies in its tile's memory.
+  // Returns the index of a voxel in its tile's memory.
   VOXELD_HD uint32_t IndexInTile(int32_t x, int32_t y, int32_t z) const {
     constexpr uint32_t kMask = kTileSize - 1;
     return (static_cast<uint32_t>(x) & kMask) << shift[0] |
@@ -60,7 +60,7 @@ struct TileGrid {
   VOXELD_HD uint32_t TileOf(int32_t x, int32_t y, int32_t z) const {
     return Index(x / kTileSize, y / kTileSize, z / kTileSize);
   }
-  // Its voxels inside the volume.
+  // Returns the tile's voxels inside the volume.
   VOXELD_HD Box3 VoxelsOf(uint32_t tile) const {
     int32_t ijk[3];
     Coordinates(tile, ijk);
@@ -71,7 +71,7 @@ struct TileGrid {
     }
     return b;
   }
-  // The tiles, half-open, that a box of voxels touches.
+  // Returns the tiles, half-open, that a box of voxels touches.
   VOXELD_HD Box3 TilesOf(const Box3& box) const {
     Box3 t;
     for (int a = 0; a < 3; ++a) {
@@ -83,7 +83,7 @@ struct TileGrid {
   }
 };
 
-// Every tile that `box` touches.
+// Calls `emit` for every tile that `box` touches.
 template <class Emit>
 VOXELD_HD void EmitTilesOfBox(const Box3& box, const TileGrid& grid, Emit&& emit) {
   const Box3 t = grid.TilesOf(box);
@@ -94,12 +94,12 @@ VOXELD_HD void EmitTilesOfBox(const Box3& box, const TileGrid& grid, Emit&& emit
   }
 }
 
-// Beyond the axis of a line, or of the capsule of `radius` units around it, how far its voxels
-// reach: the radius, half a voxel from a cell to its centre, and room for rounding.
+// Returns how far voxels reach beyond the axis of a line, or of the capsule of `radius` units
+// around it: the radius, half a voxel from a cell to its centre, and a margin for rounding.
 VOXELD_HD inline double ReachOf(int64_t radius) {
   return radius > 0 ? static_cast<double>(radius) + kHalfVoxel + 2 : 2;
 }
-// A box that holds them.
+// Returns a box that holds these voxels.
 VOXELD_HD inline Box3 BoundsOf(const Line& line, int64_t radius) {
   const double reach = ReachOf(radius);
   Box3 box;
@@ -111,8 +111,8 @@ VOXELD_HD inline Box3 BoundsOf(const Line& line, int64_t radius) {
   return box;
 }
 
-// Every tile that a voxel of the line, or of the capsule of `radius` units around it, may lie in,
-// and few others: slab by slab of the axis along which it runs most.
+// Calls `emit` for every tile that a voxel of the line, or of the capsule of `radius` units around
+// it, may lie in, and few others: it goes slab by slab along the axis in which the line is longest.
 template <class Emit>
 VOXELD_HD void EmitTilesOfLine(const Line& line, int64_t radius, const TileGrid& grid,
                                Emit&& emit) {
@@ -128,7 +128,7 @@ VOXELD_HD void EmitTilesOfLine(const Line& line, int64_t radius, const TileGrid&
   const Box3 all = grid.TilesOf(box);
   const double length = e[major] - s[major];
   for (int32_t slab = all.lo[major]; slab < all.hi[major]; ++slab) {
-    // The part of the axis from which this slab is in reach.
+    // The part of the line's axis from which this slab is in reach.
     double t0 = 0, t1 = 1;
     if (length != 0) {
       const double near = slab * 4096.0 - reach - s[major];

@@ -1,7 +1,7 @@
-// A line that winds around another, a coil or, with two radii, a cone's.
+// A line that winds around another line: a coil or, with two radii, on a cone.
 //
-// Guarantee: before it is cut the curve is within 2·10⁻⁴ of its greater radius, and begins and ends
-// where it should.
+// Guarantee: before it is cut, the curve is accurate to 2·10⁻⁴ of its greater radius, and begins
+// and ends at the exact points.
 #pragma once
 
 #include "gpu/curves/spans.h"
@@ -9,7 +9,7 @@
 namespace voxeld::gpu {
 
 struct Helix {
-  implicit::Vector start, end;  // apart
+  implicit::Vector start, end;  // must differ
   double radius = 1, end_radius = 1;
   double turns = 1;       // right-handed; left-handed if negative
   implicit::Vector u, v;  // across the axis (FrameOf)

@@ -1,15 +1,15 @@
-// The general method: a surface P, bounded by Φ, in any colours: expressions of the shape's own
-// coordinates (gpu/implicit/field.h says which voxels that means). The paper's "arbitrary 3D
+// The general method: a surface P, bounded by Φ, in any colours, all given as expressions of the
+// shape's own coordinates (gpu/implicit/field.h defines the voxels). The paper's "arbitrary 3D
 // primitive Γ is a surface P bounded by a closed curve Φ".
 //
-// Its items are blocks of tiles. What intervals say to be empty is not looked at, so that time
-// follows the surface.
+// Its items are blocks of tiles. Regions that intervals prove to be empty are skipped, so the time
+// is proportional to the surface.
 //
-// Guarantee: wherever P has other signs, in double precision, at the centres of neighbouring
-// voxels, one of the two is lit, at any thickness and whatever intervals pass over. Every built-in
-// shape that is drawn so is its own expression to within 10⁻⁴ voxel, rims of closed curves to within
-// 0.02; Box, Sphere and Cylinder, drawn in a way of their own, are the same solids, and surfaces
-// nowhere farther from the expression's than a voxel.
+// Guarantee: wherever P has different signs, in double precision, at the centres of neighbouring
+// voxels, one of the two is covered, at any thickness and whatever regions intervals skip. Every
+// built-in shape that is drawn by this method matches its own expression to within 10⁻⁴ voxel, rims
+// of closed curves to within 0.02. Box, Sphere and Cylinder have methods of their own: they are the
+// same solids, and their surfaces are nowhere farther than a voxel from the expression's.
 #pragma once
 
 #include <vector>
@@ -25,12 +25,12 @@ namespace voxeld::gpu {
 
 struct Implicit {
   static constexpr PrimitiveKind kKind = PrimitiveKind::kImplicit;
-  // What is known of a tile (ImplicitPlace::reach) where it is not a reach, the most that
-  // Field::ReachIn may answer.
+  // The values for a tile (ImplicitPlace::reach) that are not a reach, which is the greatest value
+  // that Field::ReachIn may return.
   static constexpr float kNothing = -1, kEverything = -2;
 
-  // Where it is looked for: `map` takes the geometry's coordinates to voxel space. Items are blocks
-  // of `tiles` tiles along an edge. What is to be put into `place.hoisted` it answers.
+  // Sets the place of the shape. `map` takes the geometry's coordinates to voxel space. Items are
+  // blocks of `tiles` tiles along an edge. Returns the words for `place.hoisted`.
   static std::vector<uint32_t> Place(const GeometryRecord& g, const uint32_t* program,
                                      const Affine& map, const TileGrid& grid, int32_t tiles,
                                      Solid& solid, ImplicitPlace& place) {
@@ -68,7 +68,7 @@ struct Implicit {
 #endif
   }
 
-  // What is known of a tile, an item: `box` is not empty.
+  // Returns what is known about a tile, as an item. Requires: `box` is not empty.
   VOXELD_HD static float ReachOf(const implicit::Field& field, const Box3& box) {
     const implicit::BoxState state = field.StateOf(box);
     if (state.none) return kNothing;
@@ -76,7 +76,7 @@ struct Implicit {
     return field.solid() || field.half() == 0 ? 0 : field.ReachIn(box);
   }
 
-  // On the host, of a box of a tile at most; the device has its own way to the same voxels.
+  // On the host, for a box of at most a tile; the device computes the same voxels in another way.
   template <class Emit>
   static void EmitVoxels(const Source& source, uint32_t, const Box3& box, Emit&& emit) {
     const Box3 part = Intersect(box, source.solid.bounds);
@@ -98,7 +98,8 @@ struct Implicit {
     });
   }
 
-  // Of the domain, with room for half a shell, what is drawn thicker than it is, and rounding.
+  // Returns the bounds of the domain, with a margin for half a shell, for shapes that are drawn
+  // thicker than they are, and for rounding.
   static Box3 BoundsOf(const GeometryRecord& g, const Affine& map, const TileGrid& grid,
                        float half) {
     if (g.params[6] == 0) {

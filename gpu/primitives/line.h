@@ -1,4 +1,5 @@
-// The voxels of a line one voxel wide, restricted to a box at a cost that follows what lies in it.
+// The voxels of a line one voxel wide, restricted to a box at a cost proportional to the voxels in
+// it.
 //
 // THIN and EUCLIDEAN: voxel_k = ⌊S + (E−S)·k/N⌋ for k = 0..N, in exact rational arithmetic; THIN
 // has N = max over axes of |⌊E⌋−⌊S⌋|, EUCLIDEAN N = ⌊|E−S|⌋. Each coordinate is monotonic in k, so
@@ -6,14 +7,14 @@
 //
 // COVER: the cells crossed on the way from the lexicographically smaller end to the other,
 // 6-connected. Crossing i = 1..n_a on axis a takes place at t = (p_a + 256·(i−1)) / |D_a|;
-// crossings are ordered by (t, axis); the k-th cell is what the first k of them lead to, N is their
-// number. The cells in a box are those between the last entry and the first exit.
+// crossings are ordered by (t, axis); the k-th cell is reached after the first k crossings, and N
+// is their number. The cells in a box are those between the last entry and the first exit.
 //
 // N = 0 gives the voxels of S and E, in their colours.
 //
-// Guarantee: the same voxels from both ends, and a shift by whole voxels shifts them. THIN:
-// 26-connected, an inner voxel has two neighbours and no more; COVER: 6-connected, every cell that
-// the line crosses; EUCLIDEAN: steps of one voxel along the line.
+// Guarantee: the voxels are the same from both ends, and a shift by whole voxels shifts them. THIN:
+// 26-connected, an inner voxel has exactly two neighbours; COVER: 6-connected, every cell that the
+// line crosses; EUCLIDEAN: steps of one voxel along the line.
 #pragma once
 
 #include "gpu/primitives/fixed.h"
@@ -35,7 +36,7 @@ VOXELD_HD void EmitVoxelOf(const Int3& p, uint32_t rgb, const Box3& box, Emit&& 
   }
 }
 
-// Number of steps of a THIN or EUCLIDEAN line.
+// Returns the number of steps of a THIN or EUCLIDEAN line.
 VOXELD_HD inline int64_t LineSteps(const Line& line) {
   if (line.sampling == LineSampling::kEuclidean) {
     Wide sum = 0;
@@ -55,7 +56,7 @@ VOXELD_HD VOXELD_DEVICE_NOINLINE void EmitSteps(const Line& line, int64_t n, con
   const int64_t m = n * kUnitsPerVoxel;
   I k0 = 0, k1 = n + 1;
   for (int a = 0; a < 3; ++a) {
-    // lo ≤ d·k < hi puts this coordinate into the box.
+    // This coordinate is in the box if lo ≤ d·k < hi.
     const int64_t d = line.e[a] - line.s[a];
     const I base = static_cast<I>(line.s[a]) * n;
     const I lo = static_cast<I>(m) * box.lo[a] - base;
@@ -93,7 +94,7 @@ VOXELD_HD VOXELD_DEVICE_NOINLINE void EmitSteps(const Line& line, int64_t n, con
 
 // The crossings of one axis, on the way from `from` to `to`.
 struct Crossings {
-  int64_t cell;       // where the way begins
+  int64_t cell;       // where the line begins
   int64_t direction;  // +1 or −1
   int64_t count;
   int64_t first;   // units to the first face
@@ -108,7 +109,7 @@ struct Crossings {
     c.length = Abs(to - from);
     return c;
   }
-  // Units to face i = 1..count.
+  // Returns the units to face i = 1..count.
   VOXELD_HD int64_t face(int64_t i) const { return first + (i - 1) * kUnitsPerVoxel; }
 };
 
@@ -124,7 +125,7 @@ VOXELD_HD bool Before(const CrossingTime& a, const CrossingTime& b) {
   return left < right || (left == right && a.axis < b.axis);
 }
 
-// How many of the crossings of `axis` come before `time`, itself included if `inclusive`.
+// Returns how many of the crossings of `axis` come before `time`, or at it if `inclusive`.
 template <class I>
 VOXELD_HD int64_t CrossingsUntil(const Crossings& c, int axis, const CrossingTime& time,
                                  bool inclusive) {
@@ -198,20 +199,20 @@ VOXELD_HD VOXELD_DEVICE_NOINLINE void EmitCells(const Line& line, const Box3& bo
   }
 }
 
-// `p` comes before `q` in the order of (x, y, z).
+// Returns whether `p` comes before `q` in the order of (x, y, z).
 VOXELD_HD inline bool LexicographicallyLess(const Int3& p, const Int3& q) {
   if (p[0] != q[0]) return p[0] < q[0];
   if (p[1] != q[1]) return p[1] < q[1];
   return p[2] < q[2];
 }
 
-// The same line with its lexicographically smaller end first.
+// Returns the same line with its lexicographically smaller end first.
 VOXELD_HD inline Line Ordered(const Line& line) {
   if (!LexicographicallyLess(line.e, line.s)) return line;
   return {line.e, line.s, line.color_e, line.color_s, line.sampling};
 }
 
-// Up to such coordinates (units) the products that a line's voxels take fit 64 bits.
+// Up to this coordinate (in units), the products for a line's voxels fit in 64 bits.
 inline constexpr int64_t kNarrowLine = int64_t{1} << 28;
 
 VOXELD_HD inline bool IsNarrow(const Line& line) {
@@ -222,7 +223,8 @@ VOXELD_HD inline bool IsNarrow(const Line& line) {
   return narrow;
 }
 
-// Calls emit(x, y, z, rgb) for every voxel of `line` in `box`, some perhaps more than once. `narrow`: it IsNarrow.
+// Calls emit(x, y, z, rgb) for every voxel of `line` in `box`, possibly more than once for some.
+// `narrow`: the line IsNarrow.
 template <class Emit>
 VOXELD_HD void EmitLine(const Line& line, const Box3& box, bool narrow, Emit&& emit) {
   if (line.sampling == LineSampling::kCover) {

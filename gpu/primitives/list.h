@@ -1,13 +1,13 @@
-// Every primitive there is. To add one: its header, its kind in gpu/delta.h, a line here (the
-// compiler asks for it).
+// The list of all primitives. To add one, add its header, its kind in gpu/delta.h, and a line here
+// (the compiler reports a missing one).
 //
 // A primitive is a type with
 //   kKind                            its PrimitiveKind
 //   Count(source)                    how many items a drawable has
-//   EmitTiles(source, i, grid, f)    f(tile) for every tile that item i may touch
-//   EmitVoxels(source, i, box, f)    f(x, y, z, rgb) for exactly the voxels of item i in a box
-//                                    inside the volume (repetition is allowed)
-//   CanonicalMap(record)             of a solid only
+//   EmitTiles(source, i, grid, f)    calls f(tile) for every tile that item i may touch
+//   EmitVoxels(source, i, box, f)    calls f(x, y, z, rgb) for exactly the voxels of item i in a
+//                                    box inside the volume (repetition is allowed)
+//   CanonicalMap(record)             for a solid only
 #pragma once
 
 #include <type_traits>
@@ -49,13 +49,14 @@ VOXELD_HD decltype(auto) WithPrimitive(PrimitiveKind kind, F&& f) {
     case PrimitiveKind::kFilled:
       return f(std::type_identity<Filled>{});
   }
-  __builtin_unreachable();  // ReadDelta lets no other kind in
+  __builtin_unreachable();  // ReadDelta rejects other kinds
 }
 
 template <class Primitive>
 inline constexpr bool kIsSolid = requires(const GeometryRecord& g) { Primitive::CanonicalMap(g); };
 
-// Whether it is evaluated through the inverse of its map, and draws nothing where there is none.
+// Whether it is evaluated through the inverse of its map, and draws nothing if the map has no
+// inverse.
 template <class Primitive>
 inline constexpr bool kIsInverted =
     kIsSolid<Primitive> || Primitive::kKind == PrimitiveKind::kImplicit ||

@@ -1,5 +1,5 @@
-// A box spanned by three edges around a centre: the greatest of the distances from the planes of
-// its faces.
+// A box spanned by three edges around a centre: P is the greatest of the distances from the planes
+// of its faces.
 #pragma once
 
 #include "gpu/implicit/field_shape.h"

@@ -1,8 +1,10 @@
-// A parallelogram, of its corner and two edges: its plane, bounded by how far along each edge.
+// A parallelogram, given by its corner and two edges: its plane, bounded by the distance along each
+// edge.
 //
-// Guarantee: lit voxels lie within h of the plane, or half a voxel (COVER: half a voxel's
-// diagonal) where that is more, and within the rim; all that lies within h and the rim is lit, but
-// for 0.02 voxel at the rim; within the rim no step gets through. The rim is cut along the normal.
+// Guarantee: covered voxels lie within h of the plane, or half a voxel (COVER: half a voxel's
+// diagonal) if that is more, and within the rim. All voxels within h and the rim are covered, to
+// within 0.02 voxel at the rim; within the rim no step passes through. The rim is cut along the
+// normal.
 #pragma once
 
 #include "gpu/implicit/field_shape.h"
@@ -10,7 +12,7 @@
 namespace voxeld::gpu {
 
 struct Patch {
-  implicit::Vector corner, u, v;  // the edges not along one line
+  implicit::Vector corner, u, v;  // the edges must not be parallel
 
   implicit::FieldShape Make(implicit::Graph& g) const {
     using implicit::Vector;

@@ -1,14 +1,16 @@
-// Points: the voxel ⌊P⌋ each; with a thickness also the ball around P, one that fades, or a cube.
+// Points: the voxel ⌊P⌋ of each; with a thickness also the ball around P, a ball that fades, or a
+// cube.
 //
-// Or cells, of which sparse voxels are: of the lattice of whole numbers in the geometry's own
-// coordinates each point names the one that it lies in, P is that cell's middle, and besides its
-// voxel all those are covered whose centres' coordinates (Solid::Canonical) lie in the cell, its
+// Or cells, the elements of sparse voxels. Each point names a cell of the lattice of whole numbers
+// in the geometry's own coordinates: the one that it lies in, whose middle is P. Besides the voxel
+// of P, all voxels are covered whose centres' coordinates (Solid::Canonical) lie in the cell, its
 // lower sides included. Cells side by side leave no gaps, whatever the transform: a voxel's centre
-// lies in one of them. The voxel of a middle may have its own centre in the next cell, if cells are
-// turned and small; then it is of both.
+// lies in one of them. If cells are rotated and small, the voxel of a middle may have its own
+// centre in the next cell; then it belongs to both.
 //
-// Guarantee: a thick point is the voxels whose centres lie within half its thickness, and its own;
-// cells side by side are the solid box that they fill, without gaps or voxels beside it.
+// Guarantee: a thick point covers the voxels whose centres lie within half its thickness, and its
+// own voxel; cells side by side are the solid box that they fill, without gaps and without voxels
+// beside it.
 #pragma once
 
 #include "gpu/primitives/capsule.h"
@@ -20,8 +22,8 @@ namespace voxeld::gpu {
 struct Points {
   static constexpr PrimitiveKind kKind = PrimitiveKind::kPoints;
 
-  // Of a colour, 255 at the middle and 0 at the radius: falls with the square of the distance.
-  // `square` ≤ `whole`, the radius' own.
+  // Returns the colour, faded from full at the middle to 0 at the radius, in proportion to the
+  // square of the distance. Requires: `square` ≤ `whole`, the square of the radius.
   VOXELD_HD static uint32_t Faded(uint32_t rgb, double square, double whole) {
     const uint32_t left = static_cast<uint32_t>(FloorToInt((whole - square) * 255.0 / whole));
     return Tinted(rgb, left << 16 | left << 8 | left);
@@ -29,11 +31,11 @@ struct Points {
 
   VOXELD_HD static uint32_t Count(const Source& source) { return source.corners(); }
 
-  // What a source of cells needs besides its positions.
+  // Sets the fields that a source of cells needs besides its positions.
   VOXELD_HD static void PlaceCells(const Affine& map, Source& source) {
     source.map = map;
     source.solid = Solid::Of(map, /*keep_thin=*/false);
-    double reach = 0;  // from the middle along the axes, voxels
+    double reach = 0;  // from the middle along the axes, in voxels
     for (int a = 0; a < 3; ++a) {
       const double* const row = &map.m[a * 4];
       reach = Max(reach, ((Abs(row[0]) + Abs(row[1])) + Abs(row[2])) / 2);
@@ -81,7 +83,7 @@ struct Points {
   }
 
  private:
-  // A vertex' cell, as whole numbers; what is farther than 2³⁰ counts as there.
+  // Computes a vertex' cell, in whole numbers; coordinates are clamped to 2³⁰.
   VOXELD_HD static void CellOf(const Source& source, uint32_t vertex, double cell[3]) {
     for (int a = 0; a < 3; ++a) {
       constexpr double kMost = 1073741824.0;
@@ -118,7 +120,7 @@ struct Points {
     }
   }
 
-  // Voxels whose centres are no farther than the radius: in any direction, or along each axis.
+  // Emits voxels whose centres are within the radius: in any direction, or along each axis.
   template <class Emit>
   VOXELD_HD static void EmitSplat(const Line& point, int64_t radius, Splat splat, const Box3& box,
                                   Emit&& emit) {
@@ -139,7 +141,7 @@ struct Points {
           const double square = (w[0] * w[0] + w[1] * w[1]) + w[2] * w[2];
           if (square > whole) continue;
           const uint32_t rgb = Faded(point.color_s, square, whole);
-          // What has faded to black is left to what lies below.
+          // A voxel that has faded to black is not covered.
           if (rgb != 0) emit(x, y, z, rgb);
         }
       }

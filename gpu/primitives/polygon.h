@@ -1,10 +1,10 @@
-// A plane polygon of closed curves, holes included, by the even-odd rule: its plane, bounded by the
-// curves projected along the axis nearest to its normal.
+// A plane polygon of closed curves, including holes, by the even-odd rule: its plane, bounded by
+// the curves projected along the axis nearest to its normal.
 //
-// Guarantee: lit voxels lie within h of the plane, or half a voxel (COVER: half a voxel's
-// diagonal) where that is more, and within the rim; all that lies within h and the rim is lit, but
-// for 0.02 voxel at the rim; within the rim no step gets through. Rims are cut along the axis
-// nearest to the normal, so a shell's edge leans, by h·√2 at most.
+// Guarantee: covered voxels lie within h of the plane, or half a voxel (COVER: half a voxel's
+// diagonal) if that is more, and within the rim. All voxels within h and the rim are covered, to
+// within 0.02 voxel at the rim; within the rim no step passes through. Rims are cut along the axis
+// nearest to the normal, so a shell's edge leans, by at most h·√2.
 #pragma once
 
 #include <cstddef>
@@ -18,10 +18,10 @@ struct Polygon {
   std::span<const implicit::Vector> points;
   std::span<const uint32_t> ends;  // of each curve among the points
 
-  // Of any length; zero if all points lie along one line. Twice the area along the normal of the
-  // greatest curve by Newell's sums, so that holes do not take from it; of curves that cross
-  // themselves so that nothing is left, across the farthest point and the one that is farthest from
-  // the line to it.
+  // Returns a normal of any length; zero if all points lie along one line. It is twice the area,
+  // along its normal, of the greatest curve by Newell's sums, so that holes do not reduce it. If
+  // curves cross themselves so that nothing is left, it is perpendicular to the direction of the
+  // farthest point and to that of the point farthest from the line to it.
   implicit::Vector Normal() const {
     implicit::Vector normal;
     uint32_t begin = 0;
@@ -44,7 +44,7 @@ struct Polygon {
     }
     return implicit::Length(normal) > 1e-3 * implicit::Length(across) ? normal : across;
   }
-  // How far the points are from the plane of `normal`, of any length, through their middle.
+  // Returns how far the points are from the plane of `normal`, of any length, through their middle.
   double Unevenness(const implicit::Vector& normal) const {
     double least = 0, most = 0;
     for (size_t i = 0; i < points.size(); ++i) {
@@ -55,7 +55,7 @@ struct Polygon {
     return most - least;
   }
 
-  // There is a normal.
+  // Requires: there is a normal.
   implicit::FieldShape Make(implicit::Graph& g) const {
     implicit::Vector normal = Normal();
     normal = 1 / implicit::Length(normal) * normal;

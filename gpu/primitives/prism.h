@@ -1,5 +1,5 @@
-// What closed curves in the plane z = 0 hold, by the even-odd rule, from there down to z = −depth:
-// a solid.
+// The solid inside closed curves in the plane z = 0, by the even-odd rule, from there down to z =
+// −depth.
 #pragma once
 
 #include <span>
@@ -9,9 +9,9 @@
 namespace voxeld::gpu {
 
 struct Prism {
-  std::span<const implicit::Vector> points;  // z is not looked at
+  std::span<const implicit::Vector> points;  // z is ignored
   std::span<const uint32_t> ends;            // of each curve among the points
-  double depth = 1;                          // drawn a voxel thick at least
+  double depth = 1;                          // drawn at least a voxel thick
 
   implicit::FieldShape Make(implicit::Graph& g) const {
     implicit::FieldShape shape;

@@ -1,24 +1,25 @@
-// Numbers, or colours, on a grid, under any transform: a volume through a table of colours, or the
-// surface at a level of it.
+// Numbers, or colours, on a grid, under any transform: drawn as a volume through a table of
+// colours, or as the surface at a level.
 //
 // The geometry's coordinates count samples: sample i of an axis has its centre at i + ½, and the
-// grid fills 0 to n. A voxel takes what the grid has at its centre (solid.h's coordinates, in
-// single precision): of LINEAR grids the mean of the eight samples around it by distance, of
-// NEAREST ones the sample whose cell holds it; beyond the outermost centres these go on. What lies
-// outside of the grid has nothing.
+// grid fills 0 to n. A voxel has the grid's value at its centre (solid.h's coordinates, in single
+// precision): for LINEAR grids the mean of the eight samples around it, weighted by distance, for
+// NEAREST grids the sample whose cell holds it. Beyond the outermost centres these values continue.
+// Outside the grid there is nothing.
 //
-//   volume   a value v is the entry ⌊(v − low)·scale⌋ of the table, 0 to 255; entries without the
-//            bit kDrawn cover nothing, nor do values that are not numbers. Colours are their own:
-//            c·a/255, nothing where a is 0.
-//   level    inside is where v ≥ level. SOLID covers what is inside; SURFACE by
-//            |level − v| ≤ h·|∇v|, and the neighbours on either side, as gpu/implicit/field.h has
-//            it, with nothing as outside and infinite. In the geometry's colour; or by the place of
-//            the voxel's centre q: the entry ⌊((p0·qx + p1·qy) + p2·qz) + p3⌋ of the table, 0 to 255,
-//            p being the record's params.
+//   volume   a value v is the entry ⌊(v − low)·scale⌋ of the table, 0 to 255. Entries without the
+//            bit kDrawn cover nothing, and neither does NaN. Colours stand for themselves:
+//            c·a/255, nothing if a is 0.
+//   level    a voxel is inside if v ≥ level. SOLID covers the inside; SURFACE is defined by
+//            |level − v| ≤ h·|∇v|, and by the neighbours on either side, as in
+//            gpu/implicit/field.h, where nothing counts as outside and infinite. It has the
+//            geometry's colour; or the colour of the place of the voxel's centre q: the entry
+//            ⌊((p0·qx + p1·qy) + p2·qz) + p3⌋ of the table, 0 to 255, where p are the record's
+//            params.
 //
-// Guarantee: numbers at voxels' centres are within 10⁻⁴ of those of double precision, a colour
-// within one of the 256 steps of its table; isosurfaces are as gpu/implicit/field.h has surfaces,
-// and their volumes are right within 1 % at a radius of 20 voxels.
+// Guarantee: numbers at voxels' centres are within 10⁻⁴ of double precision, and a colour is within
+// one of the 256 steps of its table. Isosurfaces have the guarantees of surfaces in
+// gpu/implicit/field.h, and their volumes are right within 1 % at a radius of 20 voxels.
 #pragma once
 
 #include "gpu/implicit/number.h"
@@ -31,14 +32,15 @@ namespace voxeld::gpu {
 enum class SampleFormat : uint32_t { kU8 = 0, kU16 = 1, kF32 = 2, kRgba8 = 3 };
 enum class SampleFilter : uint32_t { kLinear = 0, kNearest = 1 };
 
-// What the indices of a kSamples hold: this, the table, the bricks, then the samples, x fastest.
+// The contents of the indices of a kSamples: this head, the table, the bricks, then the samples, x
+// fastest.
 struct SampleHead {
   static constexpr uint32_t kTableEntries = 256;
-  static constexpr uint32_t kDrawn = 1u << 24;  // of an entry: 0xRRGGBB with it
+  static constexpr uint32_t kDrawn = 1u << 24;  // in an entry, together with 0xRRGGBB
   static constexpr uint32_t kBrick = 8;         // samples along an edge
   static constexpr uint32_t kMostAlong = 1u << 16;
 
-  // That so many samples fill.
+  // Returns the number of words that this many samples fill.
   static constexpr uint64_t WordsOf(SampleFormat format, uint64_t samples) {
     const uint64_t each = format == SampleFormat::kU8 ? 4 : format == SampleFormat::kU16 ? 2 : 1;
     return (samples + each - 1) / each;
@@ -51,12 +53,12 @@ struct SampleHead {
   float low, scale;   // of the table
   float level;
   uint32_t
-      bricks;  // words of bricks: a bit each, x fastest, set where anything in it may be covered
+      bricks;  // words of bricks: a bit each, x fastest, 1 if anything in the brick may be covered
   uint32_t reserved[2];
 };
 inline constexpr uint32_t kSampleHeadWords = sizeof(SampleHead) / sizeof(uint32_t);
 
-// A kSamples' indices.
+// The indices of a kSamples.
 struct SampleView {
   const uint32_t* words;
 
@@ -94,7 +96,7 @@ struct SampleView {
 struct Samples {
   static constexpr PrimitiveKind kKind = PrimitiveKind::kSamples;
 
-  // Where it is looked for: as Implicit::Place.
+  // Sets the place of the shape, as Implicit::Place does.
   static void Place(const GeometryRecord& g, const uint32_t* words, const Affine& map,
                     const TileGrid& grid, int32_t tiles, Solid& solid, ImplicitPlace& place) {
     solid = Solid::Of(map, /*keep_thin=*/false);
@@ -131,7 +133,7 @@ struct Samples {
     }
   }
 
-  // Whether a voxel is covered, and its colour.
+  // Returns whether a voxel is covered, and its colour.
   VOXELD_HD static bool Covers(const Source& source, int32_t x, int32_t y, int32_t z,
                                uint32_t* rgb) {
     const SampleView view{source.indices};
@@ -155,12 +157,12 @@ struct Samples {
     return (entry & SampleHead::kDrawn) != 0;
   }
 
-  // Of the table.
+  // Returns the entry of the table for a value.
   VOXELD_HD static uint32_t EntryOf(const SampleHead& head, float value) {
     return EntryAt((value - head.low) * head.scale);
   }
 
-  // Of a voxel that is covered by a level.
+  // Returns the colour of a voxel that a level covers.
   VOXELD_HD static uint32_t ColorAtLevel(const Source& source, const SampleView& view, int32_t x,
                                          int32_t y, int32_t z) {
     if (view.head().by_level == 1) return source.UniformColor();
@@ -172,15 +174,16 @@ struct Samples {
     return Tinted(view.table()[EntryAt(place)], source.tint);
   }
 
-  // Whether some voxel of a box, which is not empty, may be covered: by the bricks around it.
+  // Returns whether, according to the bricks around it, some voxel of a box may be covered. An
+  // empty box has none.
   VOXELD_HD static bool MayHave(const Source& source, const Box3& box) {
     if (IsEmpty(box)) return false;
     const SampleView view{source.indices};
     const SampleHead& head = view.head();
     int32_t first[3], last[3];
     for (int r = 0; r < 3; ++r) {
-      // Of voxels' centres, and those of neighbours; in double, with room for the rounding of
-      // singles.
+      // The range of the centres of these voxels and of their neighbours, in double, with a margin
+      // for the rounding in single precision.
       double low = 0, high = 0, terms = 0;
       for (int c = 0; c < 3; ++c) {
         const double row = static_cast<double>(source.solid.inverse[r][c]);
@@ -213,15 +216,15 @@ struct Samples {
 
   VOXELD_HD static float Mix(float a, float b, float t) { return a + (b - a) * t; }
 
-  // Of corners, x fastest.
+  // Interpolates between corners, x fastest.
   VOXELD_HD static float MixCorners(const float corner[8], const float t[3]) {
     const float a = Mix(Mix(corner[0], corner[1], t[0]), Mix(corner[2], corner[3], t[0]), t[1]);
     const float b = Mix(Mix(corner[4], corner[5], t[0]), Mix(corner[6], corner[7], t[0]), t[1]);
     return Mix(a, b, t[2]);
   }
 
-  // Of a voxel with a depth: |P| ≤ h·|∇P|, the gradient in voxel space; of NEAREST grids there is
-  // none.
+  // Returns, for a voxel with a depth, whether |P| ≤ h·|∇P|, the gradient in voxel space. NEAREST
+  // grids have no gradient.
   VOXELD_HD VOXELD_DEVICE_NOINLINE static bool IsWithinShell(const Source& source,
                                                              const SampleView& view, int32_t x,
                                                              int32_t y, int32_t z, float depth) {
@@ -232,7 +235,7 @@ struct Samples {
     float corner[8], slope[3];
     CornersOf(view, cell, corner);
     for (int a = 0; a < 3; ++a) {
-      // Where the two samples of an axis are one, nothing changes along it.
+      // If the two samples of an axis are the same, nothing changes along it.
       float t[3] = {cell.t[0], cell.t[1], cell.t[2]};
       t[a] = 0;
       const float from = MixCorners(corner, t);
@@ -254,14 +257,14 @@ struct Samples {
     return place >= 255.0f ? 255 : static_cast<uint32_t>(place);
   }
 
-  // Where a voxel's centre lies: the samples around it, and how far it is from the first to the
-  // last.
+  // The position of a voxel's centre: the samples around it, and how far it is from the first to
+  // the last.
   struct Cell {
     int32_t at[3][2];
     float t[3];
   };
 
-  // False outside of the grid.
+  // Returns false outside the grid.
   VOXELD_HD static bool Find(const Source& source, const SampleView& view, int32_t x, int32_t y,
                              int32_t z, Cell* cell) {
     const Solid& s = source.solid;
@@ -300,7 +303,7 @@ struct Samples {
     return MixCorners(corner, cell.t);
   }
 
-  // 0xAARRGGBB.
+  // Returns 0xAARRGGBB.
   VOXELD_HD static uint32_t ColorIn(const SampleView& view, const Cell& cell) {
     if (view.head().filter == SampleFilter::kNearest) {
       return view.Word(view.IndexOf(cell.at[0][0], cell.at[1][0], cell.at[2][0]));
@@ -318,7 +321,7 @@ struct Samples {
     return color;
   }
 
-  // level − v; nothing is infinite, as what is no number.
+  // Returns level − v; infinite outside the grid and for NaN.
   VOXELD_HD VOXELD_DEVICE_NOINLINE static float Depth(const Source& source, const SampleView& view,
                                                       int32_t x, int32_t y, int32_t z) {
     Cell cell;

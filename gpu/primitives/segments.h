@@ -1,5 +1,5 @@
-// Segments, as a list, a strip or a loop: one voxel wide by their sampling rule; with a thickness
-// the capsule around each, and the line's own voxels.
+// Segments, as a list, a strip or a loop: one voxel wide by their sampling rule; with a thickness,
+// the capsule around each and the line's own voxels.
 #pragma once
 
 #include "gpu/primitives/capsule.h"
@@ -11,7 +11,7 @@ namespace voxeld::gpu {
 struct Segments {
   static constexpr PrimitiveKind kKind = PrimitiveKind::kSegments;
 
-  // A strip or loop of fewer than two corners has none.
+  // A strip or loop of fewer than two corners has no segments.
   VOXELD_HD static uint32_t Count(const Source& source) {
     const uint32_t corners = source.corners();
     if (source.record->topology == Topology::kList) return corners / 2;

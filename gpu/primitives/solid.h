@@ -1,21 +1,21 @@
-// What box, sphere and cylinder share: their canonical coordinates.
+// The canonical coordinates of solids: box, sphere and cylinder share them.
 //
 // q = inverse linear part · (voxel centre − origin), in IEEE single, in the order written here. The
-// origin is snapped to a unit and split into whole voxels and a rest, so a shift by whole voxels
-// shifts the shape. The inverse is computed in double and rounded once. A row of it with a greatest
-// component beyond kMaxRow is scaled down to it: so a shape thinner than a voxel is drawn one voxel
-// thick. (A voxel's step is then a little less than the shape's thickness of 2, which leaves room
-// for the rounding of q.)
+// origin is snapped to a unit and split into whole voxels and a remainder, so a shift by whole
+// voxels shifts the shape. The inverse is computed in double and rounded once. A row of it with a
+// greatest component beyond kMaxRow is scaled down to it, so that a shape thinner than a voxel is
+// drawn one voxel thick. (A voxel's step is then a little less than the shape's thickness of 2,
+// which leaves a margin for the rounding of q.)
 //
-// A voxel is inside if it lies in `bounds` (a little more than the shape's, in double; part of the
-// definition) and the shape's test of q holds. If that leaves out the voxel of the origin (of a
-// shape that misses every centre around it), it is covered all the same.
+// A voxel is inside if it lies in `bounds` (a little larger than the shape's, in double; part of
+// the definition) and q passes the shape's test. If that does not include the voxel of the origin
+// (the shape misses every centre around it), that voxel is covered too.
 //
-// Guarantee: a solid is the voxels whose centres the shape holds, but for 2·10⁻⁵ of its half axes,
-// and its volume is right within 1 % at a radius of 20 voxels; thinner than a voxel it is one voxel
-// thick. A shift by whole voxels shifts it. With a shell or a colour scale it is drawn as
-// gpu/implicit/field.h has it: the same solid, and a surface that is nowhere more than a voxel from
-// the plain one.
+// Guarantee: a solid covers the voxels whose centres are inside the shape, to within 2·10⁻⁵ of its
+// half axes, and its volume is right within 1 % at a radius of 20 voxels; a shape thinner than a
+// voxel is one voxel thick. A shift by whole voxels shifts it. With a shell or a colour scale it is
+// drawn as in gpu/implicit/field.h: the same solid, and a surface that is nowhere more than a voxel
+// from the plain one.
 #pragma once
 
 #include "gpu/affine.h"
@@ -32,7 +32,7 @@ struct Solid {
   Box3 bounds;
   bool drawable = false;  // false: no inverse, nothing is drawn
 
-  // `map`: canonical coordinates (each −1 to 1) → voxel space. `keep_thin`: rows are scaled down to
+  // `map`: canonical coordinates (each −1 to 1) → voxel space. `keep_thin`: scale rows down to
   // kMaxRow.
   VOXELD_HD static Solid Of(const Affine& map, bool keep_thin = true) {
     Solid s;
@@ -59,7 +59,7 @@ struct Solid {
         reach[c] = reach[c] + Abs(m[c * 4 + r]) / scale;
       }
     }
-    // By how much canonical coordinates are off in single precision, there, and what that makes in
+    // The error of canonical coordinates in single precision at that distance, and its size in
     // voxels.
     constexpr double kRounding = 2.5e-7;
     double spare[3] = {};
@@ -73,8 +73,8 @@ struct Solid {
       const int64_t units = Snap(m[a * 4 + 3]);
       s.origin[a] = VoxelOf(units);
       s.rest[a] = units - s.origin[a] * kUnitsPerVoxel;
-      // The centre of a voxel inside is no farther from the origin than that, and the origin less
-      // than half a voxel from the centre of its own.
+      // The centre of a voxel inside is at most that far from the origin, and the origin is less
+      // than half a voxel from the centre of its own voxel.
       const double far = reach[a] + spare[a] + 0.5625;
       const int64_t size = far < 1073741824.0 ? FloorToInt(far) : 1 << 30;
       s.bounds.lo[a] = ToVoxel32(s.origin[a] - size);
@@ -84,7 +84,7 @@ struct Solid {
     return s;
   }
 
-  // Of a voxel's centre from the origin along one axis, in voxels.
+  // Returns the distance of a voxel's centre from the origin along one axis, in voxels.
   VOXELD_HD float Distance(int axis, int64_t voxel) const {
     return static_cast<float>((voxel - origin[axis]) * kUnitsPerVoxel + kHalfVoxel - rest[axis]) *
            0.00390625f;
@@ -97,7 +97,7 @@ struct Solid {
   }
 };
 
-// Whether a voxel is inside. `Shape::Contains(q)` is the test of canonical coordinates.
+// Returns whether a voxel is inside. `Shape::Contains(q)` tests canonical coordinates.
 template <class Shape>
 VOXELD_HD bool IsInside(const Solid& s, int64_t x, int64_t y, int64_t z) {
   if (!Contains(s.bounds, x, y, z)) return false;

@@ -1,8 +1,8 @@
 // The voxels of a solid, filled or as its surface: the inside voxels with a neighbour outside,
 // among the 6 that share a face (THIN: 6-separating) or among all 26 (COVER). Host and device.
 //
-// Guarantee: the surface lies within the solid; no path of steps across faces gets through a THIN
-// one, no path at all through a COVER one.
+// Guarantee: the surface lies within the solid. No path of steps across faces passes through a THIN
+// surface, and no path at all through a COVER one.
 #pragma once
 
 #include "gpu/primitives/grid.h"
@@ -10,15 +10,15 @@
 
 namespace voxeld::gpu {
 
-// Rows of 32 voxels as bits, bit i for x0 + i: for a block of up to 16 × 16 rows and a rim of one
-// voxel all round. Larger boxes are drawn block by block.
+// Rows of 32 voxels as bits, bit i for x0 + i: for a block of up to 16 × 16 rows with a margin of
+// one voxel on all sides. Larger boxes are drawn block by block.
 struct SolidBlock {
   static constexpr int32_t kInner = kTileSize;
   static constexpr int32_t kRows = kInner + 2;
   uint32_t bits[kRows][kRows] = {};  // [z][y]
 
-  // What is inside among voxel (x0, y0, z0) and those up to (x1, y1, z1);
-  // at most kRows along each axis.
+  // Sets the bits of the voxels that are inside, from `lo` up to, but without, `hi`. Returns
+  // whether there are any. Requires: at most kRows along each axis.
   template <class Shape>
   VOXELD_HD bool Fill(const Solid& s, const int64_t lo[3], const int64_t hi[3]) {
     uint32_t any = 0;
@@ -28,7 +28,7 @@ struct SolidBlock {
     return any != 0;
   }
 
-  // One row of it; any number of rows at once.
+  // Fills one row of the block; rows may be filled in parallel.
   template <class Shape>
   VOXELD_HD uint32_t FillRow(const Solid& s, const int64_t lo[3], const int64_t hi[3], int64_t y,
                              int64_t z) {
@@ -46,7 +46,7 @@ struct SolidBlock {
     return row;
   }
 
-  // Of row (y, z), the voxels whose neighbours are all inside.
+  // Returns the voxels of row (y, z) whose neighbours are all inside.
   VOXELD_HD uint32_t Enclosed(int32_t y, int32_t z, SurfaceRule rule) const {
     if (rule == SurfaceRule::kThin) {
       const uint32_t row = bits[z][y];
@@ -86,7 +86,7 @@ VOXELD_HD void EmitSolidBlock(const Solid& s, const GeometryRecord& g, uint32_t 
   }
 }
 
-// What the three solids share. `Shape`: CanonicalMap and Contains.
+// The common part of the three solids. `Shape` has CanonicalMap and Contains.
 template <class Shape>
 struct SolidPrimitive {
   VOXELD_HD static uint32_t Count(const Source& source) { return source.solid.drawable ? 1 : 0; }
@@ -121,7 +121,7 @@ struct SolidPrimitive {
   }
 };
 
-// Canonical coordinates → the geometry's: centre and half sizes.
+// Returns the map from canonical coordinates to the geometry's, given by centre and half sizes.
 VOXELD_HD inline Affine CentreAndHalves(const float* centre, double hx, double hy, double hz) {
   Affine a;
   a.m[0] = hx;

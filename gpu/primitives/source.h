@@ -1,4 +1,4 @@
-// A drawable in voxel space, as flat arrays: what every primitive takes its items from.
+// A drawable in voxel space, as flat arrays: every primitive reads its items from them.
 #pragma once
 
 #include <cstring>
@@ -20,25 +20,24 @@ VOXELD_HD inline Int3 SnapPoint(const Affine& map, const float* p) {
   return r;
 }
 
-// Where an implicit shape is looked for (implicit.h).
+// The place of an implicit shape (implicit.h).
 struct ImplicitPlace {
   float voxel = 0;  // the edge of a voxel in the shape's units
   float half = 0;   // half the surface's thickness, voxels; 0: one voxel wide
   // Items: blocks of `edge` voxels.
   int32_t edge = 0, first[3] = {}, blocks[3] = {};
   const uint32_t* hoisted = nullptr;  // implicit/hoisted.h
-  // Of each item, which is a tile then, what is known (implicit.h); null: it is found out when
-  // asked for.
+  // The known state of each item, which must be a tile (implicit.h); null: computed when needed.
   const float* reach = nullptr;
-  // On a device, of each item the voxels that are covered, as rows (cuda/covered_types.h); null:
-  // likewise.
+  // On a device, the covered voxels of each item, as rows (cuda/covered_types.h); null: computed
+  // when needed.
   const uint16_t* rows = nullptr;
 };
 
 struct Source {
   const GeometryRecord* record = nullptr;
-  // record->vertex_count, mapped and snapped; null: made of `positions` by `map` as they are asked
-  // for.
+  // record->vertex_count vertices, mapped and snapped; null: computed from `positions` and `map`
+  // when needed.
   const Int3* vertices = nullptr;
   const float* positions = nullptr;
   Affine map;                         // the geometry's coordinates → voxel space
@@ -46,15 +45,14 @@ struct Source {
   const uint32_t* colors = nullptr;   // ColorCount(*record)
   uint32_t tint = 0x00FFFFFF;         // DrawableRecord
   int64_t radius = 0;                 // of points, segments and triangles, units; 0: one voxel
-  Solid solid;                        // kBox, kSphere, kCylinder, kImplicit; of kFilled the bounds
-  ImplicitPlace implicit;  // kImplicit, whose program `indices` are; of kFilled the blocks
-  const uint32_t* inside =
-      nullptr;  // kFilled: InsideRows (filled.h); null: found out anew each time
-  // Of each item, which is a tile then, whether anything in it is inside; null: found out from
+  Solid solid;                        // kBox, kSphere, kCylinder, kImplicit; for kFilled the bounds
+  ImplicitPlace implicit;  // kImplicit, whose program is `indices`; for kFilled the blocks
+  const uint32_t* inside = nullptr;  // kFilled: InsideRows (filled.h); null: computed each time
+  // For each item, which must be a tile, whether anything in it is inside; null: computed from
   // `inside`.
   const uint8_t* inside_tiles = nullptr;
 
-  // Corners are what indices name, or the vertices as they stand.
+  // Corners are the vertices that indices name or, without indices, the vertices in order.
   VOXELD_HD uint32_t corners() const {
     return record->index_count != 0 ? record->index_count : record->vertex_count;
   }
@@ -70,7 +68,7 @@ struct Source {
                   tint);
   }
   VOXELD_HD bool IsTextured() const { return record->texture_width != 0; }
-  // Of a vertex, with a texture.
+  // Reads a vertex' place. Requires: a texture.
   VOXELD_HD void PlaceOnTexture(uint32_t vertex, float place[2]) const {
     std::memcpy(place, places() + static_cast<size_t>(vertex) * 2, 2 * sizeof(float));
   }
@@ -85,7 +83,7 @@ struct Source {
   }
 };
 
-// The cube root of x ≥ 0 in IEEE double: a guess from the exponent, then Newton's steps.
+// Returns the cube root of x ≥ 0 in IEEE double: a guess from the exponent, then Newton's steps.
 VOXELD_HD inline double CubeRoot(double x) {
   if (!(x > 0)) return 0;
   if (x > 1e300) return 1e100;
@@ -98,7 +96,7 @@ VOXELD_HD inline double CubeRoot(double x) {
   return y;
 }
 
-// Half the thickness, in units. `map`: from the geometry's coordinates to voxel space.
+// Returns half the thickness, in units. `map`: from the geometry's coordinates to voxel space.
 VOXELD_HD inline int64_t RadiusOf(const GeometryRecord& g, const Affine& map) {
   double thickness = static_cast<double>(g.thickness);
   if (g.thickness_unit == ThicknessUnit::kUnits) {

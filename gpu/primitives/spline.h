@@ -1,10 +1,10 @@
-// Smooth curves along points, as cubic Béziers: through them all (Catmull–Rom, whose tangents are
-// half of the way between neighbours), or near them (uniform cubic B-splines), and Béziers as they
-// are. An open one continues in a straight line, so it begins and ends in the outermost
+// Smooth curves along points, as cubic Béziers: through all points (Catmull–Rom, whose tangents are
+// half the vector between neighbours), or near them (uniform cubic B-splines), and Béziers
+// themselves. An open curve is extended in a straight line, so it begins and ends in the outermost
 // points.
 //
-// Guarantee: a curve begins and ends in its outermost points; Catmull–Rom goes through all its points;
-// it and B-splines are smooth.
+// Guarantee: a curve begins and ends in its outermost points. Catmull–Rom goes through all its
+// points; Catmull–Rom and B-splines are smooth.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ struct Spline {
   SplineForm form = SplineForm::kCatmullRom;
   bool closed = false;
 
-  // Of n points: what a message may have.
+  // Returns whether the number of points is valid for the form.
   bool Fits() const {
     const size_t n = points.size();
     switch (form) {
@@ -34,8 +34,8 @@ struct Spline {
     }
   }
 
-  // each(from, to): the points that a span goes from and to, or, of a B-spline, that its ends lie
-  // nearest to.
+  // Calls each(from, to) for every span: the points at its ends or, for a B-spline, the points
+  // nearest to its ends.
   template <typename Each>
   void ForEachJoint(Each&& each) const {
     const size_t step = form == SplineForm::kBezier ? 3 : form == SplineForm::kQuadratic ? 2 : 1;
@@ -43,7 +43,7 @@ struct Spline {
     for (size_t i = 0; i < count; ++i) each(i * step, (i + 1) * step % n);
   }
 
-  // Fits. In the order of ForEachJoint.
+  // Adds the spans in the order of ForEachJoint. Requires: Fits().
   void Make(Spans& spans) const {
     using implicit::Vector;
     ForEachJoint([&](size_t from, size_t to) {
@@ -65,7 +65,7 @@ struct Spline {
   }
 
  private:
-  // The point before or after one, past an open end by reflection.
+  // Returns the point before or after one; past an open end it is reflected.
   implicit::Vector At(size_t i, int step) const {
     const size_t n = points.size();
     if (closed) return points[(i + (step < 0 ? n - 1 : 1)) % n];

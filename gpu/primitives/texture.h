@@ -1,12 +1,12 @@
-// Pictures on triangles.
+// Textures on triangles.
 //
-// A texture is kept in levels: the first as it is, each of the others of half the sides of the one
-// before, rounded down, until both are 1. A triangle takes the first level whose texels are on the
-// average no smaller than half a voxel's face along its normal's greatest component, or the last. A
-// voxel takes the texel at the place that its centre has, weighted as colours are (triangle.h); a
-// vertex's voxel that at the vertex's.
+// A texture is stored in levels: the first is the image itself, and each of the others has half the
+// sides of the one before, rounded down, until both are 1. A triangle uses the first level whose
+// texels are on average no smaller than half a voxel's face, as seen along its normal's greatest
+// component, or else the last level. A voxel has the texel at the place of its centre, weighted as
+// colours are (triangle.h); a vertex's voxel has the texel at the vertex's place.
 //
-// Places: (0, 0) is the picture's upper left corner, (1, 1) its lower right one; beyond them it
+// Places: (0, 0) is the image's upper left corner, (1, 1) its lower right one; beyond them it
 // repeats. A whole number above 0 is the end of a repetition, not the beginning of the next.
 #pragma once
 
@@ -20,7 +20,8 @@ namespace voxeld::gpu {
 
 VOXELD_HD inline uint32_t HalfSide(uint32_t side) { return side > 1 ? side / 2 : 1; }
 
-// Texels of all levels; a level's come row by row, from the upper left, 0x00RRGGBB.
+// Returns the number of texels of all levels. The texels of a level are stored row by row, from the
+// upper left, as 0x00RRGGBB.
 VOXELD_HD inline uint64_t TexelCount(uint32_t width, uint32_t height) {
   uint64_t count = static_cast<uint64_t>(width) * height;
   while (width > 1 || height > 1) {
@@ -30,13 +31,13 @@ VOXELD_HD inline uint64_t TexelCount(uint32_t width, uint32_t height) {
   return count;
 }
 
-// Where a triangle lies on one level.
+// The place of a triangle on one level.
 struct TexturePlace {
-  const uint32_t* texels = nullptr;  // null: none
+  const uint32_t* texels = nullptr;  // null: no texture
   uint32_t width = 0, height = 0;
   float at[3][2] = {};  // of the corners
 
-  // Takes the level for a triangle with these corners.
+  // Chooses the level for a triangle with these corners.
   VOXELD_HD void ChooseLevel(const Int3 (&corners)[3]) {
     double edge[2][3], voxels = 0;  // twice the area
     for (int a = 0; a < 3; ++a) {
@@ -68,9 +69,9 @@ struct TexturePlace {
   }
 
  private:
-  // Of `count` along a side.
+  // Returns the index of the texel among `count` along a side.
   VOXELD_HD static uint32_t Row(double place, uint32_t count) {
-    constexpr double kFar = 1e12;  // also what is no number
+    constexpr double kFar = 1e12;  // also for NaN
     if (!(place > -kFar && place < kFar)) return 0;
     double whole = static_cast<double>(static_cast<int64_t>(place));
     if (whole > place || (whole == place && place > 0)) --whole;

@@ -1,16 +1,16 @@
-// Thick triangles: all voxels whose centre lies within a radius of a triangle (closed, its edges
-// and corners too), in voxel space. One without area is the segment, or the point, that it is.
+// Thick triangles: all voxels whose centre lies within a radius of a (closed) triangle, including
+// its edges and corners, in voxel space. A triangle without area is a segment or a point.
 //
 // Evaluated in IEEE double, in the order written here, from differences of positions, which are
-// exact: a shift by whole voxels shifts the result. Vertices are taken in lexicographic order, so
-// that any order of theirs gives the same voxels.
+// exact: a shift by whole voxels shifts the result. Vertices are sorted lexicographically, so that
+// any order of them gives the same voxels.
 //
-// Colour: that of the triangle at the place nearest to the voxel's centre, whose weights are worked
-// out in double, to the nearest of 255 a channel, halves up; with a texture multiplied by its texel
-// there. Of places equally near on two edges that on the first. Where several triangles cover a
-// voxel, as on both sides of an edge that they share, its word is the greatest, as everywhere. (A
-// thin triangle's own voxels, which are drawn as well, have theirs by triangle.h: at their centres
-// as seen along an axis.)
+// Colour: the colour of the triangle at the place nearest to the voxel's centre. Its weights are
+// computed in double and rounded to the nearest of 255 for each channel, halves up; with a texture
+// it is multiplied by the texel there. Of places equally near on two edges, the one on the first
+// edge counts. If several triangles cover a voxel, as on both sides of an edge that they share, its
+// word is the greatest, as everywhere. (The voxels of the thin triangle, which are drawn as well,
+// have their colours by triangle.h: at their centres, as seen along an axis.)
 #pragma once
 
 #include "gpu/primitives/capsule.h"
@@ -19,7 +19,7 @@
 
 namespace voxeld::gpu {
 
-// A point as seen from the three corners of a thick triangle, units.
+// The vectors to a point from the three corners of a thick triangle, in units.
 struct FromCorners {
   double w[3][3];
 
@@ -39,7 +39,7 @@ struct ThickTriangle {
   double normal2;     // |normal|²; 0: it has no area
   double side[3][3];  // across edge i, to the inside
 
-  // `radius` in units, 1 or more.
+  // Requires: `radius` is in units, at least 1.
   VOXELD_HD static ThickTriangle Of(const Triangle& t, int64_t radius) {
     ThickTriangle thick;
     thick.triangle = Ordered(t);
@@ -62,7 +62,7 @@ struct ThickTriangle {
     return thick;
   }
 
-  // Of the centre of a voxel, or of what lies `units` beyond its lower corner.
+  // Returns the vectors to the centre of a voxel, or to the point `units` beyond its lower corner.
   VOXELD_HD FromCorners Seen(int64_t x, int64_t y, int64_t z, int64_t units = kHalfVoxel) const {
     const int64_t p[3] = {x, y, z};
     FromCorners seen;
@@ -74,7 +74,7 @@ struct ThickTriangle {
     return seen;
   }
 
-  // Whether a point lies within `r` of the triangle.
+  // Returns whether a point lies within `r` of the triangle.
   VOXELD_HD bool Within(const FromCorners& at, double r) const {
     bool above = normal2 > 0;
     for (int i = 0; i < 3; ++i) above = above && !IsBeyond(at, i);
@@ -141,7 +141,7 @@ struct ThickTriangle {
     b = kept;
   }
 
-  // Exact, but for its conversion.
+  // Exact, except for its conversion.
   template <class I>
   VOXELD_HD void SetNormal() {
     const TriangleSetup<I> setup(triangle);
@@ -150,10 +150,10 @@ struct ThickTriangle {
     }
   }
 
-  // Whether it is on the other side of edge i than the triangle, as seen along the normal.
+  // Returns whether the point is outside edge i, as seen along the normal.
   VOXELD_HD bool IsBeyond(const FromCorners& at, int i) const { return Dot(side[i], at.w[i]) < 0; }
 
-  // How much each corner has of the nearest place; what they have in all, which is not 0.
+  // Computes the weights of the corners at the nearest place; returns their sum, which is not 0.
   VOXELD_HD double Weigh(const FromCorners& at, double weight[3]) const {
     bool above = normal2 > 0;
     for (int i = 0; i < 3; ++i) above = above && !IsBeyond(at, i);
@@ -188,12 +188,12 @@ struct ThickTriangle {
   }
 };
 
-// Of a thick triangle, without its thin voxels.
+// Emits the voxels of a thick triangle, without its thin voxels.
 template <class Emit>
 VOXELD_HD VOXELD_DEVICE_NOINLINE void EmitThick(const Triangle& t, int64_t radius, const Box3& box,
                                                 Emit emit) {
-  // Blocks of 4³ voxels whose middle is farther from the triangle than any centre of theirs can be
-  // are passed over: 1.5·√3 voxels and some.
+  // Skips blocks of 4³ voxels whose middle is farther from the triangle than any of their centres
+  // can be from their middle: 1.5·√3 voxels and a margin.
   constexpr int32_t kBlock = 4;
   constexpr double kReach = 720;
   const Box3 b = Intersect(box, BoundsOf(t, radius));

@@ -1,5 +1,5 @@
-// A torus around its own z axis: the distance from the circle of `radius` in the plane through its
-// centre, less the tube's radius.
+// A torus around its own z axis: P is the distance from the circle of `radius` in the plane through
+// its centre, minus the tube's radius.
 #pragma once
 
 #include "gpu/implicit/field_shape.h"

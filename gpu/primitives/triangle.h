@@ -7,14 +7,14 @@
 // triangle without area is the line of its longest edge (the first of 01, 12, 20 if equal), THIN or
 // COVER, and its vertices' voxels.
 //
-// Colour: weights are the areas opposite to the vertices in the projection along the axis of the
-// normal's greatest component (ties: x before y before z), taken at the voxel's centre and clamped
-// at 0; (Σ w·C + ⌊Σw/2⌋) / Σw a channel. With a texture (texture.h) that is multiplied by its
-// texel, at the place weighted in double precision.
+// Colour: the weights are the areas opposite to the vertices in the projection along the axis of
+// the normal's greatest component (ties: x before y before z), taken at the voxel's centre and
+// clamped at 0; the colour is (Σ w·C + ⌊Σw/2⌋) / Σw for each channel. With a texture (texture.h) it
+// is multiplied by the texel at the place that is weighted in double precision.
 //
-// Guarantee: exact. A closed mesh of THIN triangles is 6-separating, of COVER ones 26-separating;
-// the centre of what is lit is within half a voxel (COVER, and corners: half a voxel's diagonal) of
-// the triangle. A shift by whole voxels shifts the result.
+// Guarantee: exact. A closed mesh of THIN triangles is 6-separating, one of COVER triangles
+// 26-separating. The centre of a covered voxel is within half a voxel (COVER, and corners: half a
+// voxel's diagonal) of the triangle. A shift by whole voxels shifts the result.
 #pragma once
 
 #include "gpu/primitives/fixed.h"
@@ -39,8 +39,8 @@ struct Triangle {
   }
 };
 
-// All voxels whose closed boxes the triangle's bounding box meets; with a radius (units) also all
-// whose centres are within it.
+// Returns a box of all voxels whose closed boxes meet the triangle's bounding box; with a radius
+// (units) also of all voxels whose centres are within it.
 VOXELD_HD inline Box3 BoundsOf(const Triangle& t, int64_t radius = 0) {
   Box3 b;
   for (int a = 0; a < 3; ++a) {
@@ -52,14 +52,15 @@ VOXELD_HD inline Box3 BoundsOf(const Triangle& t, int64_t radius = 0) {
   return b;
 }
 
-// Of a number that is not negative: both machines round alike.
+// Converts a number that is not negative: host and device round alike.
 VOXELD_HD inline double ToDouble(int64_t value) { return static_cast<double>(value); }
 VOXELD_HD inline double ToDouble(Wide value) {
   return static_cast<double>(static_cast<int64_t>(value >> 64)) * 0x1p64 +
          static_cast<double>(static_cast<uint64_t>(value));
 }
 
-// Relative to the voxel that holds vertex 0. `I`: 64 bits for extents up to 2¹⁹ units, else 128.
+// Coordinates are relative to the voxel that holds vertex 0. `I`: 64 bits for extents up to 2¹⁹
+// units, otherwise 128.
 template <class I>
 struct TriangleSetup {
   int64_t origin[3];
@@ -82,13 +83,13 @@ struct TriangleSetup {
     }
   }
 
-  // Centre of a voxel on axis `a`, relative.
+  // Returns the centre of a voxel on axis `a`, relative.
   VOXELD_HD I Centre(int a, int64_t voxel) const {
     return static_cast<I>(voxel - origin[a]) * kUnitsPerVoxel + kHalfVoxel;
   }
 
-  // Twice the signed area of edge i → i+1 with the point (qb, qc),
-  // projected along `a`; positive inside.
+  // Returns twice the signed area of edge i → i+1 with the point (qb, qc), projected along `a`;
+  // positive inside.
   VOXELD_HD I Edge(int a, int i, I qb, I qc) const {
     const int b = (a + 1) % 3, c = (a + 2) % 3, j = (i + 1) % 3;
     const I area = (p[j][b] - p[i][b]) * (qc - p[i][c]) - (p[j][c] - p[i][c]) * (qb - p[i][b]);
@@ -125,7 +126,7 @@ struct TriangleSetup {
   }
 };
 
-// `box`, not empty, lies within the triangle's bounds.
+// Requires: `box` is not empty and lies within the triangle's bounds.
 template <class I, class Emit>
 VOXELD_HD void EmitThinAlong(const Triangle& t, const TriangleSetup<I>& s, int a, const Box3& box,
                              Emit&& emit) {
@@ -145,7 +146,7 @@ VOXELD_HD void EmitThinAlong(const Triangle& t, const TriangleSetup<I>& s, int a
   for (int32_t vc = box.lo[c]; vc < box.hi[c]; ++vc) {
     const I qc = s.Centre(c, vc);
     I e0 = s.Edge(a, 0, qb0, qc), e1 = s.Edge(a, 1, qb0, qc), e2 = s.Edge(a, 2, qb0, qc);
-    // Depth times |n_a|.
+    // The depth times |n_a|.
     I depth = Abs(s.n[a]) * s.p[0][a] - nb * (qb0 - s.p[0][b]) - nc * (qc - s.p[0][c]);
     for (int32_t vb = box.lo[b]; vb < box.hi[b]; ++vb) {
       if (e0 >= 0 && e1 >= 0 && e2 >= 0 && depth >= low && depth < high) {
@@ -222,7 +223,7 @@ VOXELD_HD void EmitCover(const Triangle& t, const TriangleSetup<I>& s, const Box
   }
 }
 
-// The longest edge, as a line.
+// Returns the longest edge, as a line.
 VOXELD_HD VOXELD_DEVICE_NOINLINE inline Line LongestEdge(const Triangle& t) {
   int longest = 0;
   Wide greatest = -1;
@@ -239,7 +240,8 @@ VOXELD_HD VOXELD_DEVICE_NOINLINE inline Line LongestEdge(const Triangle& t) {
           t.rule == SurfaceRule::kThin ? LineSampling::kThin : LineSampling::kCover};
 }
 
-// The inner voxels of a triangle with an area; false: it has none. `part`, not empty, lies within its bounds.
+// Emits the inner voxels of a triangle with an area. Returns false if it has no area. Requires:
+// `part` is not empty and lies within the triangle's bounds.
 template <class I, class Emit>
 VOXELD_HD VOXELD_DEVICE_NOINLINE bool EmitArea(const Triangle& t, const Box3& part, Emit emit) {
   const TriangleSetup<I> setup(t);
@@ -264,7 +266,7 @@ VOXELD_HD inline int64_t Extent(const Triangle& t) {
   return extent;
 }
 
-// narrow: TriangleSetup's products fit 64 bits.
+// narrow: TriangleSetup's products fit in 64 bits.
 template <class Emit>
 VOXELD_HD void EmitTriangle(const Triangle& t, const Box3& box, bool narrow, Emit&& emit) {
   const Box3 part = Intersect(box, BoundsOf(t));

@@ -1,5 +1,5 @@
-// Triangles, indexed or not: three corners each; one voxel wide by their rule (triangle.h); with a
-// thickness what lies within half of it as well (thick_triangle.h).
+// Triangles, indexed or not: three corners each. They are one voxel wide by their rule
+// (triangle.h); with a thickness, voxels within half of it are covered as well (thick_triangle.h).
 #pragma once
 
 #include "gpu/primitives/grid.h"
@@ -9,8 +9,8 @@
 
 namespace voxeld::gpu {
 
-// Whether the triangle, or what lies within `radius` units of it, may meet a box of voxels:
-// separating axes in double, with room for rounding.
+// Returns whether the triangle, or the points within `radius` units of it, may meet a box of
+// voxels: separating axes in double, with a margin for rounding.
 VOXELD_HD inline bool MayMeet(const Triangle& t, const Box3& box, int64_t radius = 0) {
   const double room = static_cast<double>(radius) + 2;
   double half[3], p[3][3], e[3][3];
@@ -72,7 +72,7 @@ struct Triangles {
     const Box3 tiles = grid.TilesOf(bounds);
     const int32_t x = tiles.hi[0] - tiles.lo[0], y = tiles.hi[1] - tiles.lo[1],
                   z = tiles.hi[2] - tiles.lo[2];
-    // In two tiles or fewer there is little to win.
+    // For two tiles or fewer, testing does not pay off.
     if (static_cast<int64_t>(x) * y * z <= 2) return EmitTilesOfBox(bounds, grid, emit);
     EmitTilesOfBox(bounds, grid, [&](uint32_t tile) {
       if (MayMeet(t, grid.VoxelsOf(tile), source.radius)) emit(tile);

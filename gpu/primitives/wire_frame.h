@@ -1,5 +1,5 @@
-// Shapes as lines, and as dots where those meet: edges of what has any, of what is round meridians
-// and parallels, 45° apart.
+// Shapes as lines, and as dots where those meet: the edges of shapes that have any; for round
+// shapes, meridians and parallels 45° apart.
 #pragma once
 
 #include <numbers>
@@ -95,7 +95,7 @@ inline WireFrame WireFrameOf(const Cone& shape) {
   const Vector unit = 1 / length * axis;
   Vector u, v;
   if (!FrameOf(axis, {1, 0, 0}, &u, &v)) FrameOf(axis, {0, 1, 0}, &u, &v);
-  // With round ends the mantle touches the spheres off their middles.
+  // With round ends, the mantle does not touch the spheres at their middles.
   const double fall = shape.round ? (shape.start_radius - shape.end_radius) / length : 0;
   const double slant = std::sqrt(std::max(0.0, 1 - fall * fall));
   const double tilt = std::asin(std::clamp(fall, -1.0, 1.0));
