@@ -10,11 +10,12 @@ namespace {
 
 constexpr size_t kSide = kNoiseSide, kCount = kNoiseRanks;
 constexpr double kSigma =
-    1.5;  // of the Gaussian by which pixels weigh on each other, as the paper has it
-constexpr size_t kReach = 9;  // farther off a weight is less than half of the least there is
+    1.5;  // of the Gaussian with which pixels weigh on each other, as in the paper
+constexpr size_t kReach = 9;  // farther off, a weight is less than half of the smallest weight
 constexpr size_t kFirstOnes = kCount / 10;
 
-// Which pixels are ones, and how much these weigh on every pixel, in whole numbers: sums do not depend on their order.
+// The pixels that are ones, and the sum of their weights on every pixel, in whole numbers: sums do
+// not depend on their order.
 class Pattern {
  public:
   Pattern() : kernel_(kCount), weight_(kCount), ones_(kCount), extremes_(kSide) {
@@ -42,7 +43,8 @@ class Pattern {
       extremes_[y] = ExtremesOf(y);
     }
   }
-  // The one that others weigh on most; the zero that ones weigh on least. The first of several.
+  // Return the one on which the others weigh most, and the zero on which ones weigh least; the
+  // first of several.
   size_t TightestCluster() const {
     size_t best = kNone;
     for (const Extremes& row : extremes_) {
@@ -82,7 +84,7 @@ class Pattern {
   std::vector<Extremes> extremes_;  // of each row
 };
 
-// Ones at random, moved from clusters into voids until that changes nothing.
+// Places ones at random, then moves them from clusters into voids until that changes nothing.
 void Relax(Pattern& pattern) {
   std::mt19937 random(1);
   for (size_t left = kFirstOnes; left > 0;) {
@@ -110,7 +112,8 @@ std::array<uint16_t, kCount> MakeRanks() {
     first.Set(at, false);
     ranks[at] = static_cast<uint16_t>(rank);
   }
-  // What the zeros weigh is what all weigh less what the ones weigh: the largest void is the zeros' tightest cluster.
+  // The zeros' weight is the weight of all pixels minus that of the ones, so the largest void is
+  // the zeros' tightest cluster.
   for (size_t rank = kFirstOnes; rank < kCount; ++rank) {
     const size_t at = pattern.LargestVoid();
     pattern.Set(at, true);

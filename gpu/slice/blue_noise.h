@@ -8,8 +8,9 @@
 
 namespace voxeld::gpu {
 
-// kNoiseRanks ranks (quantize.h), row-major, each once: the pixels of rank below n lie as evenly as n pixels can, around the
-// edges too. Always the same; made when a process first asks.
+// Returns kNoiseRanks ranks (quantize.h), row-major, each once: the pixels of rank below n are as
+// evenly distributed as n pixels can be, around the edges too. The ranks are always the same; the
+// first call in a process computes them.
 const std::array<uint16_t, kNoiseRanks>& BlueNoise();
 
 }  // namespace voxeld::gpu

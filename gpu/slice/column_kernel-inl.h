@@ -1,4 +1,4 @@
-// What column_kernel.cc calls, once for each instruction set.
+// The functions that column_kernel.cc calls, compiled once for each instruction set.
 #if defined(VOXELD_GPU_SLICE_COLUMN_KERNEL_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef VOXELD_GPU_SLICE_COLUMN_KERNEL_INL_H_
 #undef VOXELD_GPU_SLICE_COLUMN_KERNEL_INL_H_
@@ -55,7 +55,8 @@ inline void Transpose(const uint8_t (&columns)[kColumnsTogether][kChunkRows], ui
 using Bytes = hn::CappedTag<uint8_t, kChunkRows>;
 using VBytes = hn::Vec<Bytes>;
 
-// Nibble n of a colour's 24 interleaved bits → the bits of a channel that it holds, where they belong.
+// Maps nibble n of a colour's 24 interleaved bits to the bits of a channel that it holds, in their
+// places.
 struct NibbleTables {
   uint8_t bits[3][6][16];
 
@@ -78,7 +79,7 @@ struct NibbleTables {
 alignas(16) constexpr NibbleTables kNibbles;
 
 #if HWY_TARGET == HWY_AVX3_DL
-// Where byte b of each of 32 words lies.
+// The places of byte b of each of 32 words.
 struct WordBytes {
   uint8_t at[3][64];
 
@@ -97,7 +98,7 @@ HWY_ATTR inline VBytes HighNibble(VBytes v) {
   return hn::And(hn::BitCast(d, hn::ShiftRight<4>(hn::BitCast(d16, v))), hn::Set(d, 0x0F));
 }
 
-// table[index] of 256 bytes.
+// Returns table[index] for a table of 256 bytes.
 HWY_ATTR inline VBytes LookUp(const uint8_t* table, VBytes index) {
 #if HWY_TARGET == HWY_AVX3_DL
   const auto part = [&](int i) HWY_ATTR { return _mm512_load_si512(table + 64 * i); };
@@ -108,11 +109,12 @@ HWY_ATTR inline VBytes LookUp(const uint8_t* table, VBytes index) {
   const Bytes d;
   VBytes out = hn::Zero(d);
   for (uint8_t high = 0; high < 16; ++high) {
-    // Below 0x80 only where the upper nibble is `high`; from there on the look-up gives 0.
+    // The value is below 0x80 only if the upper nibble is `high`; for other values the look-up
+    // gives 0.
     VBytes at = hn::SaturatedAdd(hn::Xor(index, hn::Set(d, static_cast<uint8_t>(high << 4))),
                                  hn::Set(d, 0x70));
 #if !HWY_ARCH_X86 || HWY_TARGET == HWY_EMU128
-    at = hn::And(at, hn::Set(d, 0x8F));  // the others look at the bits between as well
+    at = hn::And(at, hn::Set(d, 0x8F));  // the other targets use the bits between as well
 #endif
     out = hn::Or(out, hn::TableLookupBytesOr0(hn::LoadDup128(d, table + 16 * high), at));
   }
@@ -121,7 +123,7 @@ HWY_ATTR inline VBytes LookUp(const uint8_t* table, VBytes index) {
 }
 
 #if HWY_TARGET == HWY_AVX3_DL
-// Byte `byte` of 64 words in four vectors.
+// Returns byte `byte` of 64 words in four vectors.
 HWY_ATTR inline VBytes BytesOfWords(const __m512i (&words)[4], size_t byte) {
   const __m512i at = _mm512_load_si512(kWordBytes.at[byte]);
   const __m512i low = _mm512_permutex2var_epi8(words[0], at, words[1]);
@@ -190,7 +192,7 @@ HWY_ATTR inline void LevelChunksIn(const LevelTables& tables,
   }
 }
 
-// A chunk's pixels: bytes of RGB332.
+// Computes a chunk's pixels: bytes of RGB332.
 HWY_ATTR inline void QuantizeChunk(const uint8_t* levels, uint64_t dither, uint8_t* pixels) {
   const Bytes d;
   const hn::RebindToSigned<Bytes> ds;  // values below 128
@@ -207,9 +209,10 @@ HWY_ATTR inline void QuantizeChunk(const uint8_t* levels, uint64_t dither, uint8
   }
 }
 
-// Columns of a chunk to its rows, `stride` apart. Of sixteen columns in four rounds, in each of which the highest bit
-// of a column's number becomes the lowest of its place; a vector holds sixteen rows of a column in each block. Rows of
-// two sixteens are stored together.
+// Transposes columns of a chunk into rows, `stride` apart. Sixteen columns take four rounds, in
+// each of which the highest bit of a column's number becomes the lowest of its place; a vector
+// holds sixteen rows of a column in each block. Rows of two groups of sixteen columns are stored
+// together.
 HWY_ATTR inline void Transpose(const uint8_t (&columns)[kColumnsTogether][kChunkRows], uint8_t* out,
                                size_t stride) {
   static_assert(kColumnsTogether == 32, "two sixteens");
@@ -245,7 +248,7 @@ HWY_ATTR inline void Transpose(const uint8_t (&columns)[kColumnsTogether][kChunk
 
 #endif
 
-// A block of columns of one chunk.
+// Draws a block of columns of one chunk.
 HWY_ATTR inline void DrawBlock(const uint8_t* const* levels, const uint64_t (&dither)[8],
                                uint8_t* out, size_t stride) {
   if (std::all_of(levels, levels + kColumnsTogether,
@@ -266,7 +269,8 @@ HWY_ATTR inline void DrawBlock(const uint8_t* const* levels, const uint64_t (&di
   Transpose(pixels, out, stride);
 }
 
-// Block by block in all pictures: neighbouring slices have most of a block's columns in common.
+// Goes block by block through all slice images: neighbouring slices have most of a block's columns
+// in common.
 HWY_ATTR inline void DrawRgb332In(std::span<const uint8_t* const> levels, size_t columns,
                                   size_t chunks, const uint64_t (&dither)[8], uint8_t* out) {
   const size_t places = chunks * columns;

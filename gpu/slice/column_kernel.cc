@@ -6,7 +6,7 @@
 
 #include "gpu/word.h"
 
-// Look-ups among 256 bytes are worth a target of their own.
+// Look-ups among 256 bytes justify a target of their own.
 #define HWY_WANT_AVX3_DL
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE

@@ -1,5 +1,5 @@
-// What becomes of a pixel's colour: light by its channels' curves, turned down where pixels crowd, dithered to levels. Host
-// and device; the definition for every engine.
+// Converts a pixel's colour to levels: light by its channels' curves, dimmed where pixels are
+// dense, dithered to levels. Host and device; the definition for every engine.
 #pragma once
 
 #include <cstdint>
@@ -22,22 +22,22 @@ VOXELD_HD inline uint32_t Dim(uint32_t light, uint32_t factor) {
   return (light * factor + kFullLight / 2) / kFullLight;
 }
 
-// Tables of a target (light_plan.h). Arrays outlive it.
+// Tables of a target (light_plan.h). The arrays must outlive it.
 struct Finish {
   display::PixelFormat format = display::PixelFormat::kRgb888;
   display::Dither dither = display::Dither::kNone;
-  uint32_t bits = 8;  // a channel
+  uint32_t bits = 8;  // per channel
   uint32_t sub_frames = 1;
   const uint16_t* curves = nullptr;  // 256 each of red, green and blue
   const uint16_t* noise = nullptr;   // kNoiseRanks of kBlueNoise, else null
   const uint16_t* factors =
-      nullptr;  // of each outer row of the footprints (slice·columns + column); null: all are full
+      nullptr;  // for each outer row of the footprints (slice·columns + column); null: all are full
 
   VOXELD_HD Light LightOf(uint32_t rgb) const {
     return {curves[rgb >> 16], curves[256 + (rgb >> 8 & 0xFF)], curves[512 + (rgb & 0xFF)]};
   }
 
-  // The light of colour 0x00RRGGBB in a pixel of that outer row.
+  // Returns the light of colour 0x00RRGGBB in a pixel of that outer row.
   VOXELD_HD Light LightAt(uint32_t rgb, size_t row) const {
     const Light full = LightOf(rgb);
     if (factors == nullptr) return full;

@@ -12,8 +12,8 @@
 namespace voxeld::gpu {
 namespace {
 
-constexpr size_t kMostChunks = 64;  // bits of lit_
-// Beyond it, sampling pixel by pixel is no worse.
+constexpr size_t kMostChunks = 64;  // the number of bits in lit_
+// Above this limit, sampling pixel by pixel is no worse.
 constexpr uint64_t kMostLevelBytes = uint64_t{1} << 30;
 constexpr size_t kColumnsATask = 64;
 constexpr size_t kBlocks = kChunkRows / kBlockWords;  // of a chunk
@@ -21,7 +21,8 @@ static_assert(kBlockWords == kTileSize, "a run of a chunk's rows lies in one til
 
 constexpr uint32_t kNoLight[kBlockWords] = {};
 
-// The voxel of row 0, if row v takes its colour from the voxel v further alone, in every set of inner lists.
+// Returns the voxel of row 0 if, in every set of inner lists, row v takes its colour only from the
+// voxel v further on.
 std::optional<int32_t> FirstOfStraightRows(const display::FootprintTable& table, int axis) {
   std::optional<int32_t> first;
   for (int32_t set = 0; set < table.inner_sets; ++set) {
@@ -39,7 +40,7 @@ std::optional<int32_t> FirstOfStraightRows(const display::FootprintTable& table,
   return first;
 }
 
-// Outer entries say nothing of the inner axis; those of lattices may.
+// Tests that outer entries do not use the inner axis; those of lattices may.
 bool AreFlat(const display::FootprintLists& outer, int axis) {
   return std::all_of(outer.entries.begin(), outer.entries.end(), [axis](const auto& e) {
     const int32_t at[3] = {e.x, e.y, e.z};
@@ -91,7 +92,7 @@ std::optional<LevelColumns> LevelColumns::Create(const display::FootprintTable& 
 
   const size_t uses = static_cast<size_t>(end - begin) * out.width_;
   std::map<List, uint32_t, Less> known;
-  out.voxel_begin_ = {0, 0};  // of kDark
+  out.voxel_begin_ = {0, 0};  // for kDark
   out.column_of_.reserve(uses);
   for (int32_t slice = begin; slice < end; ++slice) {
     for (int32_t u = 0; u < layout.width; ++u) {
@@ -138,9 +139,10 @@ size_t LevelColumns::PillarOf(const TileGrid& grid, uint32_t tile) const {
          static_cast<size_t>(ijk[a]);
 }
 
-// In the order of the voxels' memory: those of one voxel a row, tile by tile, then the others.
+// Sorts columns in the order of the voxels' memory: columns of one voxel per row first, tile by
+// tile, then the others.
 void LevelColumns::SortColumns(const TileGrid& grid) {
-  std::vector<uint32_t> order(lit_.size() - 1);  // kDark stays where it is
+  std::vector<uint32_t> order(lit_.size() - 1);  // kDark keeps its place
   std::iota(order.begin(), order.end(), kDark + 1);
   const auto key = [&](uint32_t column) {
     const std::span<const Voxel> voxels = VoxelsOf(column);
@@ -190,7 +192,7 @@ void LevelColumns::IndexPillars(const TileGrid& grid) {
   }
 }
 
-// Chunks that wait to be worked out, as many as may be on their way from farther caches.
+// Chunks that wait to be computed: as many as can be fetched from farther caches at once.
 class LevelColumns::Waiting {
  public:
   explicit Waiting(const LevelTables& tables) : tables_(tables) {}
@@ -199,7 +201,7 @@ class LevelColumns::Waiting {
   Waiting& operator=(const Waiting&) = delete;
 
   ChunkToLevel& next() { return chunks_[count_]; }
-  // Room for what next() refers to, until it is worked out.
+  // Returns memory for data that next() refers to, valid until it is computed.
   uint32_t* room() { return room_[count_]; }
   void Add() {
     for (const uint32_t* words : chunks_[count_].words) __builtin_prefetch(words);
@@ -241,7 +243,7 @@ void LevelColumns::Update(const TileStore& tiles, std::span<const uint32_t> chan
   });
 }
 
-// The columns of one voxel a row.
+// Computes the levels of columns of one voxel per row.
 void LevelColumns::LevelSingles(const TileStore& tiles, const Pillar& pillar) {
   Waiting waiting(tables_);
   for (size_t chunk = 0; chunk < chunks_; ++chunk) {
@@ -284,7 +286,7 @@ void LevelColumns::LevelOthers(const TileStore& tiles, std::span<const uint32_t>
             words[count++] = colors + voxel.index;
             continue;
           }
-          uint32_t* const most = waiting.room() + block * kBlockWords;  // a third is rare
+          uint32_t* const most = waiting.room() + block * kBlockWords;  // more than two are rare
           for (size_t v = 0; v < kBlockWords; ++v) {
             most[v] = std::max(words[1][v], colors[voxel.index + v]);
           }

@@ -1,9 +1,10 @@
-// Columns of pixels that many slices share, kept as levels before their dither.
+// Columns of pixels that many slices share, stored as levels before dithering.
 //
-// A column of a slice's pixels takes its colours from an outer list of the footprint table, row by row along the inner
-// axis. In a rotor the same list serves several slices (those in which a panel sweeps the same voxels), and what
-// becomes of its colours depends on the slice by the column's dither alone. So tone, levels and the greatest of the
-// list are worked out once a list and change, and a slice's picture is a comparison a pixel.
+// A column of a slice's pixels takes its colours from an outer list of the footprint table, row by
+// row along the inner axis. In a rotor the same list serves several slices (those in which a panel
+// sweeps the same voxels), and the result depends on the slice only through the column's dither. So
+// the tone, the levels and the maximum over the list are computed once per list and change, and
+// drawing a slice image takes one comparison per pixel.
 #pragma once
 
 #include <cstdint>
@@ -21,28 +22,31 @@
 
 namespace voxeld::gpu {
 
-// Thread-bound, but for Draw.
+// Thread-bound, except for Draw.
 class LevelColumns {
  public:
-  // Nothing where it does not apply: RGB332, sampled by the greatest, a row a voxel along the axis that comes first in
-  // a tile's memory, the first at a tile's beginning, and lists that serve two slices or more on average. [begin, end): the slices owned.
+  // Returns nullopt if this method does not apply. It requires RGB332; sampling by the maximum; one
+  // voxel per row along the axis that comes first in a tile's memory, with the first one at the
+  // beginning of a tile; and lists that serve two slices or more on average. [begin, end): the
+  // owned slices.
   static std::optional<LevelColumns> Create(const display::FootprintTable& table,
                                             const TileGrid& grid,
                                             const display::FrameLayout& layout,
                                             const display::Tone& tone, int32_t begin, int32_t end);
 
-  // Works out anew what looks at `changed`; the first time all that is lit must be among them.
+  // Recomputes the columns that look at `changed` tiles. In the first call, these must include all
+  // lit tiles.
   void Update(const TileStore& tiles, std::span<const uint32_t> changed, Executor& executor);
 
-  // Room that Draw takes, one a thread.
+  // Memory that Draw uses, one per thread.
   struct Scratch {
     std::vector<const uint8_t*> levels;
     std::vector<uint8_t> pixels;
   };
-  // Picture `sub` of each of some owned slices, neighbours at best. Any number of threads.
+  // Draws sub-frame `sub` of some owned slices, preferably neighbours. Any number of threads.
   static constexpr size_t kSlicesTogether = 8;
   void Draw(std::span<const int32_t> slices, uint32_t sub, Scratch& scratch) const;
-  // The i-th of those last drawn with this scratch, row-major.
+  // Returns the i-th slice image last drawn with this scratch, row-major.
   std::span<const uint8_t> picture(size_t i, const Scratch& scratch) const {
     return std::span(scratch.pixels).subspan(i * picture_bytes(), height_ * width_);
   }
@@ -51,14 +55,15 @@ class LevelColumns {
 
  private:
   struct Voxel {
-    uint32_t tile;   // the first along the inner axis
-    uint32_t index;  // in its memory, of the first voxel along the inner axis
+    uint32_t tile;   // the first tile along the inner axis
+    uint32_t index;  // of the first voxel along the inner axis, in the tile's memory
   };
-  // A column of one voxel a row, and where in a tile's memory its voxels begin.
+  // A column of one voxel per row, and the index in a tile's memory at which its voxels begin.
   struct Single {
     uint32_t column, index;
   };
-  // Tiles along the inner axis, and the columns that look at them: ranges of singles_ and others_.
+  // The tiles along the inner axis, and the columns that look at them: ranges of singles_ and
+  // others_.
   struct Pillar {
     uint32_t first_tile = UINT32_MAX;
     uint32_t singles = 0, singles_end = 0;
@@ -86,29 +91,30 @@ class LevelColumns {
   }
 
   LevelTables tables_;
-  std::vector<uint64_t> dither_;  // eight of each sub-frame
+  std::vector<uint64_t> dither_;  // eight for each sub-frame
   size_t width_ = 0, height_ = 0;
-  size_t columns_ = 0;  // of a picture, with those that fill the last block
-  size_t chunks_ = 0;   // of a column
-  int32_t begin_ = 0;   // the first slice owned
-  int axis_ = 0;        // inner
-  int32_t first_ = 0;   // voxel along it of the first row
+  size_t columns_ = 0;  // of a slice image, including those that fill the last block
+  size_t chunks_ = 0;   // per column
+  int32_t begin_ = 0;   // the first owned slice
+  int axis_ = 0;        // the inner axis
+  int32_t first_ = 0;   // the voxel of the first row along that axis
   uint32_t tile_step_ = 0;
   int32_t tiles_along_ = 0;
   std::vector<uint32_t> column_of_;  // (slice − begin_) · width_ + u
-  // Columns: voxels_[voxel_begin_[c] .. voxel_begin_[c + 1]).
+  // The voxels of column c are voxels_[voxel_begin_[c] .. voxel_begin_[c + 1]).
   std::vector<uint32_t> voxel_begin_;
   std::vector<Voxel> voxels_;
   std::vector<Pillar> pillars_;
   std::vector<Single> singles_;
   std::vector<uint32_t> others_;
-  // chunks_ of each column. Memory is had where there is light; aligned, so that a vector lies in one cache line.
+  // chunks_ for each column. Memory is used only for lit chunks. Aligned, so that a vector lies in
+  // one cache line.
   struct alignas(kChunkRows) ChunkLevels {
     uint8_t bytes[kChunkBytes];
   };
   std::unique_ptr<ChunkLevels[]> levels_;
   uint64_t level_bytes_ = 0;
-  std::vector<uint64_t> lit_;  // of each column, bit c: its chunk c is lit
+  std::vector<uint64_t> lit_;  // for each column, bit c: its chunk c is lit
 };
 
 }  // namespace voxeld::gpu

@@ -8,7 +8,7 @@
 namespace voxeld::gpu {
 namespace {
 
-// The least of what pixels have as the greatest threshold of their parts.
+// Returns the least, over all pixels, of the greatest threshold of a pixel's parts.
 uint32_t WorstThreshold(display::Dither dither, uint32_t parts) {
   uint32_t worst = kFullLight;
   const auto look = [&](auto threshold_of) {
@@ -41,10 +41,10 @@ uint16_t LeastFactor(const display::FrameLayout& layout, const display::Tone& to
   uint64_t least = kFullLight;
   for (size_t c = 0; c < 3; ++c) {
     if (tone.lut[c][255] == 0) continue;
-    // As it would be undimmed.
+    // The light if it were not dimmed.
     const uint64_t white = tone.lut[c][255] * uint64_t{kFullLight} / brightest;
     const uint64_t light = (below + of[c] - 2) / (of[c] - 1);
-    // Dim rounds: a whole step more is enough.
+    // Dim rounds, so one whole step more is enough.
     least = std::min(least, (light * kFullLight + white - 1) / white + 1);
   }
   return static_cast<uint16_t>(std::clamp<uint64_t>(least, 1, kFullLight));

@@ -1,4 +1,5 @@
-// The tables by which a target's pixels become light (finish.h), made on the host for every engine.
+// The tables that convert a target's pixels to light (finish.h), computed on the host for every
+// engine.
 #pragma once
 
 #include <cstdint>
@@ -15,36 +16,36 @@ namespace voxeld::gpu {
 
 struct LightPlan {
   std::vector<uint16_t> curves;   // 256 each of red, green and blue
-  std::vector<uint16_t> noise;    // of kBlueNoise, else none
-  std::vector<uint16_t> factors;  // of each outer row of the footprints; none: all are full
+  std::vector<uint16_t> noise;    // of kBlueNoise, otherwise empty
+  std::vector<uint16_t> factors;  // for each outer row of the footprints; empty: all are full
 
   static LightPlan Of(const display::FootprintTable& table, const display::VoxelGrid& grid,
                       const display::FrameLayout& layout, const display::Tone& tone);
-  // The same, where all rows are full.
+  // The same, if all rows are full.
   static LightPlan WithoutFactors(const display::Tone& tone);
 
-  // Ordered dither or none, and all that a pixel's place decides is its threshold: what is worked out once for many places
-  // (levels.h) holds.
+  // Returns whether dither is ordered or off and a pixel's place decides only its threshold, so
+  // that values computed once for many places (levels.h) are valid.
   bool plain(const display::FrameLayout& layout) const {
     return noise.empty() && factors.empty() && layout.format != display::PixelFormat::kPlanes24;
   }
 
-  // Refers to this.
+  // The result refers to this plan.
   Finish finish(const display::FrameLayout& layout, const display::Tone& tone) const;
 };
 
-// Makes a target's plan, and keeps the factors, which can take a while, for the next target: one with another view, or
-// dimmed, has the same. Thread-bound.
+// Computes a target's plan, and keeps the factors, whose computation can take a while, for the next
+// target: a target with another view, or with other brightness, has the same factors. Thread-bound.
 class LightPlanner {
  public:
-  // `table`: the footprints of `geometry`, as the tone samples them.
+  // `table`: the footprints of `geometry`, for the tone's sampling.
   std::shared_ptr<const LightPlan> Of(const display::FootprintTable& table,
                                       const display::Geometry& geometry,
                                       const display::FrameLayout& layout,
                                       const display::Tone& tone);
 
  private:
-  // What the factors were made of.
+  // The inputs from which the factors were computed.
   struct Even {
     display::Geometry geometry;
     display::Sampling sampling;
@@ -54,8 +55,9 @@ class LightPlanner {
   std::optional<Even> even_;
 };
 
-// The factor of light with which full white lights every pixel, whatever its threshold, in a sub-frame at least; 1 to 65535. White is
-// the tone's at full brightness: how far it is dimmed plays no part.
+// Returns the least factor of light with which full white lights every pixel, whatever its
+// threshold, in at least one sub-frame; 1 to 65535. White is the tone's at full brightness: dimming
+// has no influence.
 uint16_t LeastFactor(const display::FrameLayout& layout, const display::Tone& tone);
 
 }  // namespace voxeld::gpu

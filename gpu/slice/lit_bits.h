@@ -1,4 +1,4 @@
-// Which colours of a row are not black.
+// Finds which colours of a row are not black.
 #pragma once
 
 #include <cstdint>
@@ -10,11 +10,12 @@
 
 namespace voxeld::gpu {
 
-// Bit i: the i-th of `count` colours (kTileSize at most), each 2^shift words behind the last, is not black.
+// Returns bits: bit i is 1 if the i-th of `count` colours (at most kTileSize), each 2^shift words
+// after the last, is not black.
 inline uint32_t LitBits(const uint32_t* from, int32_t count, uint32_t shift) {
 #ifdef __SSE2__
   static_assert(kTileSize == 16, "as many as a mask has bits");
-  if (shift == 0 && count == kTileSize) {  // as a rule
+  if (shift == 0 && count == kTileSize) {  // the usual case
     const auto black = [&](int32_t i) {
       return _mm_cmpeq_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(from + i)),
                              _mm_setzero_si128());

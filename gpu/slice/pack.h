@@ -1,4 +1,4 @@
-// Where a pixel's levels go in a picture's bytes. Host and device.
+// Writes a pixel's levels into a slice image's bytes. Host and device.
 #pragma once
 
 #include <cstddef>
@@ -10,19 +10,20 @@
 
 namespace voxeld::gpu {
 
-// Levels of red, green and blue. In kPlanes24: bit t is the level in the t-th part of the sub-frame.
+// Levels of red, green and blue. For kPlanes24: bit t is the level in the t-th part of the
+// sub-frame.
 struct Levels {
   uint32_t r, g, b;
 };
 
-// How many levels the channels have. `bits`: FrameLayout::bits_per_channel().
+// Returns the number of levels of each channel. `bits`: FrameLayout::bits_per_channel().
 VOXELD_HD constexpr Levels LevelsOf(display::PixelFormat format, uint32_t bits) {
   if (format == display::PixelFormat::kRgb332) return {8, 8, 4};
   if (format == display::PixelFormat::kPlanes24) return {2, 2, 2};
   return {1u << bits, 1u << bits, 1u << bits};
 }
 
-// The three bytes of a pixel of kPlanes24: bit 3·t + c.
+// Returns the three bytes of a pixel of kPlanes24: bit 3·t + c.
 VOXELD_HD inline uint32_t Planes24(Levels q) {
   uint32_t word = 0;
   for (uint32_t t = 0; t < display::kProjectorParts; ++t) {
@@ -31,14 +32,15 @@ VOXELD_HD inline uint32_t Planes24(Levels q) {
   return word;
 }
 
-// What is the same of all pixels of a picture.
+// The properties that all pixels of a slice image share.
 struct PictureShape {
   display::PixelFormat format;
   uint32_t bits;  // FrameLayout::bits_per_channel()
   uint32_t width, height;
 };
 
-// Writes a pixel into a picture of zeros. `q`: less than LevelsOf, or bits of kPlanes24.
+// Writes a pixel into a slice image of zeros. Requires: `q` is less than LevelsOf, or bits of
+// kPlanes24.
 VOXELD_HD inline void PackPixel(const PictureShape& shape, uint32_t u, uint32_t v, Levels q,
                                 uint8_t* picture) {
   const size_t pixel = static_cast<size_t>(v) * shape.width + u;

@@ -41,7 +41,7 @@ void Pictures::SetPlan(SlicePlan plan) {
   if (packer_) {
     before_ = std::exchange(bytes_, std::vector<uint8_t>(bytes_.size()));
     packer_->SetPictures(bytes_);
-    blank_.assign(slices, 0);  // what the packer puts there is not kept account of
+    blank_.assign(slices, 0);  // the packer does not report which of its slice images are blank
   } else {
     before_ = {};
   }
@@ -100,7 +100,7 @@ void Pictures::PackAs(const SlicePixels& pixels, uint32_t sub, uint8_t* picture)
   }
 }
 
-// As the definition has it, pixel by pixel.
+// Follows the definition, pixel by pixel.
 template <display::PixelFormat kFormat>
 void Pictures::FinishAs(const SlicePixels& pixels, int32_t slice, uint32_t sub,
                         uint8_t* picture) const {
@@ -137,7 +137,7 @@ void Pictures::Pack(const SlicePixels& pixels, int32_t slice, uint32_t sub,
   }
 }
 
-// A picture's bytes as they are now; true if they are not what they were.
+// Stores a slice image's new bytes; returns true if they changed.
 bool Pictures::Keep(size_t index, std::span<const uint8_t> drawn, uint64_t frame) {
   const bool differs = std::memcmp(picture(index), drawn.data(), drawn.size()) != 0;
   if (differs) std::memcpy(picture(index), drawn.data(), drawn.size());
@@ -148,7 +148,7 @@ bool Pictures::Keep(size_t index, std::span<const uint8_t> drawn, uint64_t frame
   return false;
 }
 
-// True if some picture of the slices is not what it was.
+// Draws the slices; returns true if a slice image changed.
 bool Pictures::DrawSlices(const TileStore& tiles, std::span<const int32_t> slices, uint64_t frame,
                           Scratch& scratch) {
   const display::FrameLayout& layout = plan_->layout;
@@ -188,7 +188,7 @@ bool Pictures::DrawSlices(const TileStore& tiles, std::span<const int32_t> slice
   return changed;
 }
 
-// True if some picture is not what it was.
+// Takes over the packer's results; returns true if a slice image changed.
 bool Pictures::TakePacked(const TileStore& tiles, std::span<const uint32_t> unobserved,
                           uint64_t frame) {
   executor_.For(unobserved.size(), 1, [&](size_t i, int) {
@@ -228,7 +228,7 @@ Pictures::Result Pictures::Update(const TileStore& tiles, const Volume::Changes&
     return result;
   }
   if (columns_) columns_->Update(tiles, changes.tiles, executor_);
-  // What neighbours have in common is fetched once for all.
+  // Data that neighbours have in common is fetched once for all of them.
   const size_t together = columns_ ? LevelColumns::kSlicesTogether : 1;
   std::vector<uint8_t> changed((slices.size() + together - 1) / together);
   executor_.For(changed.size(), 1, [&](size_t i, int worker) {

@@ -1,5 +1,5 @@
-// The packed pictures of the slices that an engine owns: which are out of date, and since which
-// frame each has its bytes.
+// The packed slice images of the slices that an engine owns: which are out of date, and since which
+// frame each has had its bytes.
 #pragma once
 
 #include <cstddef>
@@ -21,11 +21,11 @@
 
 namespace voxeld::gpu {
 
-// What a target comes to.
+// The data derived from a target.
 struct SlicePlan {
   display::FrameLayout layout;
   display::Tone tone;
-  int32_t begin = 0, end = 0;  // the slices owned
+  int32_t begin = 0, end = 0;  // the owned slices
   std::shared_ptr<const LightPlan> light;
   Sampler sampler;
   display::TileToSlices tile_to_slices;
@@ -36,17 +36,19 @@ class Pictures {
  public:
   explicit Pictures(Executor& executor) : executor_(executor) {}
 
-  // Everything is to be sliced anew, from a volume that is drawn anew. With the layout as before,
-  // pictures that come out the same keep the frame of their last change.
+  // Slices everything again, from a volume that is drawn again. If the layout is the same as
+  // before, slice images with unchanged bytes keep the frame of their last change.
   void SetPlan(SlicePlan plan);
 
   struct Result {
     bool changed = false;
     uint32_t pictures_drawn = 0;
   };
-  // Who is to be told of tiles that are drawn, in frames; null: nobody. It is another after SetPlan.
+  // Returns the observer of tiles that are drawn during frames; null if there are none to notify.
+  // It changes with SetPlan.
   TileObserver* observer() { return packer_ ? &*packer_ : nullptr; }
-  // Slices again what looks at `changes`, as pictures of `frame`. `unobserved`: tiles of theirs of which the observer was not told.
+  // Slices again the slices that look at `changes`, as slice images of `frame`. `unobserved`: those
+  // of the changed tiles that the observer was not notified of.
   Result Update(const TileStore& tiles, const Volume::Changes& changes,
                 std::span<const uint32_t> unobserved, uint64_t frame);
 
@@ -55,7 +57,8 @@ class Pictures {
            (packer_ ? packer_->memory_bytes() : 0);
   }
 
-  // Writes the pictures that changed after frame `buffer_holds`, and when each did.
+  // Copies the slice images that changed after frame `buffer_holds`, and the frame of each one's
+  // last change.
   void CopyTo(FrameBuffer buffer, uint64_t buffer_holds) const;
 
  private:
@@ -80,15 +83,15 @@ class Pictures {
 
   Executor& executor_;
   std::optional<SlicePlan> plan_;
-  LevelTables levels_;                   // of the plan's format and tone; where it is plain
-  std::optional<LevelColumns> columns_;  // where it applies
-  std::optional<PlanePacker> packer_;    // where it applies: then it alone writes pictures
-  std::vector<uint8_t> bytes_;           // the owned slices' pictures, from the first on
-  std::vector<uint8_t> before_;       // under the plan before, until the packer has packed all anew
+  LevelTables levels_;                   // of the plan's format and tone, if it is plain
+  std::optional<LevelColumns> columns_;  // if the method applies
+  std::optional<PlanePacker> packer_;    // if it applies: then only the packer writes images
+  std::vector<uint8_t> bytes_;           // the owned slices' images, from the first on
+  std::vector<uint8_t> before_;       // under the previous plan, until the packer packed everything
   std::vector<uint64_t> changed_in_;  // 0: not drawn yet
-  std::vector<uint32_t> lit_tiles_;   // of each owned slice
-  std::vector<uint8_t> dirty_;        // of each owned slice
-  std::vector<uint8_t> blank_;        // all its pictures are zeros
+  std::vector<uint32_t> lit_tiles_;   // for each owned slice
+  std::vector<uint8_t> dirty_;        // for each owned slice
+  std::vector<uint8_t> blank_;        // all slice images of the slice are zeros
   std::vector<Scratch> scratch_;
 };
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr size_t kChannels = 3;
 
-// Pixel x of 16 within a channel's bits.
+// Returns the bit of pixel x of 16 within a channel's bits.
 constexpr uint32_t BitOf(uint32_t x) { return x ^ 7; }
 
 bool AreAlike(const uint32_t* row) {
@@ -23,7 +23,7 @@ bool AreAlike(const uint32_t* row) {
   return differs == 0;
 }
 
-// Whether a tile is of one colour from end to end.
+// Returns whether a tile has the same colour everywhere.
 bool IsUniform(const uint32_t* colors, const TileRows& rows) {
   if (!(rows == TileRows::All())) return false;
   constexpr size_t kPlane = kTileSize * kTileSize;
@@ -85,7 +85,7 @@ bool PlanePacker::TakeDiffers(size_t picture) { return std::exchange(differs_[pi
 
 std::optional<PlanePacker::Place> PlanePacker::PlaceOf(const int32_t (&ijk)[3]) const {
   const size_t u0 = static_cast<size_t>(ijk[0]) * kTileSize;
-  const int32_t v0 = ijk[1] * kTileSize - first_row_;  // of y 0 of the tile
+  const int32_t v0 = ijk[1] * kTileSize - first_row_;  // the row of the tile's y 0
   if (u0 >= width_) return std::nullopt;
   Place place;
   for (int32_t y = 0; y < kTileSize; ++y) {
@@ -101,11 +101,11 @@ std::optional<PlanePacker::Place> PlanePacker::PlaceOf(const int32_t (&ijk)[3]) 
   return place;
 }
 
-// Of a plane of a tile, in which voxels of x in `lit_rows` are not black. Bit y of what it returns: there may be bits in
-// row y.
+// Collects the bits of a tile's plane, which has voxels that are not black only at the x in
+// `lit_rows`. Bit y of the result: row y may have bits.
 uint32_t PlanePacker::CollectBits(const uint32_t* colors, uint32_t lit_rows, uint32_t sub,
                                   RunBits& run, PlaneBits& bits) const {
-  // Dither counts from pixel row 0.
+  // Dither starts at pixel row 0.
   const uint32_t turn = static_cast<uint32_t>(8 - first_row_ % 8);
   uint32_t lit_ys = 0;
   for (; lit_rows != 0; lit_rows &= lit_rows - 1) {
@@ -131,7 +131,7 @@ uint32_t PlanePacker::CollectBits(const uint32_t* colors, uint32_t lit_rows, uin
       for (uint32_t y = 0; y < kTileSize; ++y) bits[y] |= of[y] << BitOf(x);
       continue;
     }
-    // Voxels side by side often are of one colour.
+    // Neighbouring voxels often have the same colour.
     uint32_t word = 0;
     Under under;
     for (; lit != 0; lit &= lit - 1) {
@@ -178,7 +178,7 @@ void PlanePacker::Put(size_t picture, const Place& place, uint32_t rows, const P
   }
 }
 
-// The planes of a tile of one colour have the same bits.
+// All planes of a tile of one colour have the same bits.
 void PlanePacker::PutUniform(uint32_t tile, int32_t tile_z, const uint32_t* colors,
                              const Place& place) {
   constexpr uint32_t kAll = (1u << kTileSize) - 1;

@@ -60,7 +60,7 @@ void Sampler::BuildInner() {
     place = static_cast<uint32_t>(places_++);
     if (!runs_.empty()) {
       Run& run = runs_.back();
-      int axis = -1;  // along which this voxel follows the last
+      int axis = -1;  // the axis along which this voxel follows the last one
       for (int a = 0; a < 3; ++a) {
         Offset next = last;
         ++next[static_cast<size_t>(a)];
@@ -92,7 +92,7 @@ void Sampler::BuildInner() {
   }
 }
 
-// Tiles lie in memory along y first, so that what they know of their rows says which columns are lit.
+// Tiles are stored along y first, so the information about their rows tells which columns are lit.
 void Sampler::FindPlanes(const TileGrid& grid) {
   if (!single_ || runs_[0].axis != 1 || grid.shift[1] != 0 || grid.shift[0] != kTileBits ||
       table_.width > grid.voxels[0]) {
@@ -135,7 +135,7 @@ void Sampler::FindStrips(const TileGrid& grid) {
   }
 }
 
-// Row (slice, v) as table_.inner has it.
+// Returns row (slice, v), in the order of table_.inner.
 std::span<const Sampler::InnerEntry> Sampler::Inner(int32_t slice, uint32_t v) const {
   const size_t row =
       static_cast<size_t>(slice % table_.inner_sets) * static_cast<size_t>(table_.height) + v;
@@ -143,7 +143,7 @@ std::span<const Sampler::InnerEntry> Sampler::Inner(int32_t slice, uint32_t v) c
   return std::span(inner_).subspan(begin, table_.inner.begin[row + 1] - begin);
 }
 
-// Raises line[place] to the colours of the voxels outer + inner; false if none is lit.
+// Raises line[place] to the colours of the voxels outer + inner; returns false if none is lit.
 bool Sampler::Gather(const TileStore& tiles, const display::FootprintEntry& outer,
                      uint32_t* line) const {
   const TileGrid& grid = tiles.grid();
@@ -170,8 +170,8 @@ bool Sampler::Gather(const TileStore& tiles, const display::FootprintEntry& oute
   return seen != 0;
 }
 
-// Of kColumns columns from u0 on, or as many as there are. The greatest of a product of lists is
-// the greatest, over the inner list, of the greatest over the outer.
+// Samples kColumns columns from u0 on, or as many as exist. The maximum over a product of lists is
+// the maximum, over the inner list, of the maximum over the outer.
 void Sampler::SampleMax(const TileStore& tiles, int32_t slice, uint32_t u0,
                         SlicePixels& out) const {
   const uint32_t width = static_cast<uint32_t>(table_.width);
@@ -200,7 +200,7 @@ void Sampler::SampleMax(const TileStore& tiles, int32_t slice, uint32_t u0,
   }
 }
 
-// What SampleMax comes to where single_ holds.
+// The same as SampleMax, if single_ is true.
 void Sampler::SampleSingle(const TileStore& tiles, int32_t slice, SlicePixels& out) const {
   const TileGrid& grid = tiles.grid();
   const Run& run = runs_[0];
@@ -226,7 +226,7 @@ void Sampler::SampleSingle(const TileStore& tiles, int32_t slice, SlicePixels& o
   }
 }
 
-// What SampleSingle comes to where slices are rows.
+// The same as SampleSingle, if slices are rows.
 void Sampler::SampleStrips(const TileStore& tiles, int32_t slice, SlicePixels& out) const {
   const size_t s = static_cast<size_t>(slice);
   for (uint32_t n = strip_begin_[s]; n < strip_begin_[s + 1]; ++n) {
@@ -242,7 +242,8 @@ void Sampler::SampleStrips(const TileStore& tiles, int32_t slice, SlicePixels& o
   }
 }
 
-// What SampleSingle comes to where slices are planes: tile by tile, and of those the lit rows alone.
+// The same as SampleSingle, if slices are planes: goes tile by tile, and only through the lit rows
+// of each.
 void Sampler::SamplePlane(const TileStore& tiles, int32_t z, SlicePixels& out) const {
   const TileGrid& grid = tiles.grid();
   const int32_t first = runs_[0].at[1], last = first + runs_[0].length;  // of y
@@ -251,7 +252,7 @@ void Sampler::SamplePlane(const TileStore& tiles, int32_t z, SlicePixels& out) c
     uint32_t u, v;
     int32_t count;
   };
-  // Rows are on their way from memory together before the first of them is looked at.
+  // Prefetches several rows from memory before the first of them is used.
   constexpr size_t kTogether = 64;
   Row rows[kTogether];
   size_t count = 0;

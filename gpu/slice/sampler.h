@@ -1,4 +1,4 @@
-// The colours of a slice's pixels, from the voxels of their footprints.
+// Samples the colours of a slice's pixels from the voxels of their footprints.
 #pragma once
 
 #include <cstdint>
@@ -12,14 +12,14 @@
 
 namespace voxeld::gpu {
 
-// A slice's pixels that are not black, each once.
+// The pixels of a slice that are not black, each once.
 struct SlicePixels {
   struct Pixel {
     uint32_t rgb, u, v;  // 0x00RRGGBB
   };
   std::vector<Pixel> lit;
   std::vector<uint32_t> lines,
-      column;  // scratch of the sampler's: kColumns lines, a column of pixels
+      column;  // scratch memory of the sampler: kColumns lines, a column of pixels
 };
 
 // Immutable; used by any number of threads.
@@ -27,30 +27,30 @@ class Sampler {
  public:
   static constexpr uint32_t kColumns = 8;  // sampled together, so that pixels are written in runs
 
-  // The axis along which inner lists run: tiles are best laid out with it first.
+  // Returns the axis along which inner lists run: tiles should be laid out with it first.
   static int FastestAxis(const display::FootprintTable& table);
 
-  // Internal if the table names a voxel outside `grid`.
+  // Errors: Internal if the table names a voxel outside `grid`.
   static absl::StatusOr<Sampler> Create(display::FootprintTable table, const TileGrid& grid,
                                         display::Sampling sampling);
 
   const display::FootprintTable& table() const { return table_; }
   const TileGrid& grid() const { return grid_; }
 
-  // z by slice, where slices are planes of the grid, pixel column u is x = u, and a row further is y + 1; else empty.
-  // Sampling by the greatest alone.
+  // Returns z by slice, if slices are planes of the grid, pixel column u is x = u, the next row is
+  // y + 1, and sampling is by the maximum; otherwise empty.
   std::span<const int32_t> planes() const {
     return sampling_ == display::Sampling::kMax ? plane_of_ : std::span<const int32_t>();
   }
-  // y of pixel row 0 of planes.
+  // Returns the y of pixel row 0, if slices are planes.
   int32_t first_row() const { return runs_[0].at[1]; }
 
-  // `out` is cleared already.
+  // Requires: `out` is already cleared.
   void Sample(const TileStore& tiles, int32_t slice, SlicePixels& out) const;
 
  private:
-  // The inner lists' distinct voxels in a row along an axis;
-  // they have consecutive places in a line.
+  // Distinct voxels of the inner lists that follow each other along an axis; they have consecutive
+  // places in a line.
   struct Run {
     int32_t at[3];
     int axis;
@@ -62,7 +62,7 @@ class Sampler {
     uint32_t weight;
   };
 
-  // Neighbouring pixels of a row, one voxel each, whose voxels are neighbours in a tile's memory.
+  // Neighbouring pixels of a row, one voxel each, whose voxels are adjacent in a tile's memory.
   struct Strip {
     uint32_t u, count;
     uint32_t tile, index;  // of the first voxel
@@ -84,14 +84,14 @@ class Sampler {
   TileGrid grid_;
   display::Sampling sampling_ = display::Sampling::kMax;
   std::vector<Run> runs_;
-  std::vector<InnerEntry> inner_;  // rows as table_.inner.begin has them
+  std::vector<InnerEntry> inner_;  // rows in the order of table_.inner.begin
   size_t places_ = 0;
   bool single_ =
-      false;  // one voxel a pixel, those of a column in a row: a stack of the lattice's own resolution
+      false;  // one voxel per pixel, a column's in a row: a stack at the lattice's own resolution
   std::vector<int32_t>
-      plane_of_;  // z by slice, where pixel u is x and slices are planes; else empty
-  // Where single_ holds and a slice is one row, as in lattices: those of slice s are strips_[strip_begin_[s] ..
-  // strip_begin_[s + 1]). Else empty.
+      plane_of_;  // z by slice, if pixel u is x and slices are planes; otherwise empty
+  // If single_ is true and a slice is one row, as in lattices, the strips of slice s are
+  // strips_[strip_begin_[s] .. strip_begin_[s + 1]). Otherwise empty.
   std::vector<uint32_t> strip_begin_;
   std::vector<Strip> strips_;
 };

@@ -7,17 +7,17 @@
 
 namespace voxeld::gpu {
 
-// Of a voxel: outer times inner, each 1 to 255.
+// Returns the weight of a voxel: outer times inner, each 1 to 255.
 VOXELD_HD inline uint32_t FootprintWeight(uint32_t outer, uint32_t inner) {
   return (outer * inner + 127) / 255;
 }
 
-// A channel (0 to 255) under a weight.
+// Returns a channel (0 to 255) multiplied by a weight.
 VOXELD_HD inline uint32_t WeighChannel(uint32_t weight, uint32_t c) {
   return (weight * c + 127) / 255;
 }
 
-// Per channel the greater of `rgb` and `c` under the weight; 0x00RRGGBB.
+// Returns, for each channel, the greater of `rgb` and the weighted `c`; 0x00RRGGBB.
 VOXELD_HD inline uint32_t RaiseWeighted(uint32_t rgb, uint32_t weight, uint32_t c) {
   uint32_t result = 0;
   for (int shift = 0; shift < 24; shift += 8) {
