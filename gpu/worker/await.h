@@ -1,4 +1,4 @@
-// Waiting for an answer that comes by a call.
+// Waits for an answer that arrives by a call.
 #pragma once
 
 #include <optional>
@@ -8,8 +8,8 @@
 
 namespace voxeld::gpu {
 
-// What ask(answer) has `answer`, a function of a Result, called with, once: from any thread, or
-// inside `ask`.
+// Returns the value, a Result, with which ask(answer) has `answer` called, once: from any thread,
+// or inside `ask`. Blocks until then.
 template <typename Result, typename AskFor>
 Result Await(AskFor&& ask) {
   struct Box {

@@ -6,7 +6,7 @@
 namespace voxeld::gpu {
 namespace {
 
-// The record at the beginning of `bytes`, if they are enough.
+// Returns the record at the beginning of `bytes`, if there are enough bytes.
 template <typename Record>
 bool Read(std::span<const std::byte> bytes, Record* record) {
   if (bytes.size() < sizeof(Record)) return false;

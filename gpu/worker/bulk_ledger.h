@@ -1,5 +1,5 @@
-// What a worker reads of its owner's bulk memory, held on its behalf: a block must not be used again
-// before the geometry in it is dropped over there.
+// Records which of its owner's bulk memory a worker reads, and holds it on the worker's behalf: a
+// block must not be reused before the worker has dropped the geometry in it.
 #pragma once
 
 #include <cstdint>
@@ -16,23 +16,24 @@ namespace voxeld::gpu {
 // Thread-bound.
 class BulkLedger {
  public:
-  // What a delta changes, in order. It holds the blocks.
+  // The changes of a delta, in order. It holds the blocks.
   struct Change {
     struct Step {
       uint64_t geometry = 0;
       std::shared_ptr<const void> block;  // null: dropped
       bool by_cpu = false;                // the geometry is drawn by the CPU, whatever the engine
     };
-    bool reset = false;  // first
+    bool reset = false;  // comes first
     std::vector<Step> steps;
   };
 
-  // InvalidArgument if the delta refers to a block that did not come along. Records are not checked:
-  // what is malformed the worker refuses.
+  // Errors: InvalidArgument if the delta refers to a block that did not come with it. Does not
+  // check records: the worker rejects malformed ones.
   static absl::StatusOr<Change> ChangeOf(std::span<const std::byte> delta,
                                          std::span<const BulkBlock> referred);
 
-  // The worker has applied the delta. `copies`: its engine has copied what it draws itself.
+  // Called when the worker has applied the delta. `copies`: its engine has copied the data that it
+  // draws itself.
   void Apply(Change change, bool copies);
 
   size_t size() const { return held_.size(); }

@@ -192,7 +192,7 @@ void CallChannel::Run() {
     }
     if (answers) status = ReceiveOne();
     if (status.ok()) status = SendSome();
-    // What it said last comes before its end.
+    // The worker's last messages come before the end of the connection.
     while (absl::IsUnavailable(status) && ReceiveOne().ok()) {
     }
     if (!status.ok()) {

@@ -1,5 +1,5 @@
-// An owner's conversation with its worker: calls out, answers in, on a thread of its own; and the
-// verdict when none come.
+// An owner's connection to its worker: sends calls and receives answers on a thread of its own, and
+// detects when no answers come.
 #pragma once
 
 #include <cstdint>
@@ -24,35 +24,35 @@ inline constexpr char kLatePayload[] = "voxeld.dev/late";
 // Thread-safe.
 class CallChannel {
  public:
-  // What a call came to: its answer, DataLoss (the worker is gone, or did not answer in time), or
+  // The result of a call: its answer, DataLoss (the worker is gone, or did not answer in time), or
   // Cancelled (the channel is being closed).
   using Answered = std::function<void(absl::StatusOr<Message>)>;
 
-  // `deadline_ns`: the longest time between answers while any is owed; for the first answer of all
-  // `first_deadline_ns`. When it has passed, or the process has ended, that is killed.
+  // `deadline_ns`: the longest time between answers while any is pending; for the very first answer
+  // it is `first_deadline_ns`. When it has passed, or the process has ended, the process is killed.
   // `socket`: a connection to `process`; `wake`: an eventfd that does not block; both are closed at
-  // the end. `lost` (may be empty) is called once,
-  // on the channel's thread, with the DataLoss that ends it, after all that was owed is answered.
+  // the end. `lost` (may be empty) is called once, on the channel's thread, with the DataLoss that
+  // ends the channel, after all pending calls are answered.
   CallChannel(std::shared_ptr<WorkerProcess> process, int socket, int wake, int64_t deadline_ns,
               int64_t first_deadline_ns, std::function<void(const absl::Status&)> lost);
   ~CallChannel();
   CallChannel(const CallChannel&) = delete;
   CallChannel& operator=(const CallChannel&) = delete;
 
-  // Ends the connection and answers all that is owed, Cancelled, before it returns.
+  // Ends the connection and answers all pending calls with Cancelled before it returns.
   void Close();
-  // The same with `status`, soon: what the worker says is not to be believed.
+  // The same with `status`, soon: for a worker whose messages cannot be trusted.
   void Fail(const absl::Status& status);
 
-  // Sends a message, in the order of the calls of this function. `message.call` is filled in.
-  // `ready` (may be empty) completes the message just before it goes, on the channel's thread.
-  // `more_ns`: what this call may take beyond the deadline.
+  // Sends a message, in the order of the calls of this function, and fills in `message.call`.
+  // `ready` (may be empty) completes the message just before it is sent, on the channel's thread.
+  // `more_ns`: the time that this call may take beyond the deadline.
   void Call(Message message, std::function<void(Message&)> ready, Answered answered,
             int64_t more_ns = 0);
-  // Runs `work` on the channel's thread, after all that was sent before; at once when the worker is
-  // gone.
+  // Runs `work` on the channel's thread, after everything that was sent before; at once if the
+  // worker is gone.
   void Later(std::function<void()> work);
-  // A message without an answer; `segment` lives until it is sent.
+  // Sends a message that has no answer; keeps `segment` until it is sent.
   void Tell(Message message, std::shared_ptr<Segment> segment);
 
  private:
@@ -65,7 +65,7 @@ class CallChannel {
 
   void Run();
   void Wake() const;
-  // Sends what can be sent; not OK if the worker is gone.
+  // Sends as much as possible; not OK if the worker is gone.
   absl::Status SendSome();
   absl::Status ReceiveOne();
   void End(const absl::Status& status);
@@ -86,7 +86,7 @@ class CallChannel {
   sync::Mutex mutex_;
   bool closing_ VOXELD_GUARDED_BY(mutex_) = false;
   absl::Status failed_ VOXELD_GUARDED_BY(mutex_);
-  absl::Status ended_ VOXELD_GUARDED_BY(mutex_);  // not OK: nothing goes or comes any more
+  absl::Status ended_ VOXELD_GUARDED_BY(mutex_);  // not OK: nothing is sent or received
   uint64_t next_call_ VOXELD_GUARDED_BY(mutex_) = 1;
   std::deque<Outgoing> outgoing_ VOXELD_GUARDED_BY(mutex_);
   std::map<uint64_t, Owed> owed_ VOXELD_GUARDED_BY(mutex_);

@@ -14,16 +14,16 @@
 namespace voxeld::gpu {
 namespace {
 
-// What one thread does at a time, so that others have something to do.
+// The amount of work that one thread takes at a time, so that the others have work too.
 constexpr size_t kGrainBytes = size_t{256} << 10;
 
 constexpr size_t kWorthThreads = size_t{16} << 20;
 constexpr unsigned kMostThreads = 8;  // about as many as saturate a host's memory
 
-// Read, looked through and written before it leaves the nearest cache.
+// A piece is read, checked and written before it leaves the nearest cache.
 constexpr size_t kPieceBytes = size_t{16} << 10;
 
-// Past the caches: what is written is far more than they hold.
+// Copies past the caches, because far more is written than they hold.
 void CopyPast(std::byte* to, const std::byte* from, size_t size) {
 #if defined(__x86_64__)
   const size_t head = std::min(size, -reinterpret_cast<uintptr_t>(to) % sizeof(__m128i));

@@ -1,5 +1,5 @@
-// voxeld-engine: an engine in a process of its own. Started by its owner, or by a service manager for a
-// connection to its socket; never by hand.
+// voxeld-engine: an engine in a process of its own. It is started by its owner, or by a service
+// manager for a connection to its socket, and never by hand.
 #include <sys/socket.h>
 
 #include <cstdio>

@@ -72,7 +72,7 @@ absl::StatusOr<Message> ReceiveMessage(int socket) {
   in.msg_iovlen = std::size(parts);
   alignas(cmsghdr) char control[CMSG_SPACE(sizeof(int))] = {};
   in.msg_control = control;
-  in.msg_controllen = CMSG_LEN(sizeof(int));  // with its padding there would be room for a second
+  in.msg_controllen = CMSG_LEN(sizeof(int));  // with its padding, a second one would fit
   const ssize_t got = TEMP_FAILURE_RETRY(recvmsg(socket, &in, MSG_CMSG_CLOEXEC));
   for (cmsghdr* c = got < 0 ? nullptr : CMSG_FIRSTHDR(&in); c != nullptr; c = CMSG_NXTHDR(&in, c)) {
     if (c->cmsg_level == SOL_SOCKET && c->cmsg_type == SCM_RIGHTS) {

@@ -1,7 +1,9 @@
-// What passes between an engine's owner and its worker: small messages over a pair of
-// SOCK_SEQPACKET sockets, a pair for each engine and one for control. Bulk data lies in segments; messages name them.
+// The messages between an engine's owner and its worker: small messages over pairs of
+// SOCK_SEQPACKET sockets, one pair for each engine and one for control. Bulk data is in segments;
+// messages name them.
 //
-// Both ends are of the same build: kWorkerProtocol says so, and a worker of another is refused.
+// Both ends must come from the same build: kWorkerProtocol identifies it, and a worker of another
+// build is rejected.
 #pragma once
 
 #include <cstddef>
@@ -24,7 +26,7 @@ namespace voxeld::gpu {
 inline constexpr uint32_t kWorkerProtocol = 6;
 
 enum class MessageType : uint32_t {
-  // To the worker. Each but the segments' is answered once, under its own call number.
+  // To the worker. Each, except those about segments, is answered once, under its own call number.
   kOpen = 1,         // OpenMessage; answered by kReady or kDone
   kSegment = 2,      // SegmentMessage, with its descriptor
   kDropSegment = 3,  // SegmentMessage
@@ -32,7 +34,7 @@ enum class MessageType : uint32_t {
   kApply = 5,        // BulkMessage; kDone
   kFrame = 6,        // FrameMessage; kFrameDone or kDone
   kVoxels = 7,       // VoxelsMessage; kDone
-  kConnect = 8,      // a descriptor, the other end of a connection; over the control socket alone
+  kConnect = 8,      // a descriptor, the other end of a connection; only over the control socket
   kBulkSegment = 9,  // BulkSegmentMessage, with its descriptor
   kDropBulkSegment = 10,  // BulkSegmentMessage
   kInvite = 11,           // InviteMessage, then the library's path; kInvited or kDone
@@ -56,11 +58,11 @@ struct OpenMessage {
 
 struct SegmentMessage {
   uint32_t segment = 0;
-  uint32_t staging = 0;  // 1: for what comes, read by a device; 0: for what is asked for
+  uint32_t staging = 0;  // 1: for data to the worker, read by a device; 0: for results
   uint64_t size = 0;
 };
 
-// A segment of bulk memory, to be read only.
+// A segment of bulk memory, which is only read.
 struct BulkSegmentMessage {
   uint64_t segment = 0;
   uint64_t size = 0;
@@ -69,16 +71,16 @@ struct BulkSegmentMessage {
 // The first `size` bytes of a segment.
 struct BulkMessage {
   uint32_t segment = 0;
-  uint32_t crc = 0;  // CRC-32C of them
+  uint32_t crc = 0;  // CRC-32C of those bytes
   uint64_t size = 0;
 };
 
-// The segment takes the frame as FrameSlot lays it out.
+// The worker writes the frame to the segment, in FrameSlot's layout.
 struct FrameMessage {
   uint32_t segment = 0;
   uint64_t frame = 0;
-  uint64_t holds = 0;                // what the segment holds
-  uint64_t buffer_holds = 0;         // what the caller's buffer holds
+  uint64_t holds = 0;                // the frame that the segment holds
+  uint64_t buffer_holds = 0;         // the frame that the caller's buffer holds
   uint64_t pictures = 0, bytes = 0;  // sizes of the caller's buffer
 };
 
@@ -121,7 +123,7 @@ struct Message {
   std::vector<std::byte> body;
   int fd = -1;  // the receiver's to close
 
-  // The struct at the body's beginning; nothing if it is too short.
+  // Returns the struct at the beginning of the body; nullopt if the body is too short.
   template <typename T>
   std::optional<T> As() const {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -130,7 +132,7 @@ struct Message {
     std::memcpy(static_cast<void*>(&value), body.data(), sizeof(T));
     return value;
   }
-  // What comes behind it.
+  // Returns the text after the struct.
   template <typename T>
   std::string TextAfter() const {
     if (body.size() < sizeof(T)) return "";
@@ -153,8 +155,9 @@ Message MakeMessage(MessageType type, uint64_t call, const T& body, std::string_
 Message MakeDone(uint64_t call, const absl::Status& status);
 absl::Status StatusOf(const Message& done);
 
-// Of a socket of a pair. Send: Unavailable if the other end is gone, ResourceExhausted if it does
-// not read (only where the socket does not block). Receive: waits, Unavailable at the end.
+// For a socket of a pair. Errors: sending gives Unavailable if the other end is gone, and
+// ResourceExhausted if it does not read (only if the socket does not block). Receiving blocks, and
+// gives Unavailable at the end of the connection.
 absl::Status SendMessage(int socket, const Message& message);
 absl::StatusOr<Message> ReceiveMessage(int socket);
 

@@ -7,7 +7,8 @@
 namespace voxeld::gpu {
 
 bool GpuIsVisible(const std::string& root) {
-  // A container may have a device without the driver's folder, and not the first one. cmake/VoxeldCuda.cmake looks at the same places.
+  // A container may have a device without the driver's folder, and not the first one.
+  // cmake/VoxeldCuda.cmake checks the same places.
   std::error_code ignored;
   const std::filesystem::directory_iterator gpus(root + "/proc/driver/nvidia/gpus", ignored);
   if (gpus != std::filesystem::directory_iterator()) return true;

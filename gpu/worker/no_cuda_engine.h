@@ -1,4 +1,4 @@
-// What a build without the CUDA engine answers when it is asked for one.
+// The answers of a build without the CUDA engine when that engine is requested.
 #pragma once
 
 #include <string>
@@ -7,11 +7,12 @@
 
 namespace voxeld::gpu {
 
-// Whether the kernel has a driver for an NVIDIA GPU, by the files that it makes for one. `root`: where / is.
+// Returns whether the kernel has a driver for an NVIDIA GPU, from the files that it creates for
+// one. `root`: the directory that replaces /.
 bool GpuIsVisible(const std::string& root = "");
 
-// FailedPrecondition; the message says how to get the CUDA engine. It becomes the reason why the CPU draws
-// (EngineInfo::reason), which the daemon logs for each display.
+// Returns FailedPrecondition with a message that says how to get the CUDA engine. It becomes the
+// reason why the CPU draws (EngineInfo::reason), which the daemon logs for each display.
 absl::Status NoCudaEngine(bool gpu_is_visible);
 
 }  // namespace voxeld::gpu

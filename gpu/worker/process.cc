@@ -111,14 +111,14 @@ void WorkerProcess::Kill() {
     return;
   }
   kill(pid_, SIGKILL);
-  // One that hangs in its driver dies when that lets go of it.
+  // A process that hangs in its driver dies when the driver returns.
   try {
     std::thread([pid = pid_] {
       while (waitpid(pid, nullptr, 0) < 0 && errno == EINTR) {
       }
     }).detach();
   } catch (const std::system_error&) {
-    waitpid(pid_, nullptr, WNOHANG);  // no thread: it may stay a zombie
+    waitpid(pid_, nullptr, WNOHANG);  // without a thread, it may stay a zombie
   }
 }
 

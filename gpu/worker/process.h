@@ -12,34 +12,36 @@
 
 namespace voxeld::gpu {
 
-// Killed at the latest with this object. Thread-safe.
+// The process is killed when this object is destroyed, at the latest. Thread-safe.
 class WorkerProcess {
  public:
-  // Starts `program` with its end of a socket pair as descriptor 3, and nothing else open but the
-  // standard streams. Or, where `program` is unix:PATH, connects to a socket (SOCK_SEQPACKET) whose
-  // listener starts one for each connection, as a service manager does that keeps it apart.
-  // FailedPrecondition if neither can be done.
+  // Starts `program` with its end of a socket pair as descriptor 3, and nothing else open except
+  // the standard streams. Or, if `program` is unix:PATH, connects to a socket (SOCK_SEQPACKET)
+  // whose listener starts a process for each connection, for example a service manager that
+  // isolates it. Errors: FailedPrecondition if neither is possible.
   static absl::StatusOr<std::shared_ptr<WorkerProcess>> Start(const std::string& program);
   ~WorkerProcess();
   WorkerProcess(const WorkerProcess&) = delete;
   WorkerProcess& operator=(const WorkerProcess&) = delete;
 
-  // A connection for one engine: this end of it, the caller's to close; it does not block. The
-  // other is on its way to the process. Unavailable if that is gone.
+  // Opens a connection for one engine. Returns this end of it, which the caller closes and which
+  // does not block; the other end is sent to the process. Errors: Unavailable if the process is
+  // gone.
   absl::StatusOr<int> Connect();
-  // Ends the process, whatever it does; nobody waits for it. Its connections end with it. One that
-  // somebody else has started is told to end by its connection's end, which a stopped one does not hear.
+  // Kills the process, whatever it is doing, and does not wait for it. Its connections end too. For
+  // a process that someone else started, it closes the connection, which makes the process exit
+  // unless it is stopped.
   void Kill();
-  // It has ended, or been killed.
+  // Returns whether the process has exited or been killed.
   bool lost() const;
-  pid_t pid() const { return pid_; }  // 0: somebody else's
+  pid_t pid() const { return pid_; }  // 0: started by someone else
 
  private:
   WorkerProcess(pid_t pid, int control) : pid_(pid), control_(control) {}
   static absl::StatusOr<std::shared_ptr<WorkerProcess>> ConnectTo(const std::string& path);
 
   const pid_t pid_;
-  const int control_;  // connections go over this
+  const int control_;  // new connections are sent over this socket
   std::atomic<bool> killed_{false};
 };
 
@@ -50,7 +52,7 @@ inline constexpr int kWorkerSocket = 3;
 // for voxeld-engine-cuda, which has both engines, and then for voxeld-engine, which has the CPU's
 // alone. Returns the first that exists, and ../libexec/voxeld/voxeld-engine if none does.
 std::string DefaultWorkerProgram(const std::filesystem::path& running);
-// This process's own.
+// Returns the path of this process's own program.
 std::filesystem::path RunningProgram();
 
 }  // namespace voxeld::gpu

@@ -10,9 +10,9 @@ namespace voxeld::gpu {
 namespace {
 
 constexpr size_t kLeast = 64 << 10;
-constexpr uint64_t kMostKept = 512ull << 20;  // given back and not let go
+constexpr uint64_t kMostKept = 512ull << 20;  // returned segments that are not released
 
-// In eighths of a power of two: what a segment has is pinned, used or not.
+// Rounds up to eighths of a power of two: all bytes of a segment are pinned, used or not.
 size_t RoundUp(size_t size) {
   size = std::max(size, kLeast);
   const size_t step = std::bit_floor(size) / 8;

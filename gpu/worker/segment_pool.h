@@ -1,4 +1,4 @@
-// Segments of an engine's owner: given out, used again, named to the worker.
+// The segments of an engine's owner: handed out, reused, and named to the worker.
 #pragma once
 
 #include <atomic>
@@ -13,17 +13,18 @@
 
 namespace voxeld::gpu {
 
-// Thread-safe. What it hands out may outlive it.
+// Thread-safe. Leases may outlive the pool.
 class SegmentPool {
  public:
   struct Item {
     uint32_t id = 0;
     std::shared_ptr<Segment> segment;
-    uint64_t holds = 0;  // of a frame's segment: the frame that it holds whole
+    uint64_t holds = 0;  // for a frame's segment: the frame that it holds completely
   };
-  using Lease = std::shared_ptr<Item>;  // the item goes back with its last owner
+  using Lease = std::shared_ptr<Item>;  // the item returns to the pool with its last owner
 
-  // Told of a segment before it is first given out, and when it is kept no longer; any thread.
+  // Called with a segment before it is first handed out, and when the pool no longer keeps it; on
+  // any thread.
   using Told = std::function<void(const Item&)>;
 
   // Pools with the same worker share their numbers.
@@ -31,7 +32,8 @@ class SegmentPool {
 
   SegmentPool(uint64_t limit_bytes, Ids ids, Told added, Told dropped);
 
-  // At least `size` bytes. ResourceExhausted past the limit, which counts what is given out.
+  // Returns at least `size` bytes. Errors: ResourceExhausted past the limit, which counts what is
+  // handed out.
   absl::StatusOr<Lease> Acquire(size_t size);
 
  private:

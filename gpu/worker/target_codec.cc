@@ -53,7 +53,7 @@ class Reader {
   void List(Items& items, F&& each) {
     uint64_t count = 0;
     Value(count);
-    if (count > in_.size()) ok_ = false;  // an item has a byte at least
+    if (count > in_.size()) ok_ = false;  // an item takes at least a byte
     for (uint64_t i = 0; i < count && ok_; ++i) each(items.emplace_back());
   }
   template <typename Item, typename F>
@@ -71,7 +71,7 @@ class Reader {
   bool ok_ = true;
 };
 
-// One list of fields for both ways.
+// One list of fields for both encoding and decoding.
 template <typename Io, typename V>
 void Fields(Io& io, V& v)
   requires std::is_same_v<std::remove_const_t<V>, display::Vec3>
@@ -139,7 +139,7 @@ void Fields(Io& io, L& l)
   Fields(io, l.cell_mm);
 }
 
-// All but the shape.
+// Encodes or decodes everything except the shape.
 template <typename Io, typename T>
 void Fields(Io& io, T& t)
   requires std::is_same_v<std::remove_const_t<T>, Target>

@@ -1,4 +1,4 @@
-// A Target as flat bytes, for another process.
+// Encodes a Target as flat bytes, for another process.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 namespace voxeld::gpu {
 
 std::vector<std::byte> EncodeTarget(const Target& target);
-// InvalidArgument for bytes that are none; whether the target holds together is not asked.
+// Errors: InvalidArgument for malformed bytes. Does not check whether the target is consistent.
 absl::StatusOr<Target> DecodeTarget(std::span<const std::byte> bytes);
 
 }  // namespace voxeld::gpu

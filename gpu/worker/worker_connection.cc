@@ -18,7 +18,7 @@
 namespace voxeld::gpu {
 namespace {
 
-// A block of staging that lies in a segment.
+// A block of staging memory in a segment.
 class SegmentMemory final : public StagingBlock::Memory {
  public:
   SegmentMemory(std::shared_ptr<Segment> segment, BulkSource* bulk)
@@ -31,7 +31,7 @@ class SegmentMemory final : public StagingBlock::Memory {
   BulkSource* const bulk_;
 };
 
-// The bulk memory that the owner has shown. What a piece holds is the owner's to keep as it is.
+// The bulk memory that the owner has shown. The owner keeps the bytes of each piece unchanged.
 class BulkSegments final : public BulkSource {
  public:
   absl::StatusOr<BulkView> Find(const BulkRef& ref) override {
@@ -64,7 +64,7 @@ class Connection final : public WorkerConnection {
 
   absl::Status Handle(Message& message) override {
     const absl::Status status = Carry(message);
-    // What has no use for a descriptor does not keep it.
+    // Close a descriptor that the message's handler did not take.
     if (message.fd >= 0) close(std::exchange(message.fd, -1));
     return status;
   }
@@ -148,7 +148,7 @@ class Connection final : public WorkerConnection {
         Segment::Adopt(std::exchange(message.fd, -1), named->size);
     if (!segment.ok()) return absl::InvalidArgumentError(segment.status().message());
     Mapped& mapped = segments_[named->segment];
-    Unpin(mapped);  // of one of that name before
+    Unpin(mapped);  // of an earlier segment with that number
     mapped.pinned = {};
     mapped.segment = *std::move(segment);
     if (named->staging != 0) Pin(mapped, mapped.segment->bytes());
@@ -196,7 +196,7 @@ class Connection final : public WorkerConnection {
     return it->second.segment;
   }
 
-  // A segment, and what of it a device copies to and from.
+  // A segment, and the part of it that a device copies to and from.
   struct Mapped {
     std::shared_ptr<Segment> segment;
     std::span<std::byte> pinned;
@@ -214,7 +214,7 @@ class Connection final : public WorkerConnection {
     if (hooks_.unpin && !mapped.pinned.empty()) hooks_.unpin(mapped.pinned);
   }
 
-  // The segment of a bulk message, if its bytes are as they were sent.
+  // Returns the segment of a bulk message, if its bytes are as they were sent.
   absl::StatusOr<std::shared_ptr<Segment>> Bulk(const BulkMessage& bulk) const {
     std::shared_ptr<Segment> segment = Find(bulk.segment, bulk.size);
     if (segment == nullptr) return absl::InvalidArgumentError("bulk data in an unknown segment");
@@ -321,7 +321,7 @@ class Connection final : public WorkerConnection {
   std::unique_ptr<Engine> engine_;
   SlicePart part_;
   std::map<uint32_t, Mapped> segments_;
-  std::unique_ptr<Executor> executor_;  // to look through frames
+  std::unique_ptr<Executor> executor_;  // checks frames
   BulkSegments bulk_;
   std::optional<display::FrameLayout> layout_;
 };

@@ -1,4 +1,5 @@
-// One engine's owner, at the worker's side: what it sends, carried out message after message by an engine of its own.
+// The connection to one engine's owner, at the worker's side: an engine of its own executes the
+// owner's messages, one after another.
 #pragma once
 
 #include <functional>
@@ -12,13 +13,13 @@
 
 namespace voxeld::gpu {
 
-// Called by all connections' threads.
+// The functions are called by all connections' threads.
 struct WorkerHooks {
-  // Makes the engine; must carry out calls inline.
+  // Creates the engine, which must execute calls inline.
   std::function<absl::StatusOr<std::unique_ptr<Engine>>(const EngineOptions&)> make_engine;
-  // A segment came, or goes: to be pinned. May be empty.
+  // Called when a segment arrives, to pin it, or when it is dropped, to unpin it. May be empty.
   std::function<void(std::span<std::byte>)> pin, unpin;
-  // The same of bulk memory, which cannot be written; `unpin` undoes it.
+  // The same for bulk memory, which cannot be written; `unpin` undoes it.
   std::function<void(std::span<std::byte>)> pin_read_only;
 };
 
@@ -26,12 +27,13 @@ struct WorkerHooks {
 class WorkerConnection {
  public:
   virtual ~WorkerConnection() = default;
-  // Carries a message out and sends its answer; its descriptor is taken, or closed. What is not OK ends the worker:
-  // Unavailable (the owner is gone), DataLoss (the engine is lost; the owner has been told), or else it was no protocol.
+  // Executes a message and sends its answer; takes or closes its descriptor. A status that is not
+  // OK ends the worker: Unavailable (the owner is gone), DataLoss (the engine is lost; the owner
+  // has been notified), or another code for a protocol error.
   virtual absl::Status Handle(Message& message) = 0;
 };
 
-// Answers go to `socket`, which stays the caller's. `hooks` outlive it.
+// Answers are sent to `socket`, which the caller keeps. `hooks` must outlive the connection.
 std::unique_ptr<WorkerConnection> NewWorkerConnection(int socket, const WorkerHooks& hooks);
 
 }  // namespace voxeld::gpu

@@ -30,12 +30,12 @@
 namespace voxeld::gpu {
 namespace {
 
-// The first answer comes once there is a CUDA context, which can take seconds.
+// The first answer comes when the CUDA context exists, which can take seconds.
 constexpr int64_t kFirstAnswerFactor = 10;
-// What a byte that goes with a call may take: checked and copied twice, on a slow host.
+// The time that a byte sent with a call may take: it is checked and copied twice, on a slow host.
 constexpr int64_t kNsPerByte = 4;
 
-// An answer that is a status only.
+// Converts an answer that is only a status.
 absl::Status PlainStatus(const absl::StatusOr<Message>& answer) {
   if (!answer.ok()) return answer.status();
   if (answer->type != MessageType::kDone) return absl::DataLossError("an answer of another type");
@@ -50,7 +50,7 @@ absl::StatusOr<RankLink::Invitation> InvitationOf(const absl::StatusOr<Message>&
   return status.ok() ? absl::DataLossError("the worker's invitation is none") : status;
 }
 
-// Names the first `size` bytes of a segment, their CRC worked out when they go.
+// Names the first `size` bytes of a segment; their CRC is computed when the message is sent.
 std::function<void(Message&)> NameBulk(SegmentPool::Lease lease, size_t size) {
   return [lease = std::move(lease), size](Message& message) {
     const uint32_t crc = display::Crc32c(lease->segment->bytes().first(size));
@@ -75,8 +75,8 @@ class WorkerEngine final : public RankWorker {
 
   ~WorkerEngine() override { channel_->Close(); }
 
-  // Asks for the engine; `options_.wait_until_ready` says whether the answer is waited for. `opened`
-  // (may be empty) is told, if it is not.
+  // Requests the engine; `options_.wait_until_ready` says whether to wait for the answer. If not,
+  // calls `opened` (may be empty) with the result.
   absl::Status Open(std::function<void(const absl::Status&)> opened) {
     OpenMessage open;
     open.kind = options_.kind;
@@ -109,7 +109,7 @@ class WorkerEngine final : public RankWorker {
     {
       sync::MutexLock lock(mutex_);
       ++target_;
-      slots_.clear();  // what they hold is of another target
+      slots_.clear();  // the frames in them are of another target
     }
     Ask<absl::Status>(std::move(done), [&](auto answer) {
       channel_->Call(MakeMessage(MessageType::kTarget, 0, BulkMessage{}),
@@ -150,7 +150,7 @@ class WorkerEngine final : public RankWorker {
           MakeMessage(MessageType::kApply, 0, BulkMessage{}), NameBulk(lease, size),
           [this, lease, change = *std::move(change),
            answer](const absl::StatusOr<Message>& message) mutable {
-            lease = nullptr;  // given back before the answer
+            lease = nullptr;  // released before the answer
             const absl::Status status = PlainStatus(message);
             Judge(status);
             if (status.ok()) ledger_.Apply(std::move(change), info_.kind == EngineKind::kCuda);
@@ -242,12 +242,12 @@ class WorkerEngine final : public RankWorker {
     return absl::OkStatus();
   }
 
-  // After an answer that comes to a DataLoss the engine is gone.
+  // After an answer with a DataLoss, the engine is lost.
   void Judge(const absl::Status& answered) {
     if (absl::IsDataLoss(answered)) channel_->Fail(answered);
   }
 
-  // Has the worker know the segments of these blocks, before what is sent next.
+  // Shows the worker the segments of these blocks, before the next message is sent.
   absl::Status Show(std::span<const BulkBlock> blocks) {
     sync::MutexLock lock(mutex_);
     for (const BulkBlock& block : blocks) {
@@ -271,7 +271,8 @@ class WorkerEngine final : public RankWorker {
     return absl::OkStatus();
   }
 
-  // Has `ask` answered to `done`: on the engine's thread, or inside this call if calls are inline.
+  // Passes the answer of `ask` to `done`: on the engine's thread, or inside this call if calls are
+  // inline.
   template <typename Result, typename DoneFunction, typename AskFor>
   void Ask(DoneFunction done, AskFor&& ask) {
     if (!options_.inline_execution) {
@@ -281,7 +282,7 @@ class WorkerEngine final : public RankWorker {
     done(Await<Result>([&](std::function<void(Result)> answer) { ask(std::move(answer)); }));
   }
 
-  // An answer in its turn, without asking the worker.
+  // Answers in the call's turn, without asking the worker.
   template <typename DoneFunction>
   void Refuse(DoneFunction done, absl::Status status) {
     if (options_.inline_execution) return done(std::move(status));
@@ -290,7 +291,7 @@ class WorkerEngine final : public RankWorker {
     });
   }
 
-  // A segment for a frame, and the target (counted) that it is for.
+  // A segment for a frame, and the number of the target that it is for.
   struct Slot {
     SegmentPool::Lease lease;
     uint64_t target = 0;
@@ -358,17 +359,17 @@ class WorkerEngine final : public RankWorker {
   EngineInfo info_;
   std::shared_ptr<CallChannel> channel_;
   const std::shared_ptr<WorkerStaging> staging_;
-  const std::shared_ptr<SegmentNews> news_ = std::make_shared<SegmentNews>();  // of results_
+  const std::shared_ptr<SegmentNews> news_ = std::make_shared<SegmentNews>();  // for results_
   SegmentPool results_;
   sync::Mutex mutex_;
-  std::optional<display::FrameLayout> layout_ VOXELD_GUARDED_BY(mutex_);  // that the worker has
-  uint64_t target_ VOXELD_GUARDED_BY(mutex_) = 0;                         // sent, counted
+  std::optional<display::FrameLayout> layout_ VOXELD_GUARDED_BY(mutex_);  // the worker has it
+  uint64_t target_ VOXELD_GUARDED_BY(mutex_) = 0;                         // number of those sent
   std::vector<SegmentPool::Lease> slots_ VOXELD_GUARDED_BY(mutex_);       // for frames, newest last
   // The segments of bulk memory that the worker knows, by number.
   absl::flat_hash_map<uint64_t, std::weak_ptr<BulkSegment>> shown_ VOXELD_GUARDED_BY(mutex_);
   // On the channel's thread.
   BulkLedger ledger_;
-  std::unique_ptr<Executor> executor_;  // to look through frames
+  std::unique_ptr<Executor> executor_;  // checks frames
 };
 
 absl::StatusOr<std::shared_ptr<CallChannel>> Connect(const EngineOptions& options) {

@@ -1,6 +1,6 @@
-// An engine in a process of its own, as its owner sees it: the ordinary door, across which calls go
-// by messages and bulk data by shared memory. What goes wrong over there, a fault of the GPU say,
-// ends in DataLoss here.
+// An engine in a process of its own, as its owner uses it: the usual interface, with calls sent as
+// messages and bulk data in shared memory. A fault in that process, for example of the GPU, ends in
+// DataLoss here.
 #pragma once
 
 #include <functional>
@@ -15,39 +15,42 @@
 
 namespace voxeld::gpu {
 
-// Starts the program, unless options.workers has one for that GPU, and waits until its engine is
-// there, at most options.worker_deadline_ns (for the first CUDA context, ten times that). `reason`:
-// for EngineInfo. FailedPrecondition if the program or the engine cannot be had.
+// Starts the program, unless options.workers has a process for that GPU, and waits until its engine
+// is ready, for at most options.worker_deadline_ns (for the first CUDA context, ten times that).
+// `reason`: for EngineInfo. Errors: FailedPrecondition if the program or the engine is not
+// available.
 //
 // Contract, beyond gpu/engine.h's: a call whose answer does not come within worker_deadline_ns (and
-// 4 ns for each byte that goes with it), and every call after the process has ended, ends in
-// DataLoss; the process is killed and never waited for. Answers come on a thread of the engine's.
+// 4 ns for each byte that is sent with it), and every call after the process has ended, ends in
+// DataLoss; the process is killed, and nothing waits for it. Answers come on one of the engine's
+// threads.
 absl::StatusOr<std::unique_ptr<Engine>> CreateWorkerEngine(const EngineOptions& options,
                                                            std::string reason);
 
-// One of several that make a display together (gpu/ranks).
+// One of several engines that drive a display together (gpu/ranks).
 class RankWorker : public Engine {
  public:
-  // RankLink's, over there. Joining may take as long as a first answer.
+  // The worker's RankLink. Joining may take as long as a first answer.
   virtual void Invite(const std::string& library,
                       std::function<void(absl::StatusOr<RankLink::Invitation>)> done) = 0;
   virtual void Join(const std::string& library, const RankLink::Invitation& invitation, int rank,
                     int ranks, Done done) = 0;
-  // Ends the process soon: all that is owed, and every later call, ends in `why`, a DataLoss.
+  // Ends the process soon: all pending calls, and every later call, end in `why`, a DataLoss.
   virtual void GiveUp(const absl::Status& why) = 0;
-  // Ends the connection: all that is owed is answered, Cancelled, before it returns, and so is every
-  // later call. Not from the engine's own thread.
+  // Ends the connection: before it returns, all pending calls are answered with Cancelled, and so
+  // is every later call. Must not be called from the engine's own thread.
   virtual void Close() = 0;
 };
 
-// The same as a rank: with a process of its own, and staging that it shares with the others. Does not
-// wait: `opened` is told, once, whether its engine is there; after an error all calls end in
-// DataLoss. options.inline_execution is not looked at.
+// The same as a rank: with a process of its own, and staging memory that it shares with the other
+// ranks. Does not wait: `opened` is called once with the result of starting its engine; after an
+// error all calls end in DataLoss. Ignores options.inline_execution.
 absl::StatusOr<std::unique_ptr<RankWorker>> CreateRankWorker(
     const EngineOptions& options, std::shared_ptr<WorkerStaging> staging,
     std::function<void(const absl::Status&)> opened);
 
-// Whether a DataLoss says that no answer came in time: the engine may have been slow, not faulty.
+// Returns whether a DataLoss says that no answer came in time: the engine may have been slow, not
+// faulty.
 bool IsLate(const absl::Status& status);
 
 }  // namespace voxeld::gpu

@@ -1,4 +1,4 @@
-// The workers that there are, so that all engines of a GPU share one.
+// The running workers, so that all engines of a GPU share one.
 #pragma once
 
 #include <map>
@@ -16,8 +16,8 @@ namespace voxeld::gpu {
 // Thread-safe. A process lives as long as an engine uses it.
 class WorkerPool {
  public:
-  // The process of this program for that kind of engine and device, a new one if there is none or it
-  // has been lost.
+  // Returns the process of this program for that kind of engine and device. Starts a new one if
+  // none is running or if it was lost.
   absl::StatusOr<std::shared_ptr<WorkerProcess>> Acquire(const std::string& program,
                                                          EngineKind kind, int device);
 

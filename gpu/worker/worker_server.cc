@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kLostEngine = 3;
 
-// Until the owner ends; what the process ends with.
+// Runs until the owner closes the connection. Returns the exit status of the process.
 int Serve(int socket, const WorkerHooks& hooks) {
   const std::unique_ptr<WorkerConnection> connection = NewWorkerConnection(socket, hooks);
   for (;;) {
@@ -41,11 +41,12 @@ void ServeEngines(int control, const WorkerHooks& hooks) {
 
 void BecomeWorker() {
   setenv("CUDA_MODULE_LOADING", "EAGER", 0);
-  // Multicast over NVLink takes a service of the machine that may not be there, and then hangs; ranks
-  // of one display are of one host, and nobody else is to reach where they meet.
+  // Multicast over NVLink needs a service of the machine that may be missing, and then hangs. The
+  // ranks of one display are on one host, and no other host should reach the address where they
+  // meet.
   setenv("NCCL_NVLS_ENABLE", "0", 1);
   setenv("NCCL_SOCKET_IFNAME", "lo", 0);
-  // A terminal's Ctrl-C is for the owner, who ends its worker by closing the socket.
+  // A terminal's Ctrl-C is meant for the owner, which ends its worker by closing the socket.
   std::signal(SIGINT, SIG_IGN);
   std::signal(SIGTERM, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);

@@ -1,4 +1,4 @@
-// Staging memory of an engine in another process, or of several that are given the same: a block is
+// Staging memory of an engine in another process, or of several that are sent the same: a block is
 // one segment, which each of them maps.
 #pragma once
 
@@ -15,13 +15,14 @@
 
 namespace voxeld::gpu {
 
-// A pool's segments as those at the other ends of some channels come to know them. Thread-safe.
+// Announces a pool's segments to the workers at the other ends of some channels. Thread-safe.
 class SegmentNews {
  public:
-  // Before the first segment. One that is gone is left out.
+  // Must be called before the first segment. Listeners that have expired are skipped.
   void AddListener(std::weak_ptr<CallChannel> channel);
 
-  // What the pool calls. `staging`: of what comes, not of what is asked for.
+  // Returns a callback for the pool. `staging`: the segments are for data to the worker, not for
+  // results.
   static SegmentPool::Told Added(std::shared_ptr<SegmentNews> news, bool staging);
   static SegmentPool::Told Dropped(std::shared_ptr<SegmentNews> news);
 
@@ -32,7 +33,7 @@ class SegmentNews {
   std::vector<std::weak_ptr<CallChannel>> channels_ VOXELD_GUARDED_BY(mutex_);
 };
 
-// A block of staging in a segment.
+// A block of staging memory in a segment.
 class LeasedMemory final : public StagingBlock::Memory {
  public:
   LeasedMemory(SegmentPool::Lease lease, size_t size) : lease_(std::move(lease)), size_(size) {}
@@ -50,9 +51,9 @@ class WorkerStaging {
   explicit WorkerStaging(uint64_t limit_bytes);
 
   void AddListener(std::weak_ptr<CallChannel> channel) { news_->AddListener(std::move(channel)); }
-  // As Engine::AcquireStaging; its memory is LeasedMemory.
+  // The same as Engine::AcquireStaging; the memory is LeasedMemory.
   absl::StatusOr<StagingBlock> Acquire(size_t size);
-  // For other pools of the same workers.
+  // Returns the numbers, for other pools of the same workers.
   const SegmentPool::Ids& ids() const { return ids_; }
 
  private:
