@@ -24,7 +24,7 @@ absl::StatusOr<std::unique_ptr<Api>> Api::Open(int device) {
   cudaError_t error = cudaGetDeviceProperties(&properties, device);
   if (error == cudaSuccess) error = cudaSetDevice(device);
   if (error == cudaSuccess) error = cudaSetDeviceFlags(cudaDeviceScheduleBlockingSync);
-  if (error == cudaSuccess) error = cudaFree(nullptr);  // makes the context
+  if (error == cudaSuccess) error = cudaFree(nullptr);  // creates the context
   if (error != cudaSuccess) {
     return absl::FailedPreconditionError(
         absl::StrCat("CUDA device ", device, " cannot be used: ", Name(error)));
@@ -38,7 +38,7 @@ absl::Status Api::Enter() const {
 }
 
 absl::Status Api::Failed(const char* what, cudaError_t error) {
-  cudaGetLastError();  // what is not sticky is told once
+  cudaGetLastError();  // errors that are not sticky are reported once
   return ToStatus(what, error);
 }
 

@@ -1,13 +1,13 @@
-// The one layer through which CUDA is called: counts the calls, turns their errors into Status, and
-// can make any of them fail. (Not through it go the end of things, where an error changes nothing,
-// and the pinning of memory, where it costs speed.)
+// The only layer through which CUDA is called: it counts the calls, turns their errors into Status,
+// and can make any of them fail. (Exceptions are calls in destructors, where an error changes
+// nothing, and the pinning of memory, where an error only costs speed.)
 //
 //   api.Call("cudaMemcpyAsync", [&] { return cudaMemcpyAsync(…); });
 //
-// Codes: ResourceExhausted (out of memory; the device goes on), DataLoss (everything else: an
-// illegal address and its kin are sticky, the process that saw one can never use the device again,
-// and what the device holds cannot be trusted), FailedPrecondition (no driver, no device; from Open
-// alone).
+// Codes: ResourceExhausted (out of memory; the device continues to work), DataLoss (every other
+// error: an illegal address and similar errors are sticky, so the process can never use the device
+// again, and the contents of the device cannot be trusted), FailedPrecondition (no driver, no
+// device; only from Open).
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -23,27 +23,28 @@
 
 namespace voxeld::gpu::cuda {
 
-// Which call fails, and how.
+// Which call fails, and with which error.
 struct FaultPlan {
-  uint64_t call = 0;  // the n-th from the plan's setting on, 1 the next; 0: none
+  uint64_t call = 0;  // the n-th call after the plan was set, 1 is the next; 0: none
   cudaError_t error = cudaSuccess;
-  bool sticky = false;  // so does every later one
+  bool sticky = false;  // every later call fails too
 
-  // What the n-th call ends in; cudaSuccess: as it would without a plan.
+  // Returns the error of the n-th call; cudaSuccess: the call's own result.
   cudaError_t At(uint64_t n) const {
     const bool fails = call != 0 && (n == call || (sticky && n > call));
     return fails ? error : cudaSuccess;
   }
 };
 
-// Thread-safe, but for SetFaults.
+// Thread-safe, except for SetFaults.
 class Api {
  public:
-  // The device of that number. FailedPrecondition says what is missing.
+  // Opens the device of that number. Errors: FailedPrecondition says what is missing.
   static absl::StatusOr<std::unique_ptr<Api>> Open(int device);
 
   const cudaDeviceProp& device() const { return properties_; }
-  // Makes the device current in the calling thread: once in each that calls.
+  // Makes the device current in the calling thread. Must be called once in each thread that uses
+  // the device.
   absl::Status Enter() const;
 
   template <typename Function>

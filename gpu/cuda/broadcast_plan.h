@@ -1,4 +1,5 @@
-// How an upload goes to several devices: piece by piece, each broadcast while the next is copied.
+// Plans how an upload reaches several devices: piece by piece, where each piece is broadcast while
+// the next is copied.
 #pragma once
 
 #include <cstddef>
@@ -8,14 +9,14 @@
 
 namespace voxeld::gpu::cuda {
 
-// A run of the devices' memory, and what of it comes from the host.
+// A run of the devices' memory, and the copies into it from the host.
 struct BroadcastStep {
   size_t begin = 0, size = 0;
   std::vector<UploadPlan::Copy> copies;
 };
 
-// Runs of `most` bytes (the last may be shorter) that together are the plan's memory. It follows from
-// the plan alone, so all ranks that were given one delta have the same.
+// Returns runs of `most` bytes (the last may be shorter) that together are the plan's memory. The
+// result depends on the plan alone, so all ranks that received the same delta have the same steps.
 std::vector<BroadcastStep> BroadcastSteps(const UploadPlan& plan, size_t most);
 
 }  // namespace voxeld::gpu::cuda

@@ -19,7 +19,7 @@ CompiledFormulas::~CompiledFormulas() {
   }
   queued_.NotifyAll();
   if (thread_.joinable()) thread_.join();
-  if (loaded_ != 0) cudaDeviceSynchronize();  // they may be at work
+  if (loaded_ != 0) cudaDeviceSynchronize();  // kernels may be running
   for (const auto& [key, formula] : formulas_) {
     if (formula.code != nullptr) cudaLibraryUnload(formula.code);
   }
@@ -69,7 +69,7 @@ absl::StatusOr<cudaKernel_t> CompiledFormulas::Find(std::span<const uint32_t> ho
   if (!thread_.joinable()) {
     try {
       thread_ = std::thread([this] { CompileQueued(); });
-    } catch (const std::system_error&) {  // there is none to be had now
+    } catch (const std::system_error&) {  // out of threads or memory: nothing is compiled now
       const sync::MutexLock lock(mutex_);
       queue_.clear();
       formula.state = State::kSeen;
@@ -110,13 +110,13 @@ absl::Status CompiledFormulas::TakeDone() {
     if (status.ok()) {
       status = Load(found->second, one.module);
     } else {
-      found->second.state = State::kSeen;  // it is compiled anew when it comes again
+      found->second.state = State::kSeen;  // it is compiled again when it is requested again
     }
   }
   return status;
 }
 
-// A module that the device does not take is as good as none.
+// A module that the device rejects is treated as if there were none.
 absl::Status CompiledFormulas::Load(Formula& formula, const absl::StatusOr<std::string>& module) {
   formula.state = State::kNone;
   if (!module.ok()) return absl::OkStatus();
@@ -126,7 +126,7 @@ absl::Status CompiledFormulas::Load(Formula& formula, const absl::StatusOr<std::
     if (error == cudaSuccess) {
       error = cudaLibraryGetKernel(&formula.kernel, formula.code, kFormulaKernel);
     }
-    // Modules may be brought to the device as late as they are asked for something.
+    // Modules may be loaded only when something in them is first used, so use the kernel now.
     cudaFuncAttributes attributes;
     if (error == cudaSuccess) error = cudaFuncGetAttributes(&attributes, formula.kernel);
     if (error == cudaSuccess) {

@@ -1,6 +1,6 @@
-// Kernels for implicit shapes' programs, compiled for each as they are asked for. Programs that differ in
-// constants alone share a kernel; a compiled formula covers the same voxels as an interpreted one does, so it
-// can take its place in any frame.
+// Kernels for the programs of implicit shapes, compiled on demand. Programs that differ only in
+// constants share a kernel. A compiled formula covers the same voxels as an interpreted one, so it
+// can replace it in any frame.
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -24,31 +24,31 @@
 
 namespace voxeld::gpu::cuda {
 
-// Thread-bound, but for its own thread, which compiles and knows no device.
+// Thread-bound, except for its own thread, which compiles and does not use the device.
 class CompiledFormulas {
  public:
-  // A program heavier than kMostWeight (FormulaWeight) is left to be interpreted: its code would be
-  // compiled for seconds.
+  // A program heavier than kMostWeight (FormulaWeight) is interpreted, because compiling its code
+  // would take seconds.
   static constexpr size_t kMostKept = 512;
-  // So many wait to be compiled; what comes then is to ask again.
+  // The limit of programs that wait to be compiled; later requests have to be repeated.
   static constexpr size_t kMostQueued = 32;
   static constexpr uint64_t kMostWeight = 600;
 
-  // Of no more programs than `most_kept`, but for those that a frame needs, if they are not being compiled, is anything kept: the one that was
-  // asked for the longest ago goes, with its kernel.
+  // Keeps at most `most_kept` programs, and more only if a frame needs them or they are being
+  // compiled. Discards the program whose last request is the oldest, with its kernel.
   CompiledFormulas(Api& api, CompileFormulas when, size_t most_kept = kMostKept);
   ~CompiledFormulas();
   CompiledFormulas(const CompiledFormulas&) = delete;
   CompiledFormulas& operator=(const CompiledFormulas&) = delete;
 
-  // What is found from here on stays until the next call: kernels may be launched later.
+  // Kernels found from here on stay valid until the next call, because they may be launched later.
   void BeginFrame() { begun_ = asked_; }
-  // The kernel for a program (implicit/hoisted.h); null: there is none, or not yet. An error is one of the
-  // device's. With kLater a program is compiled when it comes for the second time: one that comes once and
-  // stays is drawn once.
+  // Returns the kernel for a program (implicit/hoisted.h); null if it is not compiled (yet).
+  // Errors: those of the device. With kLater a program is compiled when it is requested for the
+  // second time, because a shape that does not change is drawn only once.
   absl::StatusOr<cudaKernel_t> Find(std::span<const uint32_t> hoisted);
 
-  // So far, also of what has gone.
+  // Returns the number compiled so far, discarded ones included.
   size_t compiled() const { return loaded_; }
   size_t kept() const { return formulas_.size(); }
 
@@ -59,7 +59,7 @@ class CompiledFormulas {
     State state = State::kSeen;
     cudaLibrary_t code = nullptr;
     cudaKernel_t kernel = nullptr;
-    uint64_t asked = 0;  // when last, by asked_
+    uint64_t asked = 0;  // the value of asked_ at the last request
   };
   struct Work {
     Key key;
@@ -70,13 +70,14 @@ class CompiledFormulas {
     absl::StatusOr<std::string> module;
   };
 
-  // False: there is no compiler.
+  // Returns false if no compiler is available.
   bool HasCompiler();
   absl::StatusOr<std::string> Compile(const std::string& source) const;
   absl::Status TakeDone() VOXELD_EXCLUDES(mutex_);
   absl::Status Load(Formula& formula, const absl::StatusOr<std::string>& module);
   void CompileQueued() VOXELD_EXCLUDES(mutex_);
-  // Makes room for one more. What a kernel was launched for may still be under way: it is waited for.
+  // Makes room for one more. Waits for the device, because a kernel that is discarded may still be
+  // running.
   absl::Status Forget();
 
   Api& api_;
@@ -93,7 +94,7 @@ class CompiledFormulas {
   std::deque<Work> queue_ VOXELD_GUARDED_BY(mutex_);
   std::vector<Done> done_ VOXELD_GUARDED_BY(mutex_);
   bool ends_ VOXELD_GUARDED_BY(mutex_) = false;
-  std::thread thread_;  // once something is to be compiled later
+  std::thread thread_;  // started when something is to be compiled later
 };
 
 }  // namespace voxeld::gpu::cuda

@@ -1,16 +1,18 @@
-// Which voxels an implicit shape covers (implicit/field.h), tile by tile, by blocks of threads: P at a tile's
-// voxels and one around it, a thread a row along x; then, from which side of the surface each is on, who has
-// a neighbour on the other one, and who lies within the shell.
+// Computes which voxels an implicit shape covers (implicit/field.h), tile by tile, by blocks of
+// threads: P at a tile's voxels and those around it, a thread for each row along x; then which side
+// of the surface each voxel is on, which voxels have a neighbour on the other side, and which lie
+// within the shell.
 //
-// What computes P is a Formula: interpreted (kernels_implicit.cu), or compiled at run time from the same
-// program (implicit/formula_text.h), and then this file with it. So it knows what covered_types.h and
-// numbers know, no more.
+// P is computed by a Formula: interpreted (kernels_implicit.cu), or compiled at run time from the
+// same program (implicit/formula_text.h), together with this file. So this file may use only
+// covered_types.h and the number types.
 //
 //   struct Formula {
-//     using Of = …;  // what it is made of, beside the view
-//     Formula(const CoveredView& view, const Of& of, uint32_t y, uint32_t z);  // places along these axes
-//     Six Values(uint32_t x) const;                                            // P at six places from x on
-//     bool IsWithin(uint32_t x) const;                                         // |P| ≤ h·|∇P| at one
+//     using Of = …;  // the data that it is made from, besides the view
+//     Formula(const CoveredView& view, const Of& of, uint32_t y, uint32_t z);  // places along y
+//     and z
+//     Six Values(uint32_t x) const;      // P at six places from x on
+//     bool IsWithin(uint32_t x) const;   // |P| ≤ h·|∇P| at one place
 //   };
 #pragma once
 
@@ -25,24 +27,25 @@ inline constexpr int32_t kCoveredRim =
     kCoveredEdge + 2;  // voxels of a tile's row and those around it
 inline constexpr uint32_t kCoveredAcross = kCoveredRim * kCoveredRim;
 inline constexpr uint32_t kCoveredThreads = (kCoveredAcross + 31) / 32 * 32;
-inline constexpr uint32_t kCoveredBlocks = 3;  // of a multiprocessor
-inline constexpr uint32_t kCoveredAtOnce = 8;  // items that a block of threads looks through
+inline constexpr uint32_t kCoveredBlocks = 3;  // per multiprocessor
+inline constexpr uint32_t kCoveredAtOnce = 8;  // items that a block of threads handles
 
 struct CoveredScratch {
   float p[kCoveredRim][kCoveredAcross];  // by place along x, then row: y first, then z
-  // By row: bit x + 1 is voxel x of the tile: whether it is inside; whether it may lie within the shell.
+  // By row: bit x + 1 says for voxel x of the tile whether it is inside, and whether it may lie
+  // within the shell.
   uint32_t inside[kCoveredAcross], near[kCoveredAcross];
-  // Of the tile's own rows, y first, then z: bit x: what is covered.
+  // For the tile's own rows, y first, then z: bit x says whether the voxel is covered.
   uint32_t covered[kCoveredRows];
-  // Voxels to be looked at by whoever is free: x, then y, then z, four bits each.
+  // The number of listed voxels, which any free thread tests: x, then y, then z, four bits each.
   uint32_t doubtful;
   uint16_t list[kCoveredRows * kCoveredEdge];
 };
 
-// An item's voxels that lie in the bounds.
+// The voxels of an item that lie in the bounds.
 struct CoveredTile {
   int32_t lo[3], size[3];
-  int32_t skipped[3];  // voxels of the tile before them
+  int32_t skipped[3];  // voxels of the tile before those
 
   __device__ CoveredTile(const CoveredView& view, uint32_t item) {
     const uint32_t nx = static_cast<uint32_t>(view.blocks[0]),
@@ -56,18 +59,19 @@ struct CoveredTile {
       size[a] = end - lo[a];
     }
   }
-  // Of the voxel before the tile's first, in CoveredAxis.
+  // Returns the place, in CoveredAxis, of the voxel before the tile's first.
   __device__ uint32_t PlaceBefore(const CoveredView& view, int a) const {
     return static_cast<uint32_t>(lo[a] - view.lo[a]);
   }
-  // Of row (y, z), bits that there are; the first voxel's is bit 0.
+  // Returns the bits of the voxels that exist in row (y, z); the first voxel's is bit 0.
   __device__ uint32_t Within(int32_t y, int32_t z) const {
     const bool is_there = y >= 0 && z >= 0 && y < size[1] && z < size[2];
     return is_there ? (1u << size[0]) - 1 : 0;
   }
 };
 
-// Of a row's voxels, a bit each as in CoveredScratch: those that have a neighbour on the other side.
+// Returns, as bits in the order of CoveredScratch, a row's voxels that have a neighbour on the
+// other side.
 __device__ inline uint32_t BesideOthers(const CoveredScratch& s, uint32_t row, bool cover) {
   const uint32_t own = s.inside[row];
   uint32_t others = own ^ own << 1 | own ^ own >> 1;
@@ -83,8 +87,8 @@ __device__ inline uint32_t BesideOthers(const CoveredScratch& s, uint32_t row, b
   return others;
 }
 
-// Whether the voxel at `x` of the row, both from the rim on, has a neighbour on the other side whose |P| is
-// not less; what is no number is infinite.
+// Returns whether the voxel at `x` of the row, both counted from the rim on, has a neighbour on the
+// other side whose |P| is not less; NaN counts as infinite.
 __device__ inline bool IsNearest(const CoveredScratch& s, uint32_t row, int32_t x, bool cover) {
   const float p = s.p[x][row];
   const bool inside = p <= 0;
@@ -106,7 +110,7 @@ __device__ inline bool IsNearest(const CoveredScratch& s, uint32_t row, int32_t 
   return false;
 }
 
-// P of a tile and the voxels around it. By the whole block.
+// Computes P for a tile and the voxels around it. Called by the whole block.
 template <class Formula>
 __device__ void FindCoveredValues(const CoveredView& view, const typename Formula::Of& of,
                                   const CoveredTile& tile, float reach, CoveredScratch& s) {
@@ -132,7 +136,7 @@ __device__ void FindCoveredValues(const CoveredView& view, const typename Formul
   __syncthreads();
 }
 
-// Lists voxels of the tile's row `own`, bits. By a whole warp.
+// Lists voxels of the tile's row `own`, given as bits. Called by a whole warp.
 __device__ inline void ListDoubtful(uint32_t bits, uint32_t own, CoveredScratch& s) {
   const uint32_t lane = threadIdx.x % 32, count = static_cast<uint32_t>(__popc(bits));
   uint32_t until = count;
@@ -158,7 +162,8 @@ struct DoubtfulVoxel {
   __device__ uint32_t row() const { return (z + 1) * kCoveredRim + y + 1; }
 };
 
-// f(voxel) of those listed: whether it is covered; none is listed then. By the whole block.
+// Calls f(voxel), which returns whether the voxel is covered, for each listed voxel, and clears the
+// list. Called by the whole block.
 template <class F>
 __device__ void JudgeDoubtful(CoveredScratch& s, F&& f) {
   __syncthreads();
@@ -172,7 +177,7 @@ __device__ void JudgeDoubtful(CoveredScratch& s, F&& f) {
   __syncthreads();
 }
 
-// Which voxels of the tile a surface covers. By the whole block.
+// Computes which voxels of the tile a surface covers. Called by the whole block.
 template <class Formula>
 __device__ void FindCoveredSurface(const CoveredView& view, const typename Formula::Of& of,
                                    const CoveredTile& tile, CoveredScratch& s) {
@@ -183,7 +188,7 @@ __device__ void FindCoveredSurface(const CoveredView& view, const typename Formu
     there = tile.Within(static_cast<int32_t>(own % kCoveredEdge),
                         static_cast<int32_t>(own / kCoveredEdge));
     const uint32_t beside = BesideOthers(s, row, view.cover) >> 1 & there;
-    // Without a shell it is covered where P is 0.
+    // Without a shell, voxels with P = 0 are covered.
     const uint32_t zero = view.half == 0 ? s.near[row] >> 1 & there : 0;
     s.covered[own] = zero;
     ListDoubtful(beside & ~zero, own, s);
@@ -202,7 +207,7 @@ __device__ void FindCoveredSurface(const CoveredView& view, const typename Formu
   });
 }
 
-// An item's rows. By the whole block.
+// Computes an item's rows. Called by the whole block.
 template <class Formula>
 __device__ void FindCoveredTile(const CoveredView& view, const typename Formula::Of& of,
                                 uint32_t item, float reach, bool whole, CoveredScratch& s) {
@@ -225,26 +230,26 @@ __device__ void FindCoveredTile(const CoveredView& view, const typename Formula:
   __syncthreads();
 }
 
-// Implicit::kNothing and kEverything.
+// The same values as Implicit::kNothing and kEverything.
 inline constexpr float kCoversNothing = -1, kCoversEverything = -2;
 
-// The rows of kCoveredAtOnce items, those of which anything is covered.
+// Computes the rows of kCoveredAtOnce items, if anything in them is covered.
 template <class Formula>
 __device__ void FindCoveredItems(const CoveredView& view, const typename Formula::Of& of,
                                  CoveredScratch& s) {
   if (threadIdx.x == 0) s.doubtful = 0;  // before the first barrier
   for (uint32_t i = 0; i < kCoveredAtOnce; ++i) {
     const uint32_t item = blockIdx.x * kCoveredAtOnce + i;
-    if (item >= view.items) return;  // the same for every thread, as what follows
+    if (item >= view.items) return;  // the same for every thread, as is the code below
     const float reach = __ldg(&view.reach[item]);
     if (reach == kCoversNothing) continue;
     FindCoveredTile<Formula>(view, of, item, reach, reach == kCoversEverything, s);
   }
 }
 
-// ---------------------------------------------------------------------------- formulas that were compiled
+// ---------------------------------------------------------------------------- compiled formulas
 
-// What a row's formula reads: N is a number, or several side by side, or either with gradients.
+// Reads a value for a row's formula: N is a number, several side by side, or either with gradients.
 __device__ inline float CoveredValue(const CoveredAxis& axis, uint32_t value, uint32_t place,
                                      float) {
   return __ldg(&axis.value[(value - axis.first) * axis.places + place]);
@@ -265,7 +270,7 @@ __device__ inline Six CoveredDistance(const CoveredAxis& axis, uint32_t place, S
   return implicit::EachOf<6>([&](size_t i) { return __ldg(&axis.distance[place + i]); });
 }
 
-// Where a formula is asked for: places along x (of Six the first), y and z.
+// The place at which a formula is evaluated: places along x (the first, for Six), y and z.
 template <class N>
 struct CoveredAt {
   const CoveredView& view;
@@ -274,13 +279,13 @@ struct CoveredAt {
   __device__ N Hoisted(int axis, uint32_t value) const {
     return CoveredValue(view.axis[axis], value, axis == 0 ? x : axis == 1 ? y : z, N());
   }
-  // An instruction's immediate, by its place among the words of hoisted.h.
+  // Returns an instruction's immediate, by its place among the words of hoisted.h.
   __device__ N Constant(uint32_t word) const {
     return implicit::ConstantLike(N(), implicit::FromBits(__ldg(&view.hoisted[word])));
   }
   __device__ N Voxel() const { return implicit::ConstantLike(N(), view.voxel); }
 
-  // As Field::Coordinates.
+  // The same as Field::Coordinates.
   template <class M>
   __device__ M CoordinateOf(int r, M like) const {
     const float* const row = view.inverse[r];
@@ -302,7 +307,7 @@ struct CoveredAt {
   __device__ N Coordinate(int r) const { return Coordinate(r, N()); }
 };
 
-// A Formula of what was compiled (implicit/formula_text.h).
+// A Formula made from compiled text (implicit/formula_text.h).
 template <class Compiled>
 class CompiledFormula {
  public:

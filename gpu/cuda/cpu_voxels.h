@@ -12,8 +12,8 @@
 
 namespace voxeld::gpu::cuda {
 
-// By tile: item i of the drawable is what it covers of tiles[i], the voxels [begin[i], begin[i+1]).
-// A voxel is its index in the tile, from bit 32 on, and its word.
+// The voxels by tile: item i of the drawable is the part that it covers of tiles[i], the voxels
+// [begin[i], begin[i+1]). A voxel is its index in the tile, from bit 32 on, and its word.
 struct CpuVoxels {
   std::vector<uint32_t> tiles;
   std::vector<uint64_t> begin = {0};
@@ -21,7 +21,7 @@ struct CpuVoxels {
   bool singular = false;
 };
 
-// `view`: scene → voxel space. `owned[tile]`: 0 leaves the tile out.
+// `view` maps the scene to voxel space. Tiles with owned[tile] = 0 are left out.
 CpuVoxels DrawOnCpu(const Drawable& drawable, const Affine& view, const TileGrid& grid,
                     std::span<const uint8_t> owned, Executor& executor);
 

@@ -49,7 +49,7 @@ absl::Status CudaCore::SetTarget(const Target& target) {
       *device_, grid, OwnedTiles(tile_to_slices, grid, part_, target.layout.slices),
       !packed.has_value());
   if (!tiles.ok()) return tiles.status();
-  // The tables have been copied from memory that is about to go.
+  // The tables have been copied from memory that is about to be freed.
   if (absl::Status status = device_->Wait(); !status.ok()) return status;
   const bool all_dirty = packed.has_value() && (*pictures)->inherited();
   if (absl::Status status = volume_.SetView(*std::move(tiles), target.view, all_dirty);
@@ -118,7 +118,7 @@ absl::Status CudaCore::ReadVoxels(VoxelBox box, std::span<uint32_t> out) {
     status = volume_.DrawGroup(0, pictures_->index(), pictures_->packed(), device_->stream());
   if (!status.ok()) return status;
   if (out.empty()) return device_->Wait();
-  // Outside the volume there is nothing.
+  // Voxels outside the volume are 0.
   absl::StatusOr<Block> voxels = device_->Zeros(out.size() * sizeof(uint32_t));
   if (!voxels.ok()) return voxels.status();
   status =

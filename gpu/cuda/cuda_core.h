@@ -1,4 +1,5 @@
-// The CUDA engine's work, without its threads of control: what each call of gpu/engine.h does.
+// The work of the CUDA engine, without its threads: the operations behind each call of
+// gpu/engine.h.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +20,8 @@
 
 namespace voxeld::gpu::cuda {
 
-// Thread-bound, but for where it was made. An error leaves it as it was, unless it is DataLoss.
+// Thread-bound, but may be created in another thread. An error leaves it as it was, unless it is
+// DataLoss.
 class CudaCore {
  public:
   CudaCore(std::unique_ptr<Device> device, SlicePart part, const Tuning& tuning = {});

@@ -11,7 +11,7 @@
 
 namespace voxeld::gpu {
 
-// `reason`: for EngineInfo. FailedPrecondition if there is no device that can be used.
+// `reason`: for EngineInfo. Errors: FailedPrecondition if no device is usable.
 absl::StatusOr<std::unique_ptr<Engine>> CreateCudaEngine(const EngineOptions& options,
                                                          std::string reason,
                                                          const cuda::FaultPlan& faults = {},

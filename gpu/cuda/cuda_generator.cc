@@ -109,7 +109,7 @@ absl::Status CudaGenerator::PlaceOn(const Batch& batch, const Plan& plan, Placed
   absl::Status status = device_->Run("PrepareGenerate", [&] {
     return PrepareGenerate(placed.view_, plan.extent.format.sampling, device_->stream());
   });
-  return status.ok() ? device_->Wait() : status;  // the staging memory is the next batch's
+  return status.ok() ? device_->Wait() : status;  // the next batch uses the staging memory
 }
 
 absl::Status CudaGenerator::QueueOnDevice(const PlacedBatch& batch, Format format,
@@ -193,7 +193,7 @@ absl::Status CudaGenerator::GenerateToHost(const PlacedBatch& batch, Format form
   absl::Status status;
   for (uint64_t i = 0, first = 0; first < all && status.ok(); ++i, first += chunk) {
     Slot& slot = slots_[i % kSlots];
-    // The device waits for the slot's last copy, not this thread.
+    // The device, not this thread, waits for the slot's last copy.
     status = device_->api().Call("cudaStreamWaitEvent", [&] {
       return cudaStreamWaitEvent(device_->stream(), slot.copied, 0);
     });
@@ -201,7 +201,7 @@ absl::Status CudaGenerator::GenerateToHost(const PlacedBatch& batch, Format form
     status =
         Queue(slot, batch, format, first, std::min(chunk, all - first), out.data() + first * bytes);
   }
-  // Whatever failed, nothing is written any more when this returns.
+  // On any failure, nothing writes to the output after this returns.
   absl::Status waited = device_->api().Call(
       "cudaStreamSynchronize", [&] { return cudaStreamSynchronize(device_->copies()); });
   return status.ok() ? waited : Settled(status);

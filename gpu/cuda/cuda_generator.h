@@ -1,4 +1,5 @@
-// The generator on CUDA: into device memory, or in chunks whose making and copying overlap.
+// The generator on CUDA: writes into device memory, or in chunks whose generation and copying
+// overlap.
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -19,7 +20,7 @@
 
 namespace voxeld::gpu::cuda {
 
-// A batch that lies on the device, ready to be generated from. Its generator outlives it.
+// A batch that is on the device, ready for generation. Its generator must outlive it.
 class PlacedBatch {
  public:
   uint64_t voxels() const { return extent_.voxels; }
@@ -33,30 +34,33 @@ class PlacedBatch {
 
 class CudaGenerator final : public generate::Generator {
  public:
-  // Looks batches through on `threads` of the CPU's. FailedPrecondition: no such device, or no driver.
+  // `threads`: the CPU's threads that check batches. Errors: FailedPrecondition if the device or
+  // the driver is missing.
   static absl::StatusOr<std::unique_ptr<CudaGenerator>> Open(int device, int threads);
   ~CudaGenerator() override;
 
   std::string name() const override { return "cuda"; }
   absl::StatusOr<generate::Plan> Prepare(const generate::Batch& batch,
                                          generate::Format format) override;
-  // `out` may be any memory of the host's; pinned memory (AllocatePinned) is copied to at the bus's rate.
+  // `out` may be any host memory; the device copies to pinned memory (AllocatePinned) at the rate
+  // of the bus.
   absl::Status Generate(const generate::Batch& batch, const generate::Plan& plan,
                         generate::Format format, std::span<std::byte> out) override;
   absl::StatusOr<generate::HostMemory> Allocate(size_t bytes) override;
-  // What is taken lies in pinned memory.
+  // `take` receives chunks in pinned memory.
   absl::Status Stream(const generate::Batch& batch, const generate::Plan& plan,
                       generate::Format format, uint64_t chunk_voxels,
                       const generate::TakeChunk& take) override;
 
   // ---- device memory
-  // ResourceExhausted: the device has too little memory.
+  // Copies a batch to the device. Errors: ResourceExhausted if the device has too little memory.
   absl::StatusOr<PlacedBatch> Place(const generate::Batch& batch, const generate::Plan& plan);
-  // All voxels to device memory aligned to 16 bytes (InvalidArgument otherwise, or if it is too small);
-  // done when it returns.
+  // Writes all voxels to device memory aligned to 16 bytes; done when it returns. Errors:
+  // InvalidArgument if it is not aligned or is too small.
   absl::Status GenerateOnDevice(const PlacedBatch& batch, generate::Format format,
                                 std::span<std::byte> out);
-  // The same, queued in device().stream(): done when that has come there, until when the batch stays.
+  // The same, queued in device().stream(): done when the stream has reached it; keep the batch
+  // until then.
   absl::Status QueueOnDevice(const PlacedBatch& batch, generate::Format format,
                              std::span<std::byte> out);
   // The same, into host memory.
@@ -68,7 +72,7 @@ class CudaGenerator final : public generate::Generator {
   Device& device() { return *device_; }
 
  private:
-  // Chunks on their way.
+  // The number of chunks in progress.
   static constexpr size_t kSlots = 3;
   struct Slot {
     Block voxels;
@@ -80,11 +84,11 @@ class CudaGenerator final : public generate::Generator {
       : device_(std::move(device)), executor_(std::move(executor)) {}
   absl::Status Ready(Slot& slot, size_t bytes, bool pinned);
   static absl::Status Reserve(std::span<std::byte>& pinned, size_t bytes);
-  // Makes a chunk and queues its copy to `to`.
+  // Generates a chunk and queues its copy to `to`.
   absl::Status Queue(Slot& slot, const PlacedBatch& batch, generate::Format format, uint64_t first,
                      uint64_t count, std::byte* to);
   absl::Status WaitFor(cudaEvent_t event);
-  // The same status; an error only when nothing is under way any more.
+  // Returns the same status; after an error, waits until no work is in progress.
   absl::Status Settled(absl::Status status);
   absl::Status PlaceOn(const generate::Batch& batch, const generate::Plan& plan,
                        PlacedBatch& placed);
@@ -95,7 +99,7 @@ class CudaGenerator final : public generate::Generator {
   std::span<std::byte> staging_;  // pinned: a batch on its way to the device
 };
 
-// Host memory that devices copy to at the bus's rate; freed by FreePinned.
+// Allocates host memory that devices copy to at the rate of the bus; FreePinned frees it.
 absl::StatusOr<std::span<std::byte>> AllocatePinned(size_t bytes);
 void FreePinned(std::span<std::byte> memory);
 

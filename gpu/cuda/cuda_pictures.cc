@@ -8,7 +8,7 @@
 namespace voxeld::gpu::cuda {
 namespace {
 
-// Of slices, so that one's pictures are on their way while the next is drawn.
+// The number of groups of slices, so that slice images of one are copied while the next is drawn.
 constexpr size_t kSampledGroups = 4;
 constexpr size_t kMostGroups = kMostDrawGroups;
 static_assert(kMostGroups >= kSampledGroups && kMostGroups >= PackedPlan::kMostGroups);
@@ -30,7 +30,7 @@ absl::StatusOr<std::unique_ptr<CudaPictures>> CudaPictures::Make(
 }
 
 CudaPictures::~CudaPictures() {
-  // After an error kernels may be under way that write to what is freed here.
+  // After an error, kernels may still be running that write to memory freed here.
   for (cudaStream_t stream : {device_.beside(), device_.stream()}) cudaStreamSynchronize(stream);
   for (cudaEvent_t event : events_) cudaEventDestroy(event);
   if (numbers_ != nullptr) cudaFreeHost(numbers_);
@@ -110,7 +110,7 @@ absl::Status CudaPictures::PutPictures(const CudaPictures* before) {
   struct Wanted {
     Block* block;
     size_t bytes;
-    const Block* before;  // what it begins with, instead of zeros
+    const Block* before;  // its initial contents, instead of zeros
   };
   const bool same = before != nullptr && before->plan_.layout == plan_.layout &&
                     before->plan_.begin == plan_.begin && before->plan_.end == plan_.end;
@@ -118,11 +118,11 @@ absl::Status CudaPictures::PutPictures(const CudaPictures* before) {
   for (const Wanted& wanted :
        {Wanted{&lit_tiles_, slices * sizeof(uint32_t), nullptr},
         {&differs_, pictures * sizeof(uint32_t), same ? &before->differs_ : nullptr},
-        // Whole words: neighbours may be changed together.
+        // The size is in whole words, because neighbouring bytes may be changed together.
         {&bytes_, (pictures * view_.bytes_per_picture + 3) / 4 * 4,
          same ? &before->bytes_ : nullptr},
         {&changed_in_, pictures * sizeof(uint64_t), same ? &before->changed_in_ : nullptr},
-        // Of pictures packed as they were drawn it is not known.
+        // For slice images packed as they were drawn, this is not known.
         {&blank_, slices * sizeof(uint32_t),
          same && !before->packed_ ? &before->blank_ : nullptr}}) {
     absl::StatusOr<Block> block = device_.Zeros(wanted.bytes);
@@ -172,7 +172,7 @@ absl::Status CudaPictures::PutPictures(const CudaPictures* before) {
   return status;
 }
 
-// Pictures that are newer than what the buffer holds, in runs of neighbours.
+// Copies slice images that are newer than those in the buffer, in runs of neighbours.
 absl::Status CudaPictures::CopyPictures(size_t first, size_t count, FrameBuffer buffer,
                                         uint64_t buffer_holds) {
   const size_t size = view_.bytes_per_picture;
@@ -247,8 +247,9 @@ absl::Status CudaPictures::Await(size_t event, cudaStream_t stream) {
                      [&] { return cudaStreamWaitEvent(stream, events_[event]); });
 }
 
-// One group after the other; or in two streams by turns, so that one begins where the one before has
-// left multiprocessors. At the end the device's stream has waited for all.
+// Queues one group after the other; or alternates between two streams, so that one group starts on
+// multiprocessors that the group before has left. In the end the device's stream has waited for
+// all.
 absl::Status CudaPictures::QueueGroups(const VolumeView& volume, uint64_t frame,
                                        std::span<const Range> ranges, const Drawing& drawing,
                                        Stopwatch& stopwatch) {

@@ -1,5 +1,5 @@
-// The packed pictures of the slices that an engine owns, on the device: footprints, tone, and since
-// which frame each picture has its bytes.
+// The packed slice images of the slices that an engine owns, on the device: footprints, tone, and
+// since which frame each slice image has had its bytes.
 #pragma once
 
 #include <cstdint>
@@ -26,14 +26,14 @@ namespace voxeld::gpu::cuda {
 struct PicturesPlan {
   display::FrameLayout layout;
   display::Tone tone;
-  int32_t begin = 0, end = 0;  // the slices owned
+  int32_t begin = 0, end = 0;  // the owned slices
 };
 
-// Thread-bound. Its calls queue work in the device's stream.
+// Thread-bound. Calls queue work in the device's stream.
 class CudaPictures {
  public:
-  // Everything is to be sliced anew. With the layout of `before` (may be null) pictures that come
-  // out the same keep the frame of their last change.
+  // All slices are sliced again. If the layout is that of `before` (may be null), slice images with
+  // unchanged bytes keep the frame of their last change.
   static absl::StatusOr<std::unique_ptr<CudaPictures>> Make(
       Device& device, const PicturesPlan& plan, const LightPlan& light,
       const display::FootprintTable& table, const display::TileToSlices& tile_to_slices,
@@ -43,26 +43,28 @@ class CudaPictures {
   CudaPictures& operator=(const CudaPictures&) = delete;
 
   const SliceIndexView& index() const { return index_; }
-  // Where tiles are to be packed as they are drawn; null: they are kept, and sliced by Draw.
+  // Returns where tiles are packed as they are drawn; null if they are stored, and sliced by Draw.
   const PackedView* packed() const { return packed_ ? &*packed_ : nullptr; }
-  // Whether they begin with what others had, which may not be what an empty volume shows.
+  // Returns whether the slice images start with the contents of others, which may differ from those
+  // of an empty volume.
   bool inherited() const { return inherited_; }
 
-  // Where they are packed as they are drawn: the groups in which that can be done, so that one's
-  // pictures are copied while the next is drawn. `together`: as one.
+  // Returns the groups in which regions are drawn, if they are packed as they are drawn, so that
+  // slice images of one are copied while the next is drawn. `together`: use a single group.
   DrawGroups GroupsOfRegions(bool together) const;
 
-  // What draws a group, queued in a stream; `apart`: two groups may be drawn at once.
+  // Draws a group, queued in a stream; `apart`: two groups may be drawn at once.
   struct Drawing {
     std::function<absl::Status(uint32_t group, cudaStream_t stream)> queue;
     bool apart;
   };
 
-  // Slices again what is dirty, as pictures of `frame`, and brings `buffer` up to it; waits until
-  // all is there. Draws each group of slices before, where pictures are packed as they are drawn, else
-  // group 0 as that of all; sets the marks. `result` gets what was counted, of which nothing is left on
-  // the device. After an error nothing writes to `buffer` any more, whose pictures may be of this frame
-  // or older; what was drawn may be told by the next one, or, if all of it was, by none.
+  // Slices the dirty slices again, as slice images of `frame`, and brings `buffer` up to date;
+  // waits until it is complete. First draws each group of slices, if slice images are packed as
+  // they are drawn, otherwise group 0 as the group of all; sets the marks. `result` gets the
+  // counters, which are then cleared on the device. After an error nothing writes to `buffer`,
+  // whose slice images may be of this frame or older; the next frame may report what was drawn, or,
+  // if everything was drawn, no frame does.
   absl::Status Draw(const VolumeView& volume, uint64_t frame, FrameBuffer buffer,
                     uint64_t buffer_holds, bool together, const Drawing& drawing,
                     Stopwatch& stopwatch, FrameResult& result);
@@ -73,7 +75,7 @@ class CudaPictures {
                          const display::TileToSlices& tile_to_slices);
   absl::Status PutPacked(const std::optional<PackedPlan>& packed);
   absl::Status PutPictures(const CudaPictures* before);
-  // Slices [begin, end), from the first owned.
+  // Slices [begin, end), counted from the first owned slice.
   struct Range {
     size_t begin, end;
   };
@@ -84,7 +86,7 @@ class CudaPictures {
                            const Drawing& drawing, Stopwatch& stopwatch);
   absl::Status CopyGroups(std::span<const Range> ranges, FrameBuffer buffer, uint64_t buffer_holds);
   absl::Status Record(size_t event, cudaStream_t stream);
-  // `stream` goes on after what events_[event] has been recorded behind.
+  // Makes `stream` wait for the work that precedes events_[event].
   absl::Status Await(size_t event, cudaStream_t stream);
 
   absl::Status CopyPictures(size_t first, size_t count, FrameBuffer buffer, uint64_t buffer_holds);
@@ -98,10 +100,10 @@ class CudaPictures {
   bool inherited_ = false;
   std::vector<Block> tables_;
   Block dirty_, lit_tiles_, blank_, bytes_, changed_in_, differs_;
-  // Pinned, and written by kernels: what changed_in_ has, and what was counted in the frame.
+  // Pinned, and written by kernels: the values of changed_in_, and the counters of the frame.
   uint64_t* numbers_ = nullptr;
   Counters* counters_ = nullptr;
-  std::vector<cudaEvent_t> events_;  // of each group, and that drawing may begin
+  std::vector<cudaEvent_t> events_;  // one for each group, and one that lets drawing start
 };
 
 }  // namespace voxeld::gpu::cuda

@@ -14,9 +14,9 @@
 namespace voxeld::gpu::cuda {
 namespace {
 
-// Beyond as many items as there are, what has gone is swept out of the index.
+// If there are more removed items than live ones, plus this many, they are removed from the index.
 constexpr uint64_t kSpareItems = 65536;
-constexpr size_t kSpareSlots = 1 << 16;  // tables with fewer places are never made smaller
+constexpr size_t kSpareSlots = 1 << 16;  // tables with fewer slots are never made smaller
 
 uint64_t IndexBytes(const Tuning& tuning, const cudaDeviceProp& device) {
   if (tuning.index_bytes != 0) return tuning.index_bytes;
@@ -133,12 +133,12 @@ void CudaVolume::EnterAllAgain() {
 
 namespace {
 
-// Brings an array on the device up to date; `there` is what it holds.
+// Brings an array on the device up to date; `there` is its current contents.
 template <typename T>
 absl::Status PutArray(Device& device, Block& block, const std::vector<T>& now,
                       std::vector<T>& there) {
   if (now == there) return absl::OkStatus();
-  there.clear();  // not known while it is being written
+  there.clear();  // unknown while it is being written
   if (now.empty()) return absl::OkStatus();
   absl::Status status = device.pool().Grow<T>(block, now.size(), 0, device.stream());
   if (!status.ok()) return status;
@@ -221,7 +221,7 @@ absl::Status CudaVolume::MarkPairs(std::span<const uint32_t> slots) {
   });
 }
 
-// Those of `left_` that the index of pairs goes on naming.
+// Kills the pairs of those in `left_` that the index of pairs still names.
 absl::Status CudaVolume::KillPairs() {
   std::vector<uint32_t> slots;
   std::copy_if(left_.begin(), left_.end(), std::back_inserter(slots),
@@ -243,7 +243,7 @@ absl::Status CudaVolume::MarkLeft() {
       return slots_[slot].indexed_by == IndexedBy::kPairs;
     });
     absl::Status status = MarkPairs({marks_.begin(), of_regions});
-    // Each looks for its own.
+    // Each index finds its own items.
     for (const IndexedBy by : kByRegion) {
       if (!status.ok()) return status;
       status = IndexOf(by).Mark({of_regions, marks_.end()}, tiles_.region_dirty.as<uint8_t>());
@@ -278,12 +278,12 @@ absl::Status CudaVolume::MarkLeft() {
     dead_slots_.clear();
     dead_items_ = 0;
   }
-  // Their memory may be handed out again: in the stream, after what has just been queued.
+  // Later work in the stream may reuse their memory: it runs after the work queued here.
   kept_.clear();
   if (dead_items_ + dead_slots_.size() > live_items_ + kSpareItems) {
     status = index_.DropDead(table_.as<TableEntry>(), tiles_.grid.count());
     if (absl::IsResourceExhausted(status)) {
-      DeferPairs();  // which leaves the room that there is
+      DeferPairs();  // uses the memory that is available
     } else if (!status.ok()) {
       return status;
     }
@@ -291,7 +291,8 @@ absl::Status CudaVolume::MarkLeft() {
     dead_slots_.clear();
     dead_items_ = 0;
   }
-  // Tables do not shrink. When most of their places are free, the few drawables that are left get new ones.
+  // Tables do not shrink. If most of their slots are free, the few drawables that are left get new
+  // tables.
   if (slots_.size() > kSpareSlots && slot_of_.size() < slots_.size() / 8) EnterAllAgain();
   return absl::OkStatus();
 }
@@ -337,7 +338,7 @@ absl::StatusOr<DrawView> CudaVolume::ViewForDrawing(uint32_t group) {
 }
 
 absl::Status CudaVolume::Draw(DrawView& view, DrawTo to, cudaStream_t stream) {
-  // Whether all that there is lies in one layer, to be seen as it is.
+  // Whether all drawables are in one layer that is shown without blending.
   bool plain = true, masked = false;
   absl::flat_hash_set<uint32_t> layers;
   const auto keep_drawn = [&](auto& list) {

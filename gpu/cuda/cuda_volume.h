@@ -1,10 +1,10 @@
-// The voxel volume on the device: the scene's table of drawables, the indices of what may lie in which
-// tile (pair_index.h), of thin lines (line_index.h), of points (point_index.h) and of small
-// triangles (triangle_index.h), and the drawing of the regions that changed.
+// The voxel volume on the device: the scene's table of drawables; the indices of the items that may
+// lie in each tile (pair_index.h), of thin lines (line_index.h), of points (point_index.h) and of
+// small triangles (triangle_index.h); and the drawing of the regions that changed.
 //
-// Each index is a few batches: a change adds one, batches of like size are merged, and what has gone
-// is dropped on the way; so an index of n costs O(log n) each, and what has gone never costs more
-// than what is there.
+// Each index consists of a few batches: a change adds one, batches of similar size are merged, and
+// removed items are dropped in the process. So an index of n items costs O(log n) for each, and
+// removed items never cost more than the live ones.
 #pragma once
 
 #include <cstdint>
@@ -36,35 +36,37 @@
 
 namespace voxeld::gpu::cuda {
 
-// The tiles of a target, dark and clean.
+// The tiles of a target, initially dark and clean.
 struct DeviceTiles {
   TileGrid grid;
   RegionGrid regions;
-  std::vector<uint8_t> owned_here;  // as the device has it
+  std::vector<uint8_t> owned_here;  // a copy of the device's data
   Block owned, dirty, region_dirty, dirty_list, lit, counters;
-  Block colors;  // unless pictures are packed as tiles are drawn
+  Block colors;  // empty if slice images are packed as tiles are drawn
   VolumeView view() const;
 
   static absl::StatusOr<DeviceTiles> Make(Device& device, const TileGrid& grid,
                                           std::span<const uint8_t> owned, bool keep_colors);
 };
 
-// Of a geometry's positions, closed; and how far corners of one of its triangles are apart at most.
+// The bounds of a geometry's positions, closed, and the greatest distance between corners of one of
+// its triangles.
 struct GeometryBounds {
   double lo[3], hi[3];
   double extent[3] = {};
 };
 
-// What a geometry's arrays lie in; and its bounds, if its items may be thin lines or small triangles, or if it
-// is filled.
+// The memory of a geometry's arrays; and its bounds, if its items may be thin lines or small
+// triangles, or if it is filled.
 struct DeviceArrays {
   std::shared_ptr<Block> block;
   std::optional<GeometryBounds> bounds;
-  // Of what is worked out on the host as well, implicit shapes and curves, where that can read them.
+  // For geometries that the host processes as well (implicit shapes and curves): a copy that the
+  // host can read.
   std::optional<RetainedGeometry> on_host;
 };
 
-// A box of voxels, closed, of which nothing more is asked than about how large it is.
+// A box of voxels, closed, which is only used to estimate sizes.
 struct RoughBox {
   double lo[3], hi[3];
 
@@ -72,61 +74,61 @@ struct RoughBox {
   static RoughBox Nothing() { return {{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}}; }
   static RoughBox Everything() { return {{-kFar, -kFar, -kFar}, {kFar, kFar, kFar}}; }
   void Add(const RoughBox& other);
-  // Of a volume's regions, the share that it touches.
+  // Returns the share of a volume's regions that the box touches.
   double ShareOf(const RegionGrid& regions) const;
 };
 
-// Thread-bound. Its calls queue work in the device's stream. An error leaves the scene as it was,
-// and what could not be drawn is drawn with the next Update.
+// Thread-bound. Calls queue work in the device's stream. An error leaves the scene as it was, and
+// what could not be drawn is drawn with the next Update.
 class CudaVolume final : private SceneObserver {
  public:
   CudaVolume(Device& device, Uploader& uploader, const Tuning& tuning);
 
-  // All or nothing. InvalidArgument for a malformed delta, ResourceExhausted if its arrays do not
-  // fit the device.
+  // Applies all of a delta or nothing. Errors: InvalidArgument for a malformed delta,
+  // ResourceExhausted if its arrays do not fit in the device's memory.
   absl::Status Apply(std::span<const std::byte> delta, BulkSource* bulk);
 
-  // Everything is to be drawn anew; with `all_dirty` also where nothing is.
+  // Everything is to be drawn again; with `all_dirty`, also empty regions.
   absl::Status SetView(DeviceTiles tiles, const Affine& view, bool all_dirty);
 
-  // A frame: TakeIn takes in what has come and gone, and ListDirty finds what is dirty, by group.
-  // Then, each group once, DrawGroup draws that: into the tiles, and marks the slices that look at it;
-  // or, if there is `packed`, straight into pictures. If DrawsApart, groups may be drawn in streams of
-  // their own, after what ListDirty has queued.
+  // A frame has these steps: TakeIn applies added and removed drawables, and ListDirty finds the
+  // dirty regions, by group. Then DrawGroup draws each group once: into the tiles, and marks the
+  // slices that look at it; or, with `packed`, directly into slice images. If DrawsApart, groups
+  // may be drawn in streams of their own, after the work that ListDirty has queued.
   absl::Status TakeIn();
   absl::Status ListDirty(const DrawGroups& groups);
-  // About how many items lie where something is dirty; after TakeIn.
+  // Returns approximately how many items lie in dirty regions; call after TakeIn.
   double ItemsToDraw() const;
   bool DrawsApart() const {
     return CountDeferred([](uint32_t) { return true; }) == 0;
   }
   absl::Status DrawGroup(uint32_t group, const SliceIndexView& slices, const PackedView* packed,
                          cudaStream_t stream);
-  // The frame's counters have been told, and begin anew.
+  // Called when the frame's counters have been reported and start again at 0.
   void CountersAreClear() { counted_ = false; }
 
-  // The colours of voxels, after a frame; for who asks. `out` is on the device.
+  // Reads the colours of voxels, after a frame. `out` is on the device.
   absl::Status Read(const Box3& box, uint32_t* out);
 
   VolumeView view() const { return tiles_.view(); }
   uint32_t singular_drawables() const { return singular_; }
-  // In the host's memory.
+  // Returns the bytes in the host's memory.
   uint64_t host_bytes() const;
 
  private:
-  // By which index a drawable's items are drawn.
+  // The index by which a drawable's items are drawn.
   enum class IndexedBy : uint8_t { kPairs, kLines, kPoints, kTriangles };
-  // What the host knows of a slot of the table.
+  // The host's data about a slot of the table.
   struct Slot {
     uint32_t items = 0;
     bool singular = false;
     IndexedBy indexed_by = IndexedBy::kPairs;
     RoughBox box = RoughBox::Everything();
     uint32_t regions_each = 0;        // that a triangle touches at most
-    Block tiles, begin, voxels;       // of what the CPU has drawn
+    Block tiles, begin, voxels;       // of a drawable that the CPU has drawn
     Block hoisted, reach, covered;    // of an implicit shape (ImplicitPlace; CoveredView)
     Block vertices, indices, colors;  // of a curve that was cut
-    Block inside;                     // of a mesh that is filled
+    Block inside;                     // of a filled mesh
   };
 
   absl::Status OnPlan(const DeltaPlan& plan) override;
@@ -140,9 +142,9 @@ class CudaVolume final : private SceneObserver {
   absl::Status FindGeometryBounds(const DeltaPlan& plan);
   template <typename T>
   std::span<const T> OnDevice(const GeometryView& view, std::span<const T> array) const;
-  // The index that its items are drawn by, if they turn out to be thin, or small.
+  // Returns the index for its items, if they turn out to be thin, or small.
   static IndexedBy IndexFor(const GeometryRecord& record);
-  // Decides it for a drawable that comes.
+  // Chooses the index of a drawable that is added.
   void ChooseIndex(const Drawable& drawable, const TableEntry& entry, const Cut* cut,
                    Slot& slot) const;
   static void ChooseIndexOf(IndexedBy by, const RoughBox& box, const double extent[3], Slot& slot);
@@ -154,19 +156,20 @@ class CudaVolume final : private SceneObserver {
     if (by == IndexedBy::kPoints) return points_;
     return triangles_;
   }
-  // Forgets all places, in tables and indexes. All drawables are pending.
+  // Discards all slots, in tables and indexes. All drawables become pending.
   void EnterAllAgain();
   absl::Status KillPairs();
   absl::Status MarkLeft();
   absl::Status MarkPairs(std::span<const uint32_t> slots);
   absl::Status Enter();
-  // `entries`: null, or what the table does not have of these drawables, which then come together.
+  // `entries`: null, or the entries of these drawables that the table does not have yet; the
+  // drawables are then added together.
   absl::Status EnterRegions(IndexedBy by, std::span<const Drawable* const> drawables,
                             std::span<const uint32_t> slots, const FewEntries* entries);
-  // Whether they are lines, or points, of one layer, and so few that an index of them puts them
-  // into the table.
+  // Returns whether they are lines, or points, of one layer, and so few that an index puts them
+  // into the table itself.
   bool AreFew(std::span<const uint32_t> slots, std::span<const TableEntry> entries) const;
-  // Of one layer, no more than may come at once.
+  // Drawables of one layer, at most as many as may be added at once.
   struct Arriving {
     std::vector<uint32_t> slots;
     std::vector<uint64_t> first = {0};
@@ -177,77 +180,80 @@ class CudaVolume final : private SceneObserver {
                           const FewEntries* entries);
   absl::Status EnterPairs(std::span<const PairedDrawable> drawables);
 
-  // All that a layer has, if it is many boxes, spheres and cylinders: where the layer moves, the device
-  // places them anew, and the host has nothing to do for each (cuda_volume_crowds.cc).
+  // All drawables of a layer, if they are many boxes, spheres and cylinders: when the layer moves,
+  // the device places them again, and the host does no work for each of them
+  // (cuda_volume_crowds.cc).
   struct Crowd {
     std::vector<const Drawable*> drawables;
-    std::vector<uint32_t> slots;      // of each, with one item: none is without an inverse
-    uint32_t layer = 0;               // its slot
-    bool moved = false;               // and not yet placed anew
-    bool marks = false;               // where they were is to be drawn anew
-    Block there, firsts, transforms;  // on the device, once they are needed
+    std::vector<uint32_t> slots;      // of each, with one item: all have an inverse
+    uint32_t layer = 0;               // the slot of the layer
+    bool moved = false;               // and not yet placed again
+    bool marks = false;               // their old places are to be drawn again
+    Block there, firsts, transforms;  // on the device, when needed
 
     uint32_t count() const { return static_cast<uint32_t>(slots.size()); }
   };
   using Crowds = absl::flat_hash_map<const Layer*, Crowd>;
-  // Of drawables that come: those that are crowds get their pairs, and are no more among `pairs`.
+  // Handles added drawables: those that form crowds get their pairs, and are removed from `pairs`.
   absl::Status EnterCrowds(std::span<const Drawable* const> drawables,
                            std::span<const uint32_t> slots, Crowds& formed,
                            std::vector<PairedDrawable>& pairs);
-  // Places those anew whose layers have moved. What cannot stay together leaves, and comes anew.
+  // Places the crowds whose layers have moved. Drawables that cannot stay together are removed and
+  // added again.
   absl::Status MoveCrowds();
-  // False: it cannot stay together.
+  // Returns false if the crowd cannot stay together.
   absl::StatusOr<bool> MoveCrowd(const Layer& layer, Crowd& crowd);
-  // What is needed of it there and is not; its transforms only if it has moved.
+  // Uploads the missing data of a crowd to the device; its transforms only if it has moved.
   absl::Status BringCrowd(Crowd& crowd);
-  // A layer's drawables are on their own again: one comes, or goes.
+  // Makes a layer's drawables independent again, because one is added or removed.
   void Disperse(const Layer* layer);
   void DisperseAll();
-  // Puts off all that the index of pairs has.
+  // Defers everything in the index of pairs.
   void DeferPairs();
-  // What is drawn by a group's number, at the same time as other groups.
+  // Returns the view for drawing a group, by its number, at the same time as other groups.
   absl::StatusOr<DrawView> ViewForDrawing(uint32_t group);
-  // The regions that `view` lists.
+  // Draws the regions that `view` lists.
   absl::Status DrawListed(DrawView& view, DrawTo to, cudaStream_t stream);
-  // The items, of layers for which seen(slot) is true, that have no lists.
+  // Handles the items without lists, of layers for which seen(slot) is true.
   using Seen = std::function<bool(uint32_t)>;
   uint64_t CountDeferred(const Seen& seen) const;
   absl::Status DrawInPasses(const DrawView& view, DrawTo to, const Seen& seen);
-  // Gives them lists of what `pass` draws. False if not all have: there was no room. Then only if
-  // `some` they can be drawn all the same.
+  // Gives them lists for the regions that `pass` draws. Returns false if some have no lists for
+  // lack of memory: then they can be drawn anyway only if `some` is true.
   absl::StatusOr<bool> SortPass(const RegionGrid& pass, const Seen& seen, bool some);
   void EndPass();
   absl::Status Draw(DrawView& view, DrawTo to, cudaStream_t stream);
   absl::Status GrowTable();
   absl::Status PutDrawables(std::span<const uint32_t> slots, std::span<const TableEntry> entries);
-  // What the host works out of a drawable that comes, until it has gone over.
+  // The data that the host computes for an added drawable, until it has been uploaded.
   struct WorkedOut {
     std::vector<uint32_t> hoisted;  // of an implicit shape
-    std::unique_ptr<Cut> cut;       // of what is curved
+    std::unique_ptr<Cut> cut;       // of a curve or patch
   };
-  // An implicit shape that was placed: which voxels it covers is yet to be found.
+  // An implicit shape that was placed, and whose covered voxels have not been found yet.
   struct PlacedImplicit {
     CoveredView view;
-    cudaKernel_t formula = nullptr;  // by which; null: by interpreting its program
+    cudaKernel_t formula = nullptr;  // the kernel that finds them; null: its program is interpreted
   };
   static const GeometryView& OnHost(const Drawable& drawable);
   TableEntry EntryOf(const Drawable& drawable, WorkedOut& worked_out) const;
-  // Queues its way over, and finds room for what the device works out. It is to live until then.
+  // Queues its upload, and allocates memory for the data that the device computes. `worked_out`
+  // must live until the upload is done.
   absl::Status Place(const Drawable& drawable, const WorkedOut& worked_out, TableEntry& entry,
                      uint32_t slot);
   absl::Status PlaceImplicit(const Drawable& drawable, std::span<const uint32_t> hoisted,
                              TableEntry& entry, uint32_t slot);
   absl::Status PlaceFilled(TableEntry& entry, Slot& slot);
-  // Where a geometry is, or the whole volume.
+  // Returns the bounds of a geometry, or the whole volume.
   Box3 BoundsOf(const Drawable& drawable, const Affine& map) const;
   absl::Status PlaceCut(const Cut& cut, TableEntry& entry, Slot& slot);
-  // Which voxels implicit shapes cover, of those that were placed and are in the table
+  // Finds which voxels implicit shapes cover, of those that were placed and are in the table
   // (cuda_volume_implicit.cc).
   absl::Status FindImplicit();
   template <typename F>
   absl::Status ForViews(std::vector<CoveredView> all, F&& f);
   absl::StatusOr<std::optional<Block>> RoomToKeep(uint64_t bytes);
-  // Has the CPU draw it; the result goes over, and into `slot`.
+  // Has the CPU draw it, and uploads the result into `slot`.
   absl::Status DrawInto(TableEntry& entry, const Drawable& drawable, Slot& slot);
   uint32_t TakeSlot();
 
@@ -256,56 +262,56 @@ class CudaVolume final : private SceneObserver {
   Scene scene_;
   DeviceTiles tiles_;
   Affine view_;
-  bool listed_ = false;  // tiles were taken for clean and not drawn: any may be dirty
-  bool counted_ = true;  // the counters have begun
+  bool listed_ = false;  // tiles were marked clean but not drawn: any may be dirty
+  bool counted_ = true;  // the counters have started
   RoughBox dirty_ = RoughBox::Nothing();
-  DrawGroups groups_;  // of the frame under way
+  DrawGroups groups_;  // of the current frame
   ListBudget list_budget_;
-  PairIndex index_;  // of all that the others do not have
+  PairIndex index_;  // of all items that the others do not have
   LineIndex lines_;
   PointIndex points_;
   bool lines_suit_ = false, points_suit_ = false;  // the volume is not too large for them
   TriangleIndex triangles_;
   CompiledFormulas formulas_;
-  // Of blocks of regions: a pass that failed last, with so many items without lists, halved. As many
-  // planes along z go in the next.
+  // For blocks of regions: the size of the last pass that failed, with that many items without
+  // lists, halved. The next pass gets as many planes along z.
   int32_t pass_planes_ = INT32_MAX;
   uint64_t pass_items_ = 0;
 
   Block table_;
   std::vector<Slot> slots_;
   std::vector<uint32_t> free_slots_;
-  std::vector<uint32_t> dead_slots_;  // not free before the index has forgotten them
+  std::vector<uint32_t> dead_slots_;  // not free until the index has dropped them
   uint64_t live_items_ = 0, dead_items_ = 0;
   absl::flat_hash_map<const Drawable*, uint32_t> slot_of_;
   absl::flat_hash_set<const Drawable*> pending_;
-  std::vector<PlacedImplicit> placed_;  // of those that are entering
+  std::vector<PlacedImplicit> placed_;  // of the drawables that are being added
   Crowds crowds_;
   const uint32_t least_crowd_;
 
   Block looks_, half_spaces_, cylinders_;
   Block below_[kMostDrawGroups];                    // DrawView::below of each group
-  std::vector<LayerLook> looks_now_, looks_there_;  // by slot; what the device has
+  std::vector<LayerLook> looks_now_, looks_there_;  // by slot; the device's contents
   std::vector<VoxelHalfSpace> half_spaces_now_, half_spaces_there_;
   std::vector<VoxelCylinder> cylinders_now_, cylinders_there_;
   absl::flat_hash_map<uint64_t, uint32_t> layer_slots_;
   std::vector<uint32_t> free_layer_slots_;
 
-  std::vector<uint32_t> marks_;  // slots whose tiles are to be drawn anew
-  std::vector<uint32_t> left_;   // slots that have left
-  // Memory of geometries that have left, until their tiles are marked.
+  std::vector<uint32_t> marks_;  // slots whose tiles are to be drawn again
+  std::vector<uint32_t> left_;   // slots of removed drawables
+  // Memory of removed geometries, until their tiles are marked.
   std::vector<std::shared_ptr<const RetainedGeometry>> kept_;
 
-  // The arrays of the delta under way, all at `arrays_`: those that lie in the delta, from
-  // `arrays_begin_` on, at its beginning; those in bulk memory, by where their positions lie on the
-  // host, where `bulk_` says.
+  // The arrays of the current delta, all at `arrays_`: those in the delta, from `arrays_begin_` on,
+  // are at its beginning; those in bulk memory are at the offsets in `bulk_`, by the host address
+  // of their positions.
   const std::byte* arrays_begin_ = nullptr;
   std::shared_ptr<Block> arrays_;
   absl::flat_hash_map<const float*, size_t> bulk_;
-  // Of its geometries' positions, by where these lie on the host.
+  // Bounds of the delta's geometries, by the host address of their positions.
   absl::flat_hash_map<const float*, GeometryBounds> bounds_;
   uint32_t singular_ = 0;
-  std::unique_ptr<Executor> executor_;  // for what the CPU draws; made when it is asked for
+  std::unique_ptr<Executor> executor_;  // for drawing on the CPU; created on demand
 };
 
 }  // namespace voxeld::gpu::cuda

@@ -1,4 +1,4 @@
-// What deltas bring, and where it lies on the device.
+// The arrays of deltas, and their places on the device.
 #include <algorithm>
 #include <bit>
 #include <optional>
@@ -15,10 +15,10 @@
 namespace voxeld::gpu::cuda {
 namespace {
 
-// Up to so many vertices the host looks through itself.
+// The host itself computes the bounds of up to this many vertices.
 constexpr size_t kFewVertices = 1024;
 
-// The same array, at its place in device memory. Never looked at by the host.
+// Returns the same array at its place in device memory, which the host must not read.
 template <typename T>
 std::span<const T> Moved(std::span<const T> array, const std::byte* host, std::byte* device) {
   if (array.empty()) return array;
@@ -52,7 +52,8 @@ GeometryBounds BoundsOfFew(const GeometryView& g) {
   return bounds;
 }
 
-// Of the same positions, in bulk memory, several geometries may be made: all that any needs.
+// Several geometries may use the same positions in bulk memory: notes the data that any of them
+// needs.
 void NoteBounds(absl::flat_hash_map<const float*, GeometryBounds>& all, const float* positions,
                 const GeometryBounds& bounds) {
   const auto [it, fresh] = all.emplace(positions, bounds);
@@ -76,7 +77,7 @@ absl::Status CudaVolume::Apply(std::span<const std::byte> delta, BulkSource* bul
   return status;
 }
 
-// The arrays of all geometries go over into one piece of memory.
+// Copies the arrays of all geometries into one piece of memory.
 absl::Status CudaVolume::OnPlan(const DeltaPlan& plan) {
   UploadPlan uploads;
   for (const DeltaStep& step : plan.steps) {
@@ -102,7 +103,7 @@ absl::Status CudaVolume::OnPlan(const DeltaPlan& plan) {
   if (!block.ok()) return block.status();
   arrays_ = std::make_shared<Block>(*std::move(block));
   const absl::Status status = FindGeometryBounds(plan);
-  // The delta's memory is given back when Apply returns, and so may bulk memory be.
+  // The delta's memory is released when Apply returns, and bulk memory may be as well.
   const absl::Status waited = uploader_.Wait();
   return status.ok() ? waited : status;
 }
@@ -120,8 +121,8 @@ CudaVolume::IndexedBy CudaVolume::IndexFor(const GeometryRecord& record) {
   return line ? IndexedBy::kLines : IndexedBy::kPairs;
 }
 
-// Where all geometries lie whose items may be thin lines, points or small triangles, and how large
-// these are: large geometries are looked through on the device.
+// Finds the bounds and sizes of all geometries whose items may be thin lines, points or small
+// triangles. For large geometries the device does it.
 absl::Status CudaVolume::FindGeometryBounds(const DeltaPlan& plan) {
   std::vector<const GeometryView*> large;
   for (const DeltaStep& step : plan.steps) {
@@ -181,7 +182,7 @@ absl::Status CudaVolume::FindGeometryBounds(const DeltaPlan& plan) {
   return absl::OkStatus();
 }
 
-// An array of a geometry of the delta under way, where it lies on the device.
+// Returns an array of a geometry of the current delta, at its place on the device.
 template <typename T>
 std::span<const T> CudaVolume::OnDevice(const GeometryView& view, std::span<const T> array) const {
   if (view.bulk == nullptr) return Moved(array, arrays_begin_, arrays_->as<std::byte>());
@@ -191,8 +192,8 @@ std::span<const T> CudaVolume::OnDevice(const GeometryView& view, std::span<cons
 
 namespace {
 
-// What the host reads of a geometry. Copied from bulk memory, too, which its owner may use for something else
-// once the delta has been applied.
+// Copies the data of a geometry that the host reads. Bulk memory is copied too, because its owner
+// may reuse it once the delta has been applied.
 RetainedGeometry CopyOf(const GeometryView& view) {
   GeometryView copied = view;
   copied.bulk = nullptr;
@@ -202,7 +203,7 @@ RetainedGeometry CopyOf(const GeometryView& view) {
   return KeepOnHost(copied);
 }
 
-// Whether the host reads what such geometries have, as well.
+// Returns whether the host reads the data of such geometries as well.
 bool IsWorkedOutOnHost(PrimitiveKind kind) {
   return kind == PrimitiveKind::kImplicit || kind == PrimitiveKind::kSamples || IsCurved(kind);
 }
@@ -224,11 +225,11 @@ RetainedGeometry CudaVolume::Retain(const GeometryView& view) {
   return kept;
 }
 
-// A geometry whose arrays the host can read: of kinds that it works something out of.
+// Returns a geometry whose arrays the host can read, for kinds that the host processes.
 const GeometryView& CudaVolume::OnHost(const Drawable& drawable) {
   const RetainedGeometry& geometry = *drawable.geometry;
   const auto* const arrays = static_cast<const DeviceArrays*>(geometry.memory.get());
-  // What the CPU draws lies in the host's memory.
+  // The arrays of geometries that the CPU draws are in the host's memory.
   if (geometry.view.record.drawn_by == DrawnBy::kCpu || arrays == nullptr) return geometry.view;
   return arrays->on_host->view;
 }
@@ -254,7 +255,7 @@ void CudaVolume::OnEnter(Drawable& drawable) {
 void CudaVolume::OnLayerLook(Layer& layer, const LayerRecord& next) {
   const LayerRecord& now = layer.record;
   if (LooksSame(now, next) || (!layer.drawn && next.visible == 0)) return;
-  // Nothing of it was to be seen, and it enters anew.
+  // It was not visible, and is added again.
   if (!layer.drawn && !(now.transform == next.transform)) return;
   if (const auto it = crowds_.find(&layer); it != crowds_.end()) {
     it->second.marks = true;

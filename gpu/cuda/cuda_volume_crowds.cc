@@ -1,4 +1,4 @@
-// Crowds: layers of many solids, which the device moves.
+// Crowds: layers of many solids that the device moves.
 #include <numeric>
 #include <utility>
 
@@ -78,7 +78,7 @@ absl::Status CudaVolume::BringCrowd(Crowd& crowd) {
     if (!block.ok()) return block.status();
     crowd.transforms = *std::move(block);
   }
-  // What goes over lies in memory that goes with this call.
+  // The uploaded data lies in memory that is freed when this call returns.
   return firsts.empty() && transforms.empty() ? absl::OkStatus() : device_.Wait();
 }
 
@@ -96,7 +96,7 @@ absl::StatusOr<bool> CudaVolume::MoveCrowd(const Layer& layer, Crowd& crowd) {
     });
   }
   if (!status.ok()) return status;
-  // Of a hidden one nothing is to be drawn, here or there.
+  // A hidden layer is not drawn, before or after the move.
   if (crowd.marks || layer.drawn) dirty_ = RoughBox::Everything();
   crowd.marks = false;
   if (!crowd.moved) return true;
@@ -140,7 +140,7 @@ void CudaVolume::Disperse(const Layer* layer) {
   index_.Loosen(crowd.layer);
   if (crowd.marks) marks_.insert(marks_.end(), crowd.slots.begin(), crowd.slots.end());
   if (!crowd.moved) return;
-  // The table does not have them where they are now: they come anew.
+  // The table does not have their current places: they are added again.
   for (size_t i = 0; i < crowd.slots.size(); ++i) {
     const Drawable* const drawable = crowd.drawables[i];
     slot_of_.erase(drawable);

@@ -1,5 +1,4 @@
-// Drawables that come: into the table, and into the index of pairs, of lines, of points or of
-// triangles.
+// Adds drawables to the table, and to the index of pairs, of lines, of points or of triangles.
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -39,8 +38,8 @@ void CudaVolume::ChooseIndex(const Drawable& drawable, const TableEntry& entry, 
       hi[a] = corner == 0 ? at[a] : std::max(hi[a], at[a]);
     }
   }
-  // Differences of floats were rounded; and so is what a vertex is mapped to, in proportion to its
-  // terms.
+  // Differences of floats were rounded, and so are mapped vertices, in proportion to the terms of
+  // the mapping.
   constexpr double kSpare = 1.000001, kMostTerms = 1e11;
   double extent[3] = {};
   for (int a = 0; a < 3 && by == IndexedBy::kTriangles; ++a) {
@@ -55,7 +54,7 @@ void CudaVolume::ChooseIndex(const Drawable& drawable, const TableEntry& entry, 
   ChooseIndexOf(by, {{lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}}, extent, slot);
 }
 
-// `box` holds all vertices, of which those of a triangle are at most `extent` apart, voxels.
+// `box` holds all vertices; those of a triangle are at most `extent` apart, in voxels.
 void CudaVolume::ChooseIndexOf(IndexedBy by, const RoughBox& box, const double extent[3],
                                Slot& slot) {
   const bool suits = by == IndexedBy::kLines    ? AreThin(box.lo, box.hi)
@@ -65,7 +64,7 @@ void CudaVolume::ChooseIndexOf(IndexedBy by, const RoughBox& box, const double e
   slot.indexed_by = by;
   slot.box = box;
   if (by != IndexedBy::kTriangles) return;
-  // Snapping, voxels only touched, and that the last one counts.
+  // Allows for snapping, for voxels that are only touched, and for counting the last one.
   int32_t voxels[3];
   for (int a = 0; a < 3; ++a) voxels[a] = static_cast<int32_t>(extent[a]) + 4;
   slot.regions_each = RegionsOfExtent(voxels);
@@ -177,7 +176,7 @@ absl::Status CudaVolume::PlaceCut(const Cut& cut, TableEntry& entry, Slot& slot)
 
 Box3 CudaVolume::BoundsOf(const Drawable& d, const Affine& map) const {
   const TileGrid& grid = tiles_.grid;
-  // What the CPU draws lies in the host's memory.
+  // The arrays of geometries that the CPU draws are in the host's memory.
   const bool on_device = d.geometry->view.record.drawn_by != DrawnBy::kCpu;
   const auto* const arrays =
       on_device ? static_cast<const DeviceArrays*>(d.geometry->memory.get()) : nullptr;
@@ -192,7 +191,7 @@ absl::Status CudaVolume::PlaceFilled(TableEntry& entry, Slot& slot) {
   if (bytes == 0) return absl::OkStatus();
   absl::StatusOr<std::optional<Block>> room = RoomToKeep(bytes + Filled::Count(entry.source));
   if (!room.ok()) return room.status();
-  // Without room for it, tiles look at all triangles.
+  // Without memory for it, tiles test all triangles.
   if (!room->has_value()) return absl::OkStatus();
   slot.inside = **std::move(room);
   uint32_t* const inside = slot.inside.as<uint32_t>();
@@ -219,7 +218,7 @@ absl::Status CudaVolume::DrawInto(TableEntry& entry, const Drawable& drawable, S
   block = device_.Upload(drawn.voxels.data(), drawn.voxels.size());
   if (!block.ok()) return block.status();
   slot.voxels = *std::move(block);
-  // What goes over lies in memory that is about to go.
+  // The uploaded data lies in memory that is about to be freed.
   if (absl::Status status = device_.Wait(); !status.ok()) return status;
   slot.items = static_cast<uint32_t>(drawn.tiles.size());
   slot.singular = drawn.singular;
@@ -228,7 +227,7 @@ absl::Status CudaVolume::DrawInto(TableEntry& entry, const Drawable& drawable, S
   return absl::OkStatus();
 }
 
-// The old table stays until all is right in the new one.
+// The old table is kept until the new one is complete.
 absl::Status CudaVolume::GrowTable() {
   if (slots_.size() * sizeof(TableEntry) <= table_.size()) return absl::OkStatus();
   const size_t entries = table_.size() / sizeof(TableEntry);
@@ -294,7 +293,7 @@ absl::Status CudaVolume::PutDrawables(std::span<const uint32_t> slots,
 }
 
 absl::Status CudaVolume::Enter() {
-  constexpr uint64_t kMostWorkedOut = 64u << 20;  // bytes on their way, about
+  constexpr uint64_t kMostWorkedOut = 64u << 20;  // approximate bytes in uploads
   if (pending_.empty()) return absl::OkStatus();
   const std::vector<const Drawable*> drawables(pending_.begin(), pending_.end());
   std::vector<uint32_t> slots;
@@ -304,7 +303,7 @@ absl::Status CudaVolume::Enter() {
   slots.reserve(drawables.size());
   entries.reserve(drawables.size());
   std::deque<WorkedOut> worked_out;
-  uint64_t held = 0;  // bytes of cuts in there
+  uint64_t held = 0;  // bytes of the cuts in it
   bool uploads = false;
   absl::Status status;
   uint32_t singular = 0;
@@ -354,7 +353,7 @@ absl::Status CudaVolume::Enter() {
       held = 0;
     }
   }
-  // What goes over lies in memory that goes with this call.
+  // The uploaded data lies in memory that is freed when this call returns.
   if (uploads) {
     const absl::Status waited = device_.Wait();
     if (status.ok()) status = waited;
@@ -387,7 +386,7 @@ absl::Status CudaVolume::Enter() {
     }
   }
   if (!status.ok()) {
-    // They go again, and come anew with the next frame.
+    // They are removed again, and are added with the next frame.
     for (const auto& [layer, crowd] : formed) index_.Loosen(crowd.layer);
     left_.insert(left_.end(), slots.begin(), slots.end());
     return status;
@@ -414,7 +413,7 @@ absl::Status CudaVolume::EnterPairs(std::span<const PairedDrawable> drawables) {
   return deferred.empty() ? absl::OkStatus() : MarkPairs(deferred);
 }
 
-// Layer by layer.
+// Goes layer by layer.
 absl::Status CudaVolume::EnterRegions(IndexedBy by, std::span<const Drawable* const> drawables,
                                       std::span<const uint32_t> slots, const FewEntries* entries) {
   RegionIndex& index = IndexOf(by);

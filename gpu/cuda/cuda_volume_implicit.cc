@@ -1,5 +1,5 @@
-// Implicit shapes that come: room for what is known of their tiles and for the voxels that they cover, which
-// are found before anything is drawn.
+// Adds implicit shapes: allocates memory for the state of their tiles and for the voxels that they
+// cover, which are found before anything is drawn.
 #include <algorithm>
 #include <bit>
 #include <utility>
@@ -14,10 +14,10 @@
 namespace voxeld::gpu::cuda {
 namespace {
 
-constexpr size_t kMostViews = 32768;  // that one kernel is launched for
+constexpr size_t kMostViews = 32768;  // for which one kernel is launched
 
-// What lies in Slot::covered: of each axis duals, values, distances; then rows. `base` null: only how much that
-// is.
+// Lays out Slot::covered: for each axis duals, values, distances; then rows. If `base` is null,
+// only computes the size.
 uint64_t LayOut(const TableEntry& entry, const implicit::HoistedView& hoisted, std::byte* base,
                 CoveredView* view) {
   uint64_t at = 0;
@@ -71,7 +71,7 @@ uint32_t PlacesOf(const CoveredView& view) {
 
 }  // namespace
 
-// Room for what stays; none if lists would keep too much with it.
+// Allocates memory that is kept; none if lists would keep too much with it.
 absl::StatusOr<std::optional<Block>> CudaVolume::RoomToKeep(uint64_t bytes) {
   if (list_budget_.pool.used() + bytes > list_budget_.most_kept) return std::nullopt;
   absl::StatusOr<Block> block = list_budget_.pool.Acquire(bytes);
@@ -90,8 +90,8 @@ absl::Status CudaVolume::PlaceImplicit(const Drawable& drawable, std::span<const
   PlacedImplicit placed;
   placed.view = ViewOf(entry, slot, {OnHost(drawable).indices.data()});
   if (placed.view.items == 0) return absl::OkStatus();
-  // Without room for what is known of its tiles, that is found out anew whenever one is drawn; so is what it
-  // covers without room for that.
+  // Without memory for the state of its tiles, that state is computed whenever a tile is drawn; the
+  // same holds for the covered voxels without memory for them.
   absl::StatusOr<std::optional<Block>> room = RoomToKeep(placed.view.items * sizeof(float));
   if (!room.ok()) return room.status();
   if (!room->has_value()) return absl::OkStatus();
@@ -113,8 +113,8 @@ absl::Status CudaVolume::PlaceImplicit(const Drawable& drawable, std::span<const
   return absl::OkStatus();
 }
 
-// f(views) of them all, as many at once as one kernel takes, of about the same size: a kernel is launched
-// for so many tiles of each as the largest has.
+// Calls f(views) for all of them, as many at once as one kernel takes, sorted by size, because a
+// kernel is launched with as many tiles for each as the largest has.
 template <typename F>
 absl::Status CudaVolume::ForViews(std::vector<CoveredView> all, F&& f) {
   std::sort(all.begin(), all.end(),
@@ -133,11 +133,11 @@ absl::Status CudaVolume::ForViews(std::vector<CoveredView> all, F&& f) {
       std::copy(some.begin(), some.end(), views.few);
     } else {
       absl::StatusOr<Block> block = device_.Upload(some.data(), some.size());
-      // What goes over lies in memory that goes with this call.
+      // The uploaded data lies in memory that is freed when this call returns.
       if (!block.ok()) return block.status();
       uploaded = *std::move(block);
       views.views = uploaded.as<CoveredView>();
-      // What goes over lies in memory that goes with this call.
+      // The uploaded data lies in memory that is freed when this call returns.
       if (absl::Status status = device_.Wait(); !status.ok()) return status;
     }
     if (absl::Status status = f(views); !status.ok()) return status;

@@ -1,4 +1,4 @@
-// The drawing of regions while some items have no lists: pass by pass, each with lists of what it draws.
+// Draws regions while some items have no lists: pass by pass, each with lists for its own regions.
 #include <algorithm>
 #include <utility>
 
@@ -8,7 +8,7 @@
 namespace voxeld::gpu::cuda {
 namespace {
 
-// The axis along which blocks are cut in two; −1: there is one.
+// Returns the axis along which blocks are halved; −1 if there is only one.
 int AxisToCut(const int32_t lo[3], const int32_t hi[3]) {
   for (int a = 2; a >= 0; --a) {
     if (hi[a] - lo[a] > 1) return a;
@@ -62,7 +62,7 @@ absl::Status CudaVolume::DrawInPasses(const DrawView& all, DrawTo to, const Seen
   absl::StatusOr<Block> found = device_.pool().Acquire(sizeof(PickedRegions));
   if (!found.ok()) return found.status();
   auto* const picked_there = found->as<PickedRegions>();
-  std::vector<RegionGrid> left;  // the next one last
+  std::vector<RegionGrid> left;  // the next one is last
   const int32_t planes = std::min(pass_planes_, regions.blocks[2]);
   for (int32_t z = 0; z < regions.blocks[2]; z += planes) {
     left.push_back(regions);
@@ -106,7 +106,7 @@ absl::Status CudaVolume::DrawInPasses(const DrawView& all, DrawTo to, const Seen
     view.listed = &picked_there->count;
     view.taken = &picked_there->taken;
     status = Draw(view, to, device_.stream());
-    // In the stream, who has the lists' memory next comes after the drawing.
+    // In the stream, the next user of the lists' memory comes after the drawing.
     EndPass();
     if (!status.ok()) return status;
   }

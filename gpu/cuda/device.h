@@ -1,4 +1,4 @@
-// A device with its memory and its stream of work.
+// A device with its memory and its streams of work.
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -15,7 +15,7 @@
 
 namespace voxeld::gpu::cuda {
 
-// Thread-bound, after it was made.
+// Thread-bound after its creation.
 class Device {
  public:
   static absl::StatusOr<std::unique_ptr<Device>> Open(int device);
@@ -25,11 +25,11 @@ class Device {
 
   Api& api() { return *api_; }
   Pool& pool() { return pool_; }
-  cudaStream_t stream() const { return stream_; }  // the work
-  cudaStream_t copies() const { return copies_; }  // results on their way to the host
-  cudaStream_t beside() const { return beside_; }  // work that needs not be done after the other
+  cudaStream_t stream() const { return stream_; }  // the main work
+  cudaStream_t copies() const { return copies_; }  // copies of results to the host
+  cudaStream_t beside() const { return beside_; }  // work that need not follow the main work
 
-  // A kernel's queueing.
+  // Queues a kernel.
   template <typename Function>
   absl::Status Run(const char* what, Function&& function) {
     return api_->Call(what, std::forward<Function>(function));
@@ -37,9 +37,9 @@ class Device {
   absl::Status ToDevice(void* to, const void* from, size_t bytes);
   absl::Status ToHost(void* to, const void* from, size_t bytes);
   absl::Status Zero(void* at, size_t bytes);
-  absl::Status Wait();  // for the work
+  absl::Status Wait();  // for the main work
 
-  // A block with `count` values, copied from `from`.
+  // Returns a block with `count` values, copied from `from`.
   template <typename T>
   absl::StatusOr<Block> Upload(const T* from, size_t count) {
     absl::StatusOr<Block> block = pool_.Acquire(count * sizeof(T));
@@ -49,9 +49,9 @@ class Device {
     }
     return block;
   }
-  // A block of zeros.
+  // Returns a block of zeros.
   absl::StatusOr<Block> Zeros(size_t bytes);
-  // The value at a device address, after all work before.
+  // Returns the value at a device address, after all work before.
   template <typename T>
   absl::StatusOr<T> Read(const T* from) {
     T value;

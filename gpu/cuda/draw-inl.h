@@ -1,5 +1,5 @@
-// The drawing of dirty regions: a block of threads draws one in shared memory, layer by layer, and
-// writes it out once.
+// Draws dirty regions: a block of threads draws one in shared memory, layer by layer, and writes it
+// out once.
 #pragma once
 
 #include <cstddef>
@@ -13,8 +13,8 @@
 
 namespace voxeld::gpu::cuda {
 
-// What a drawing has to reckon with: thin lines, points and small triangles that have lists, of one
-// layer that is seen as it is; of any layers; or anything.
+// The content that a kernel can draw: thin lines, points and small triangles that have lists, in
+// one layer that is shown without blending; the same in any layers; or anything.
 enum class DrawWhat : uint8_t { kOneLayer, kLines, kAll };
 
 template <DrawWhat kWhat>
@@ -34,15 +34,16 @@ struct DrawScratch<DrawWhat::kAll> {
     PairScratch pairs;
   };
   PairRows rows;
-  uint32_t mask[kDrawThreads];  // of the layer that is drawn, if it has one; each thread's voxels
+  uint32_t mask[kDrawThreads];  // of the layer being drawn, if it has one; each thread's voxels
 };
 static_assert(offsetof(DrawScratch<DrawWhat::kAll>, pairs) == sizeof(RegionScratch) &&
               offsetof(PairScratch, solid) == 0);  // SharedBehind
-// So that a multiprocessor has kDrawBlocks of them; the system keeps 1 KB of each.
+// A multiprocessor must have room for kDrawBlocks of them; the system reserves 1 KB of each.
 static_assert(sizeof(DrawScratch<DrawWhat::kAll>) <= (228 / kDrawBlocks - 1) * 1024);
 
-// Where a kernel writes to. The kernels for thin lines, points and small triangles are compiled for each destination.
-// The one for anything is many times larger than what writes a region out: it is compiled once and asks for each region.
+// The destination of a kernel. The kernels for thin lines, points and small triangles are compiled
+// for each destination. The kernel for anything is many times larger than the code that writes a
+// region out: it is compiled once and checks the destination for each region.
 template <DrawTo kTo>
 struct FixedOutput {
   __device__ constexpr DrawTo to() const { return kTo; }
@@ -60,8 +61,9 @@ __device__ void Flush(const DrawView& view, const Output& output, const RegionPl
   FlushToReader(view, place, scratch);
 }
 
-// What is to be done with the layer that was found, and which is wanted next. One with a mask is found three times: it has
-// something here, then its mask is, then it is drawn. By the first warp.
+// Decides what to do with the layer that was found, and which one to find next. A layer with a mask
+// takes three steps: it is found to have something here, then its mask is found, then it is drawn.
+// Called by the first warp.
 template <DrawWhat kWhat>
 __device__ void PlanStep(const DrawView& view, int32_t found, RegionScratch& scratch) {
   __syncwarp();
@@ -96,15 +98,15 @@ __device__ void PlanStep(const DrawView& view, int32_t found, RegionScratch& scr
   }
 }
 
-// A layer that was drawn: its words stand.
+// A layer that was drawn and whose words are still in shared memory.
 struct Standing {
   uint32_t layer = kAllLanes;  // its slot; kAllLanes: none
   uint32_t cutting = 0;        // RegionScratch::cutting
 };
 
-// What is shown of the layer, above what was settled before, if anything was: put aside, so that the next
-// layer can be drawn; or, if there is none (`last`), it stands where the words did. By the whole block: a
-// thread sees to the same voxels each time.
+// Blends the visible part of the layer over the layers that were settled before, if any. The result
+// is put aside, so that the next layer can be drawn; or, if it is the last layer (`last`), it
+// replaces the words. Called by the whole block: a thread handles the same voxels each time.
 template <DrawWhat kWhat>
 static __device__ __noinline__ void Settle(const DrawView& view, Standing standing, bool settled,
                                            bool last, DrawScratch<kWhat>& all) {
@@ -132,13 +134,13 @@ static __device__ __noinline__ void Settle(const DrawView& view, Standing standi
   __syncthreads();
 }
 
-// The words become the mask of the layer that follows. By the whole block.
+// Turns the words into the mask of the layer that follows. Called by the whole block.
 static __device__ __noinline__ void TakeMask(const DrawView& view,
                                              DrawScratch<DrawWhat::kAll>& all) {
   RegionScratch& scratch = all.region;
   const RegionPlace place(view, scratch);
   const CutBy cut_by = CutBy::Of(view, view.layers[scratch.layer], scratch.cutting);
-  uint32_t mask = 0;  // bits: by j
+  uint32_t mask = 0;  // bit j: the thread's j-th voxel
 #pragma unroll 4
   for (uint32_t j = 0; j < kRounds; ++j) {
     const uint32_t v = threadIdx.x + j * kDrawThreads;
@@ -151,7 +153,7 @@ static __device__ __noinline__ void TakeMask(const DrawView& view,
   __syncthreads();
 }
 
-// What a layer has in the region, raised into the words. By the whole block.
+// Raises the layer's items in the region into the words. Called by the whole block.
 template <DrawWhat kWhat>
 __device__ void RaiseLayer(const DrawView& view, DrawScratch<kWhat>& all) {
   RegionScratch& scratch = all.region;
@@ -194,7 +196,7 @@ __device__ void RaiseLayer(const DrawView& view, DrawScratch<kWhat>& all) {
   }
 }
 
-// The layers of a region from the lowest on. The words are then what is seen.
+// Draws the layers of a region from the lowest on. Afterwards the words are the visible result.
 template <DrawWhat kWhat>
 __device__ void DrawLayers(const DrawView& view, const RegionPlace& place,
                            DrawScratch<kWhat>& all) {
@@ -219,7 +221,7 @@ __device__ void DrawLayers(const DrawView& view, const RegionPlace& place,
     const DrawStep step = scratch.step;
     if (step == DrawStep::kNone) break;
     if (step == DrawStep::kSkip) {
-      __syncthreads();  // all have seen it
+      __syncthreads();  // all threads have read it
       continue;
     }
     if (standing.layer != kAllLanes) {
@@ -236,8 +238,8 @@ __device__ void DrawLayers(const DrawView& view, const RegionPlace& place,
         continue;
       }
     }
-    __syncthreads();                   // all know what stands
-    if (view.below == nullptr) break;  // there is one layer
+    __syncthreads();                   // all threads have read the step
+    if (view.below == nullptr) break;  // there is only one layer
   }
   if (standing.layer == kAllLanes) return;
   const LayerLook& look = view.layers[standing.layer];
@@ -262,7 +264,7 @@ __global__ void __launch_bounds__(kDrawThreads, kDrawBlocks)
       scratch.least[threadIdx.x] = view.packed.least[threadIdx.x];
     }
   }
-  // A block has one place in the list to begin with, and takes others from the `taken` counter.
+  // A block starts with one place in the list, and takes others from the `taken` counter.
   if (threadIdx.x == 0) {
     scratch.lit_change = 0;
     scratch.region = blockIdx.x < dirty ? view.list[blockIdx.x] : kAllLanes;
@@ -270,12 +272,11 @@ __global__ void __launch_bounds__(kDrawThreads, kDrawBlocks)
   }
   for (;;) {
     if (threadIdx.x < kRegionTiles) scratch.lit[threadIdx.x] = scratch.differs[threadIdx.x] = 0;
-    // Voted on: a loop that threads might leave one by one, for all that the compiler knows, must not
-    // call functions.
+    // The result is voted on: the compiler must not see a loop that threads might leave one by one,
+    // because it calls functions.
     if (__syncthreads_or(threadIdx.x == 0 && scratch.region != kAllLanes) == 0) break;
     const uint32_t region = scratch.region;
-    // The next region, and the place of the one after it, are on their way while this one is written
-    // out.
+    // Prefetch the next region, and the place of the one after it, while this one is written out.
     uint32_t region_after = kAllLanes, place_after = 0;
     const auto ask_ahead = [&] {
       if (threadIdx.x != 0) return;
@@ -283,7 +284,7 @@ __global__ void __launch_bounds__(kDrawThreads, kDrawBlocks)
       place_after = gridDim.x + atomicAdd(view.taken, 1u);
     };
     if (kWhat == DrawWhat::kOneLayer && !view.clipped) {
-      // All batches are of the layer.
+      // All batches are of that layer.
       for (uint32_t b = 0; b < view.lines.count; ++b) DrawSpans(view.lines.batches[b]);
       for (uint32_t b = 0; b < view.points.count; ++b) DrawPoints(view.points.batches[b]);
       for (uint32_t b = 0; b < view.triangles.count; ++b) {

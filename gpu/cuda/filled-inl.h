@@ -1,5 +1,5 @@
-// The inside of a mesh in a region, by a block of threads: a thread looks up a row, a warp raises a
-// plane.
+// Draws the inside of a mesh in a region, by a block of threads: a thread looks up a row, a warp
+// raises a plane.
 #pragma once
 
 #include "gpu/cuda/draw_types.h"
@@ -29,7 +29,7 @@ static __device__ __noinline__ void DrawFilled(const TableEntry& entry, const Bo
   for (uint32_t left = __ballot_sync(kAllLanes, row != 0); left != 0; left &= left - 1) {
     const uint32_t r = static_cast<uint32_t>(__ffs(static_cast<int>(left))) - 1;
     if ((__shfl_sync(kAllLanes, row, r) >> lane & 1) == 0) continue;
-    words[r << 5] = Max(words[r << 5], word);  // nobody else has this voxel now
+    words[r << 5] = Max(words[r << 5], word);  // no other thread accesses this voxel now
   }
   __syncthreads();
 }

@@ -1,6 +1,7 @@
-// Where a region's colours go. Each function is called by the whole block, and leaves the words 0. When a
-// thread returns, all have read what says which region it is.
-// What is seen of a voxel is its word's colour (an erase's is 0), or what else stands in its place as a colour.
+// Writes a region's colours to their destination. Each function is called by the whole block, and
+// sets the words to 0. When a thread returns, all threads have read the variables that identify the
+// region. The visible colour of a voxel is its word's colour (0 for an erase), or the colour that
+// replaced the word.
 #pragma once
 
 #include "gpu/cuda/pixels-inl.h"
@@ -11,9 +12,9 @@ namespace voxeld::gpu::cuda {
 
 inline constexpr uint32_t kRounds = kRegionVoxels / kDrawThreads;
 
-// Of voxel threadIdx.x + j·kDrawThreads of a region: a warp has a row along x.
+// The place of voxel threadIdx.x + j·kDrawThreads of a region: a warp has a row along x.
 struct RowPlace {
-  uint32_t v, lane, half;  // which of the two tiles along x
+  uint32_t v, lane, half;  // half: which of the two tiles along x
   int32_t x, y, z;
 
   __device__ RowPlace(const RegionPlace& place, uint32_t j) {
@@ -24,7 +25,7 @@ struct RowPlace {
     y = place.box.lo[1] + static_cast<int32_t>(v >> 5 & 31);
     z = place.box.lo[2] + static_cast<int32_t>(v >> 10);
   }
-  // Of the region's four.
+  // Returns which of the region's four tiles it is.
   __device__ uint32_t tile() const { return half | (static_cast<uint32_t>(y) >> 4 & 1) << 1; }
 };
 
@@ -44,7 +45,7 @@ __device__ inline void CountLit(bool lit, const RowPlace& at, RegionScratch& scr
   }
 }
 
-// Notes a tile's number of lit voxels. By one thread a tile.
+// Notes a tile's number of lit voxels. Called by one thread per tile.
 __device__ inline void PutLit(const VolumeView& volume, uint32_t tile, uint8_t owner,
                               uint32_t before, uint32_t now, RegionScratch& scratch) {
   if (now == before) return;
@@ -53,7 +54,8 @@ __device__ inline void PutLit(const VolumeView& volume, uint32_t tile, uint8_t o
   atomicAdd(&scratch.lit_change, static_cast<unsigned long long>(now) - before);
 }
 
-// Slices that look at a tile whose colours changed. `more`: 1 if it has become lit, −1 if dark.
+// Marks the slices that look at a tile whose colours changed. `more`: 1 if it has become lit, −1 if
+// dark.
 __device__ inline void MarkSlices(const SliceIndexView& slices, const TileGrid& grid, uint32_t tile,
                                   uint32_t more, uint32_t thread, uint32_t threads) {
   int32_t ijk[3];
@@ -71,7 +73,7 @@ __device__ inline void MarkSlices(const SliceIndexView& slices, const TileGrid& 
   }
 }
 
-// Into the tiles' colours; marks the slices that look at those that changed.
+// Writes to the tiles' colours; marks the slices that look at tiles that changed.
 __device__ inline void FlushToTiles(const DrawView& view, const RegionPlace& place,
                                     RegionScratch& scratch) {
   const VolumeView& volume = view.volume;
@@ -94,7 +96,7 @@ __device__ inline void FlushToTiles(const DrawView& view, const RegionPlace& pla
     CountLit(c != 0, at, scratch);
   }
   __syncthreads();
-  // A warp looks after a tile.
+  // A warp handles a tile.
   if (threadIdx.x < 32 * kRegionTiles) {
     const uint32_t t = threadIdx.x / 32, lane = threadIdx.x % 32;
     const uint32_t tile = place.TileOf(volume, t);
@@ -112,7 +114,7 @@ __device__ inline void FlushToTiles(const DrawView& view, const RegionPlace& pla
   __syncthreads();
 }
 
-// A row's pixels into a picture of bytes.
+// Writes a row's pixels into a slice image of bytes.
 __device__ inline bool PutPixel(const SliceView& view, uint32_t sub, uint32_t u, uint32_t v,
                                 uint32_t color, uint8_t* picture) {
   Levels q = {0, 0, 0};
@@ -128,14 +130,15 @@ __device__ inline bool PutPixel(const SliceView& view, uint32_t sub, uint32_t u,
   return PutLevels(view, u, v, q, picture);
 }
 
-// Three planes' words of a row of 32 pixels in a picture of bits, as far as the picture has them.
+// The place of three planes' words for a row of 32 pixels in a slice image of bits, as far as the
+// slice image reaches.
 struct BitsPlace {
   uint8_t* at = nullptr;  // of the first plane; null: none
   uint32_t plane = 0;     // bytes from one to the next
   int32_t count = 0;      // pixels
   bool whole = false;     // they are words in memory
 
-  // Of row `lane` of the region's plane that is `slice`.
+  // For row `lane` of the region's plane that is `slice`.
   __device__ BitsPlace(const PackedView& packed, const RegionPlace& place, int32_t slice,
                        uint32_t sub) {
     const SliceView& view = packed.slices;
@@ -159,7 +162,7 @@ struct BitsPlace {
 #pragma unroll
     for (uint32_t p = 0; p < 3; ++p) held[p] = *reinterpret_cast<uint32_t*>(at + p * plane);
   }
-  // The first pixel in the highest bit. True if they were others.
+  // Writes the bits, the first pixel in the highest bit. Returns true if they changed.
   __device__ bool Put(const uint32_t bits[3], const uint32_t held[3]) const {
     if (at == nullptr) return false;
     const uint32_t kept = count >= 32 ? kAllLanes : ~(kAllLanes >> count);
@@ -181,15 +184,15 @@ struct BitsPlace {
   }
 };
 
-// Bits of a row's 32 voxels, the first in the highest.
+// Bits of a row's 32 voxels, the first in the highest bit.
 struct RowBits {
   uint32_t lit = 0, red = 0, green = 0, blue = 0;
 };
 
-// Of a row in shared memory, of which this lane alone sees to this one, while its warp sees to 32: each
-// begins with other voxels, so that they meet all banks. least:
-// PackedView::least of eight pixels of the row. `keep`: the words are wanted again. limit: voxels of it
-// that there are.
+// Takes a row out of shared memory. Each lane processes a row alone, and its warp 32 rows: each
+// starts with other voxels, so that the accesses are spread over all banks. least:
+// PackedView::least of eight pixels of the row. `keep`: the words are used again. limit: the number
+// of existing voxels in the row.
 __device__ inline RowBits TakeRow(uint32_t* row, uint32_t v, int32_t limit, const uint4 least[2],
                                   bool keep) {
   constexpr uint32_t kBlue = 0x249249;
@@ -197,7 +200,7 @@ __device__ inline RowBits TakeRow(uint32_t* row, uint32_t v, int32_t limit, cons
   const bool odd = threadIdx.x % 2 != 0;
   const uint4 near = least[odd ? 1 : 0], far = least[odd ? 0 : 1];
   const uint32_t leasts[8] = {near.x, near.y, near.z, near.w, far.x, far.y, far.z, far.w};
-  RowBits bits;  // of what is below the least, and of what is dark
+  RowBits bits;  // of voxels below the least, and of dark voxels
 #pragma unroll 1
   for (uint32_t step = 0; step < 32; step += 8) {
 #pragma unroll
@@ -218,7 +221,7 @@ __device__ inline RowBits TakeRow(uint32_t* row, uint32_t v, int32_t limit, cons
       for (uint32_t i = 0; i < 4; ++i) {
         const uint32_t at = x + i, l = leasts[half + i];
         const uint32_t c = static_cast<int32_t>(at) < limit ? four[i] & kColorMask : 0;
-        // The sign of a difference is whether it is less.
+        // The sign of the difference says whether it is less.
         bits.lit = __funnelshift_l(c - 1, bits.lit, 1);
         bits.red = __funnelshift_l((c & kBlue << 1) - (l << 1), bits.red, 1);
         bits.green = __funnelshift_l((c & kBlue << 2) - (l << 2), bits.green, 1);
@@ -229,7 +232,7 @@ __device__ inline RowBits TakeRow(uint32_t* row, uint32_t v, int32_t limit, cons
   const auto in_order = [&](uint32_t turned) {
     return ~__funnelshift_l(turned, turned, 32 - begin);
   };
-  // A pixel without light is at the lowest level whatever the least is.
+  // A pixel without light is at the lowest level, whatever the least is.
   bits.lit = in_order(bits.lit);
   bits.red = in_order(bits.red) & bits.lit;
   bits.green = in_order(bits.green) & bits.lit;
@@ -237,12 +240,12 @@ __device__ inline RowBits TakeRow(uint32_t* row, uint32_t v, int32_t limit, cons
   return bits;
 }
 
-// What writing a region into pictures needs from memory, all asked for at once. A warp has a plane,
-// which is a slice; a thread of the first few a tile.
+// The data in memory that writing a region to slice images needs, all requested at once. A warp has
+// a plane, which is a slice; each of the first few threads has a tile.
 struct PicturesHeld {
-  int32_t slice = -1;                     // from the first owned; −1: none
-  uint32_t slice_dirty = 0, differs = 0;  // of its first picture
-  uint32_t held[3] = {};                  // of that, this lane's row of bits
+  int32_t slice = -1;                     // from the first owned slice; −1: none
+  uint32_t slice_dirty = 0, differs = 0;  // of its first slice image
+  uint32_t held[3] = {};                  // of that image, this lane's row of bits
   uint32_t tile = kAllLanes, lit = 0;
   uint8_t owner = 0;
 
@@ -266,8 +269,8 @@ struct PicturesHeld {
   }
 };
 
-// One plane of the region, by a warp: a lane has a row. Bits: which sub-frames' pictures differ.
-// limit[2]: how much of it there is, along x and y.
+// Writes one plane of the region, by a warp: a lane has a row. Returns bits: which sub-frames'
+// slice images changed. limit[2]: the existing part of the plane, along x and y.
 __device__ inline uint32_t FlushPlane(const PackedView& packed, const RegionPlace& place,
                                       const PicturesHeld& before, const int32_t limit[2],
                                       RegionScratch& scratch) {
@@ -284,11 +287,12 @@ __device__ inline uint32_t FlushPlane(const PackedView& packed, const RegionPlac
         reinterpret_cast<const uint4*>(sub == 0 ? scratch.least : packed.least + sub * 64) + v * 2;
     const BitsPlace bits_place(packed, place, before.slice, sub);
     uint32_t held[3] = {before.held[0], before.held[1], before.held[2]};
-    if (sub > 0) bits_place.Load(held);  // on their way while the row is read
+    if (sub > 0) bits_place.Load(held);  // they are loaded while the row is read
     const RowBits drawn =
         TakeRow(scratch.words + row * 32, row * 32, voxels, leasts, sub + 1 < view.sub_frames);
     if (sub == 0) {
-      // Of 16 rows: of the nearer tile in the lower half, of the further in the upper.
+      // Counts over 16 rows: of the nearer tile in the lower half, of the farther tile in the
+      // upper.
       uint32_t counts = static_cast<uint32_t>(__popc(drawn.lit >> 16)) |
                         static_cast<uint32_t>(__popc(drawn.lit & 0xFFFF)) << 16;
       for (int lanes = 8; lanes > 0; lanes /= 2) {
@@ -306,7 +310,8 @@ __device__ inline uint32_t FlushPlane(const PackedView& packed, const RegionPlac
   return pictures;
 }
 
-// Straight into the pictures of the slices that the region's planes are: a warp has a plane.
+// Writes directly to the slice images of the slices that are the region's planes: a warp has a
+// plane.
 static_assert(kDrawWarps == 1u << RegionBits(2));
 __device__ inline void FlushToPictures(const DrawView& view, const RegionPlace& place,
                                        RegionScratch& scratch) {
@@ -352,7 +357,7 @@ __device__ inline void FlushToPictures(const DrawView& view, const RegionPlace& 
     }
   }
   if (lane == 0 && pictures != 0) {
-    // As a rule another region has said so already.
+    // Usually another region has already marked it.
     if (before.slice_dirty == 0) packed.slice_dirty[s] = 1;
     for (uint32_t sub = 0; sub < slices.sub_frames; ++sub) {
       if ((pictures >> sub & 1) == 0 || (sub == 0 && before.differs != 0)) continue;
@@ -365,7 +370,7 @@ __device__ inline void FlushToPictures(const DrawView& view, const RegionPlace& 
   }
 }
 
-// To who asks for voxels.
+// Writes to the caller of ReadVoxels.
 __device__ inline void FlushToReader(const DrawView& view, const RegionPlace& place,
                                      RegionScratch& scratch) {
   const Box3& box = view.read.box;

@@ -1,4 +1,4 @@
-// The source of a kernel for one formula, and what it includes.
+// The source of a kernel for one formula, and the sources that it includes.
 #pragma once
 
 #include <cstdint>
@@ -11,11 +11,13 @@ namespace voxeld::gpu::cuda {
 
 inline constexpr const char* kFormulaKernel = "voxeld_find_covered";
 
-// As FindCovered (implicit_kernels.h), of shapes with that program's key (implicit/formula_text.h):
+// Returns the source of a kernel that does the same as FindCovered (implicit_kernels.h), for shapes
+// with that program's key (implicit/formula_text.h):
 //   void voxeld_find_covered(CoveredViews views)
 // `hoisted`: the program (implicit/hoisted.h).
 std::string FormulaSource(std::span<const uint32_t> hoisted);
-// Of covered-inl.h all that it includes, as they are in the tree, and what of the standard library that takes.
+// Returns all sources that covered-inl.h includes, as they are in the tree, and the required parts
+// of the standard library.
 std::span<const NamedSource> FormulaSources();
 
 }  // namespace voxeld::gpu::cuda

@@ -1,11 +1,11 @@
-// An implicit shape in a tile, by a block of threads. As a rule it is known which voxels it covers
-// (kernels_implicit.cu). Where there was no room for that it is found here: P's hoisted values along each axis
-// (hoisted.h); which parts of 4³ voxels may have something, by intervals; P in these and around them, four voxels
-// a thread; then whoever has a neighbour on the other side, or lies within the shell, by the definition
-// (implicit/field.h).
+// Draws an implicit shape in a tile, by a block of threads. Usually the voxels that it covers are
+// already known (kernels_implicit.cu). If there was no memory for them, they are found here: P's
+// hoisted values along each axis (hoisted.h); which parts of 4³ voxels may have something, by
+// intervals; P in these parts and around them, four voxels per thread; then, by the definition
+// (implicit/field.h), which voxels have a neighbour on the other side or lie within the shell.
 //
-// Loops around the program's run are the same for all threads of a warp: idle ones run it as well, and
-// take no notice of what comes out.
+// Loops around the program's execution are the same for all threads of a warp: idle threads execute
+// it as well and ignore the results.
 #pragma once
 
 #include "gpu/cuda/covered_types.h"
@@ -24,11 +24,12 @@ struct ImplicitScratch {
   static constexpr uint32_t kAllParts = kParts * kParts * kParts;
   static constexpr int32_t kRows = kTileSize + 2;
 
-  // P's hoisted values: at voxels from one before the box on, with gradients of a shell; and in parts.
+  // P's hoisted values: at voxels from one before the box on, for a shell with gradients; and in
+  // parts.
   float value[implicit::kMostHoisted][kRows + 2];
   float gradient[implicit::kMostHoisted][kRows][3];
   implicit::Interval range[implicit::kMostHoisted][kParts];
-  // P in rows [z][y] from one before the box on, where parts with anything or their neighbours are.
+  // P in rows [z][y] from one before the box on, in parts with anything and their neighbours.
   static constexpr int32_t kQuads = (kRows + 3) / 4;
   alignas(16) implicit::Quad p[kRows][kRows][kQuads];
   uint8_t row_parts[kParts][kParts];  // [z][y], bits: parts along x with anything
@@ -45,7 +46,7 @@ struct ImplicitTile {
   const Solid& solid;
   ImplicitScratch& scratch;
   Box3 box;
-  float reach;  // of a shell: Field::ReachIn the box
+  float reach;  // for a shell: Field::ReachIn of the box
 
   __device__ static void PartAt(uint32_t part, int32_t at[3]) {
     constexpr uint32_t kParts = ImplicitScratch::kParts;
@@ -60,7 +61,7 @@ struct ImplicitTile {
   }
 };
 
-// Thread by thread: places along axes, then parts along axes, in warps of their own.
+// Each thread handles a place along an axis, or a part along an axis; these are in different warps.
 static __device__ __noinline__ void FindHoisted(const ImplicitTile& tile) {
   constexpr uint32_t kRows = ImplicitScratch::kRows, kParts = ImplicitScratch::kParts;
   ImplicitScratch& s = tile.scratch;
@@ -91,7 +92,7 @@ static __device__ __noinline__ void FindHoisted(const ImplicitTile& tile) {
   }
 }
 
-// P at four voxels along x, by the place of the first in the tile, from −1 on.
+// Returns P at four voxels along x, from the place of the first in the tile, from −1 on.
 static __device__ __noinline__ implicit::Quad ImplicitValues(const ImplicitTile& tile, int32_t x,
                                                              int32_t y, int32_t z) {
   implicit::Quad q[3];
@@ -152,7 +153,7 @@ static __device__ __noinline__ implicit::BoxState ImplicitState(const ImplicitTi
   if (tile.is_shell()) state.none = state.none && implicit::Abs(p).lo > tile.reach;
   return state;
 }
-// The word of a voxel of the volume.
+// Returns the word of a voxel of the volume.
 static __device__ __noinline__ uint32_t ImplicitColor(const implicit::Field& field,
                                                       uint32_t priority, bool erase, int32_t x,
                                                       int32_t y, int32_t z) {
@@ -160,7 +161,7 @@ static __device__ __noinline__ uint32_t ImplicitColor(const implicit::Field& fie
   if (!field.is_uniform()) field.CoordinatesOf(x, y, z, q);
   return MakeWord(priority, erase, field.ColorAt(q));
 }
-// The same if the shape's bound holds the voxel; else 0.
+// The same if the voxel is within the shape's bound; otherwise 0.
 static __device__ __noinline__ uint32_t ImplicitWord(const implicit::Field& field,
                                                      uint32_t priority, bool erase, int32_t x,
                                                      int32_t y, int32_t z) {
@@ -172,7 +173,7 @@ static __device__ __noinline__ uint32_t ImplicitWord(const implicit::Field& fiel
   return ImplicitColor(field, priority, erase, x, y, z);
 }
 
-// Finds out which parts have anything; false if none has. By the whole block.
+// Finds which parts have anything; returns false if none has. Called by the whole block.
 __device__ inline bool FindImplicitParts(const ImplicitTile& tile) {
   ImplicitScratch& s = tile.scratch;
   FindHoisted(tile);
@@ -195,11 +196,11 @@ __device__ inline bool FindImplicitParts(const ImplicitTile& tile) {
   }
   __syncthreads();
   const bool any = s.some != 0;
-  __syncthreads();  // all have seen it
+  __syncthreads();  // all threads have read it
   return any;
 }
 
-// P where it matters. By the whole block.
+// Computes P in the parts that matter. Called by the whole block.
 __device__ inline void FindImplicitValues(const ImplicitTile& tile) {
   constexpr int32_t kRows = ImplicitScratch::kRows, kQuads = ImplicitScratch::kQuads;
   constexpr int32_t kAll = kRows * kRows * kQuads;
@@ -224,7 +225,8 @@ __device__ inline void FindImplicitValues(const ImplicitTile& tile) {
   }
 }
 
-// Whether the voxel, at (x, y, z) in its tile, has a neighbour on the other side whose |P| is not less.
+// Returns whether the voxel at (x, y, z) of its tile has a neighbour on the other side whose |P| is
+// not less.
 __device__ inline bool IsBetweenSides(const ImplicitTile& tile, int32_t x, int32_t y, int32_t z) {
   const auto value = [&](int32_t dx, int32_t dy, int32_t dz) {
     return (&tile.scratch.p[z + dz + 1][y + dy + 1][0].at[0])[x + dx + 1];
@@ -246,7 +248,7 @@ __device__ inline bool IsBetweenSides(const ImplicitTile& tile, int32_t x, int32
   return any;
 }
 
-// A voxel that P says to be covered.
+// Raises a voxel that P selects.
 __device__ inline void RaiseImplicit(const TableEntry& entry, const ImplicitTile& tile, int32_t x,
                                      int32_t y, int32_t z, uint32_t* words) {
   const int32_t at[3] = {tile.box.lo[0] + x, tile.box.lo[1] + y, tile.box.lo[2] + z};
@@ -255,8 +257,8 @@ __device__ inline void RaiseImplicit(const TableEntry& entry, const ImplicitTile
   if (word != 0) atomicMax(&words[IndexInRegion(at[0], at[1], at[2])], word);
 }
 
-// The voxels of a part that are covered for their sides' sake; those that may lie in the shell are put
-// down. By a warp.
+// Draws the voxels of a part that are covered because of their neighbours' sides; lists those that
+// may lie in the shell. Called by a warp.
 __device__ inline void DrawImplicitPart(const TableEntry& entry, const ImplicitTile& tile,
                                         uint32_t part, uint32_t* words) {
   ImplicitScratch& s = tile.scratch;
@@ -291,13 +293,13 @@ __device__ inline void DrawImplicitPart(const TableEntry& entry, const ImplicitT
   }
 }
 
-// An item's voxels, which lie in the tile of `box`, by the whole block.
+// Draws an item's voxels, which lie in the tile of `box`. Called by the whole block.
 static __device__ __noinline__ void DrawImplicit(const TableEntry& entry, uint32_t item,
                                                  const Box3& box, uint32_t* words,
                                                  ImplicitScratch& s) {
   const implicit::Field field(entry.source);
   const Box3 part = Intersect(box, entry.source.solid.bounds);
-  if (IsEmpty(part)) return;  // the same for every thread, as what follows
+  if (IsEmpty(part)) return;  // the same for every thread, as is the code below
   const float* const known = entry.source.implicit.reach;
   const float reach = known != nullptr ? known[item] : Implicit::ReachOf(field, part);
   if (reach == Implicit::kNothing) return;
@@ -322,7 +324,8 @@ static __device__ __noinline__ void DrawImplicit(const TableEntry& entry, uint32
   __syncthreads();
 }
 
-// Of the tile at (i, j, k) its row (y, z), voxels of the tile, as far as the shape is bounded; bit x.
+// Returns row (y, z) of the tile at (i, j, k), within the shape's bounds; bit x is voxel x of the
+// tile.
 __device__ inline uint32_t CoveredRow(const Source& source, int32_t i, int32_t j, int32_t k,
                                       uint32_t row) {
   const ImplicitPlace& place = source.implicit;
@@ -332,12 +335,13 @@ __device__ inline uint32_t CoveredRow(const Source& source, int32_t i, int32_t j
     if (at[a] < 0 || at[a] >= place.blocks[a]) return 0;
     item = item * static_cast<uint32_t>(place.blocks[a]) + static_cast<uint32_t>(at[a]);
   }
-  // What has nothing has no rows.
+  // An item with nothing in it has no rows.
   if (__ldg(&place.reach[item]) == Implicit::kNothing) return 0;
   return __ldg(&place.rows[size_t{item} * kCoveredRows + row]);
 }
 
-// The same where its rows are known, in a whole region, `box`: a thread looks up a row, a warp raises a plane.
+// The same if the shape's rows are known, in a whole region, `box`: a thread looks up a row, a warp
+// raises a plane.
 static __device__ __noinline__ void DrawCovered(const TableEntry& entry, const Box3& box) {
   static_assert(RegionBits(0) == 5 && RegionBits(1) == 5 && kDrawWarps == 1u << RegionBits(2));
   const Source& source = entry.source;
@@ -361,7 +365,7 @@ static __device__ __noinline__ void DrawCovered(const TableEntry& entry, const B
           field, entry.priority, entry.erase != 0, box.lo[0] + static_cast<int32_t>(lane),
           box.lo[1] + static_cast<int32_t>(r), box.lo[2] + static_cast<int32_t>(plane));
     }
-    at[r << 5] = Max(at[r << 5], word);  // nobody else has this voxel now
+    at[r << 5] = Max(at[r << 5], word);  // no other thread accesses this voxel now
   }
   __syncthreads();
 }

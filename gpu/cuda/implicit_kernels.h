@@ -1,5 +1,6 @@
-// What finds implicit shapes' voxels on the device (kernels_implicit.cu). Each function queues its kernel in
-// `stream`, for shapes in the table, 65,535 at most, and answers whether that could be done.
+// The kernels that find the voxels of implicit shapes (kernels_implicit.cu). Each function queues
+// its kernel in `stream`, for at most 65,535 shapes in the table, and returns whether that
+// succeeded.
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -11,14 +12,15 @@ namespace voxeld::gpu::cuda {
 
 // Sets `reach`.
 cudaError_t FindTiles(const TableEntry* table, const CoveredViews& views, cudaStream_t stream);
-// Sets what `axis` points to. Every view has rows, here and below.
+// Sets the arrays of `axis`. Here and below, every view has rows.
 cudaError_t FindAlong(const TableEntry* table, const CoveredViews& views, cudaStream_t stream);
-// Sets `rows`, from what the two before have set, of tiles that may have anything: what P says to be
-// covered. Programs are interpreted.
+// Sets `rows` of tiles that may have anything, from the results of the two functions above: the
+// voxels that P selects. Programs are interpreted.
 cudaError_t FindCovered(const TableEntry* table, const CoveredViews& views, cudaStream_t stream);
-// The same by a kernel that was compiled for a program that all of them have (compiled_formulas.h).
+// The same, with a kernel that was compiled for the program that all of them share
+// (compiled_formulas.h).
 cudaError_t FindCoveredBy(cudaKernel_t kernel, const CoveredViews& views, cudaStream_t stream);
-// Takes from `rows` what Φ and rings leave out.
+// Removes from `rows` the voxels that Φ and rings exclude.
 cudaError_t BoundCovered(const TableEntry* table, const CoveredViews& views, cudaStream_t stream);
 
 }  // namespace voxeld::gpu::cuda

@@ -13,14 +13,14 @@
 
 namespace voxeld::gpu::cuda {
 
-// An ItemList with the memory that it lies in.
+// An ItemList and its memory.
 struct UploadedList {
   Block slots, firsts;
   ItemList list;
   uint64_t items = 0;
 };
 
-// firsts[i]: where the row of slots[i] begins; the end last.
+// firsts[i]: where the row of slots[i] begins; the last element is the end.
 inline absl::StatusOr<UploadedList> UploadList(Device& device, std::span<const uint32_t> slots,
                                                std::span<const uint64_t> firsts) {
   UploadedList uploaded;
@@ -42,7 +42,7 @@ inline absl::StatusOr<UploadedList> UploadList(Device& device, std::span<const u
   return uploaded;
 }
 
-// The items of drawables by slot; items_of(slot): how many.
+// Uploads the items of drawables by slot; items_of(slot) is their number.
 template <typename ItemsOf>
 absl::StatusOr<UploadedList> UploadItems(Device& device, std::span<const uint32_t> slots,
                                          ItemsOf&& items_of) {

@@ -1,4 +1,5 @@
-// For kernels over drawables' items: a thread's number, blocks for so many, the drawable of an item.
+// For kernels over drawables' items: a thread's number, the number of blocks, the drawable of an
+// item.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,7 @@ __device__ inline uint64_t Thread() {
   return static_cast<uint64_t>(blockIdx.x) * blockDim.x + threadIdx.x;
 }
 
-// table[few.slots[i]] = few.entries[i], by one block of threads, word by word.
+// Sets table[few.slots[i]] = few.entries[i], by one block of threads, word by word.
 __device__ inline void PutFew(TableEntry* table, const FewEntries& few, uint32_t count) {
   constexpr uint32_t kWords = sizeof(TableEntry) / sizeof(uint32_t);
   for (uint32_t i = 0; i < count; ++i) {
@@ -33,7 +34,7 @@ __device__ inline void PutFew(TableEntry* table, const FewEntries& few, uint32_t
   }
 }
 
-// Which drawable of the list (ItemList, or of its kind) has item `i` of the row.
+// Returns which drawable of the list (ItemList, or a similar type) has item `i` of the row.
 template <typename List>
 __device__ uint32_t DrawableOf(const List& list, uint64_t i) {
   uint32_t low = 0, high = list.count;  // first(low) ≤ i < first(high)
@@ -44,7 +45,8 @@ __device__ uint32_t DrawableOf(const List& list, uint64_t i) {
   return low;
 }
 
-// Where item `i` of the rows lies, of a list in which slot(d) is the first of the d-th row.
+// Returns the place of item `i` of the rows, for a list in which slot(d) is the first place of the
+// d-th row.
 __device__ inline uint64_t PlaceOf(const ItemList& list, uint64_t i) {
   const uint32_t d = DrawableOf(list, i);
   return list.slot(d) + (i - list.first(d));

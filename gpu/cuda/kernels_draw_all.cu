@@ -1,6 +1,6 @@
-// Regions with anything in them; which regions are dirty; voxels for who asks.
+// Draws regions with anything in them; lists dirty regions; reads voxels for ReadVoxels.
 
-// Here intervals serve implicit shapes for whose voxels there is no room (implicit-inl.h).
+// Here intervals are used for implicit shapes whose voxels did not fit in memory (implicit-inl.h).
 #define VOXELD_INTERVALS_OUT_OF_LINE
 #include "gpu/cuda/draw-inl.h"
 #include "gpu/cuda/draw_kernels.h"

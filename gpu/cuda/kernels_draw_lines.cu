@@ -1,4 +1,4 @@
-// Regions with nothing but thin lines, points and small triangles.
+// Draws regions that have only thin lines, points and small triangles.
 #include "gpu/cuda/draw-inl.h"
 #include "gpu/cuda/draw_kernels.h"
 

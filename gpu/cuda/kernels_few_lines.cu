@@ -1,5 +1,5 @@
-// Few thin lines made and sorted by region, by one block of threads: what takes six kernels where
-// there are many would be over before the next could be queued.
+// Makes a few thin lines and sorts them by region, in one block of threads: for so few, each of the
+// six kernels used for many lines would finish before the next could be queued.
 #include <cub/block/block_scan.cuh>
 
 #include "gpu/cuda/line_kernels.h"
@@ -8,10 +8,10 @@
 namespace voxeld::gpu::cuda {
 namespace {
 
-constexpr uint32_t kThreads = kMostFewLines;  // a line each
+constexpr uint32_t kThreads = kMostFewLines;  // one line each
 constexpr uint32_t kAll = 0xFFFFFFFFu;
 
-// counts[r] becomes the sum of those before; returns the sum of all.
+// Replaces counts[r] by the sum of those before; returns the sum of all.
 __device__ uint32_t SumCounts(uint32_t* counts, uint32_t regions) {
   using Scan = cub::BlockScan<uint32_t, kThreads>;
   __shared__ typename Scan::TempStorage scan;
@@ -29,7 +29,8 @@ __device__ uint32_t SumCounts(uint32_t* counts, uint32_t regions) {
   return all;
 }
 
-// What SpanLists has, every block of regions with one chunk. counts: spans before each region.
+// Writes the arrays of SpanLists, with one chunk for every block of regions. counts: spans before
+// each region.
 __device__ void PutLists(const LineSort& sort, const uint32_t* counts, uint32_t all) {
   const uint32_t blocks = sort.grid.block_count(), regions = sort.grid.count();
   for (uint32_t b = threadIdx.x; b <= blocks; b += kThreads) {
@@ -54,7 +55,7 @@ __device__ void PutLists(const LineSort& sort, const uint32_t* counts, uint32_t 
 
 __global__ void __launch_bounds__(kThreads)
     SortFewLinesKernel(const __grid_constant__ FewLines few) {
-  // Spans by region, then before it, then the place of the next.
+  // Per region: its number of spans, then the spans before it, then the place of the next.
   extern __shared__ uint32_t counts[];
   const LineSort& sort = few.sort;
   const uint32_t regions = sort.grid.count(), i = threadIdx.x;
@@ -82,7 +83,7 @@ __global__ void __launch_bounds__(kThreads)
 
 }  // namespace
 
-// The scan's memory lies beside it: less than 4 KB.
+// The memory of the scan is additional: less than 4 KB.
 size_t SortFewLinesShared(const RegionGrid& grid) {
   return size_t{grid.count()} * sizeof(uint32_t);
 }

@@ -1,5 +1,5 @@
-// Which voxels are inside of a mesh (primitives/filled.h): every triangle flips bits where rows meet it, then each row's
-// bits become the parity up to them, and each tile is noted that has any.
+// Finds which voxels are inside a mesh (primitives/filled.h): every triangle flips bits where rows
+// meet it, then each row's bits become the parity up to them, and each tile that has any is noted.
 #include "gpu/cuda/kernels.h"
 #include "gpu/cuda/warp-inl.h"
 #include "gpu/primitives/filled.h"
@@ -8,10 +8,10 @@ namespace voxeld::gpu::cuda {
 namespace {
 
 constexpr uint32_t kThreads = 256, kWarps = kThreads / 32;
-// Threads a triangle, where there are many, and where there are few.
+// Threads per triangle, if there are many triangles, and if there are few.
 constexpr uint32_t kLeastTeam = 4, kMostTeam = 256 * 32;
 
-// Rows of a triangle, by a team of threads: a power of two.
+// Flips bits for the rows of a triangle, by a team of threads: a power of two.
 __global__ void FlipKernel(Source source, GeometryRecord record, uint32_t team, uint32_t* bits) {
   source.record = &record;
   const uint64_t thread = uint64_t{blockIdx.x} * kThreads + threadIdx.x;
@@ -25,7 +25,7 @@ __global__ void FlipKernel(Source source, GeometryRecord record, uint32_t team, 
                 });
 }
 
-// A row a warp, 32 words at a time.
+// Each warp handles a row, 32 words at a time.
 __global__ void SumKernel(uint32_t* bits, uint64_t rows, uint32_t words) {
   const uint64_t row = uint64_t{blockIdx.x} * kWarps + threadIdx.x / 32;
   if (row >= rows) return;
@@ -40,12 +40,12 @@ __global__ void SumKernel(uint32_t* bits, uint64_t rows, uint32_t words) {
     if (is_there) at[begin + lane] = sums ^ (0u - parity);
     before ^= static_cast<uint32_t>(__popc(odd)) & 1;
   }
-  // The row is open.
+  // A row that is open has no inside.
   for (uint32_t i = lane; before != 0 && i < words; i += 32) at[i] = 0;
 }
 
-// Of a row of tiles along x, by a block of threads: tiles[i] is whether item i has any. A lane has
-// a word of 32 voxels along x, half of it a tile's.
+// For a row of tiles along x, by a block of threads: sets tiles[i] to whether item i has any. A
+// lane has a word of 32 voxels along x, half of which is a tile's.
 __global__ void NoteTilesKernel(Source source, const uint32_t* bits, uint8_t* tiles) {
   __shared__ uint32_t any[32];
   static_assert(kTileSize == 16);

@@ -14,9 +14,10 @@ using generate::Sampling;
 using generate::Stride;
 using generate::Voxel;
 using generate::Walk;
-// A warp's walks begin exactly where it enters a segment, or so many steps before that, at most a round of them, as
-// if it went on there; each round adds a run of steps and one long one. Steps backwards take their roundings away:
-// a walk may be a round's too small where nobody looks, and where somebody does it has at least so much bias.
+// A warp's walks begin exactly where it enters a segment, or up to a round of steps before that, as
+// if the segment extended backwards; each round adds a run of steps and one long one. Steps
+// backwards subtract their rounding: a walk may be too small by one round's amount outside the
+// segment, where it is not used, and inside it the bias is at least as large.
 using Rules =
     generate::WalkRules<kGenerateRound + kGenerateMostRounds*(kGenerateRun + 1) + kGenerateRun>;
 
@@ -45,7 +46,7 @@ __global__ void PrepareRecords(GenerateView view) {
   view.records[i] = record;
 }
 
-// The segment that holds a voxel, between lo and hi.
+// Returns the segment that holds a voxel, between lo and hi.
 __device__ uint32_t SegmentOf(const uint64_t* offsets, uint32_t lo, uint32_t hi, uint64_t voxel) {
   while (lo < hi) {
     const uint32_t middle = lo + (hi - lo + 1) / 2;
@@ -74,7 +75,8 @@ __device__ Stride StrideOf(const StepRecord& axis) {
   return stride;
 }
 
-// Of a segment of so many steps that strides do not decide. A call: it takes registers.
+// Computes a voxel of a segment with so many steps that strides may be inexact. Not inlined,
+// because it needs registers.
 __device__ __noinline__ Voxel LongExact(const FixedSegment* segment, const uint64_t* offset,
                                         uint32_t k) {
   const FixedSegment g = *segment;
@@ -86,7 +88,8 @@ __device__ __noinline__ Voxel LongExact(const FixedSegment* segment, const uint6
   return {v[0], v[1], v[2]};
 }
 
-// What a walk leaves in doubt. kLong: segments may have kStrideExact steps or more.
+// Computes a voxel for which a walk is doubtful. kLong: segments may have kStrideExact steps or
+// more.
 template <bool kLong>
 __device__ Voxel ExactVoxel(const GenerateView& view, const SegmentRecord& record, uint32_t segment,
                             uint32_t k) {
@@ -105,7 +108,8 @@ struct Walks {
     for (int a = 0; a < 3; ++a)
       axis[a] = Rules::From(StrideOf(record.axis[a]), k, record.axis[a].bias);
   }
-  // Up to a round before the segment's first voxel they begin as if it went on there.
+  // Up to a round before the segment's first voxel, the walks begin as if the segment extended
+  // backwards.
   __device__ void BeginNear(const SegmentRecord& record, int32_t k) {
     Begin(record, static_cast<uint32_t>(max(k, 0)));
     const auto before = static_cast<uint64_t>(max(-k, 0));
@@ -115,7 +119,7 @@ struct Walks {
     for (int a = 0; a < 3; ++a) axis[a].at += axis[a].step;
   }
   __device__ Voxel voxel() const { return {axis[0].whole(), axis[1].whole(), axis[2].whole()}; }
-  // The least of all fractions and `other`.
+  // Returns the least of all fractions and `other`.
   __device__ uint32_t least(uint32_t other) const {
     return __vimin3_u32(axis[0].fraction(), axis[1].fraction(), min(axis[2].fraction(), other));
   }
@@ -143,8 +147,8 @@ __device__ uint32_t Bits(Output kind, int32_t c) {
   return kind == Output::kF32x3 ? __float_as_uint(__int2float_rn(c)) : static_cast<uint32_t>(c);
 }
 
-// A warp's voxels, four a thread, to memory in whole lines: through shared memory, where they are laid out
-// as they will be.
+// Writes a warp's voxels, four per thread, to memory in whole lines: through shared memory, where
+// they have their final layout.
 template <Output kOut>
 __device__ void StoreWarp(const Voxel (&v)[kGenerateRun], uint64_t warp_at, uint4* stage,
                           void* out) {
@@ -185,7 +189,7 @@ __device__ void StoreWarp(const Voxel (&v)[kGenerateRun], uint64_t warp_at, uint
   }
 }
 
-// The first `count` of a thread's run.
+// Writes the first `count` voxels of a thread's run.
 template <Output kOut>
 __device__ void StoreSome(const Voxel (&v)[kGenerateRun], uint64_t at, int32_t count, void* out) {
 #pragma unroll
@@ -194,7 +198,8 @@ __device__ void StoreSome(const Voxel (&v)[kGenerateRun], uint64_t at, int32_t c
   }
 }
 
-// `warp_at`: of the warp's first voxel, from `out` on; `end`: of the first that is not asked for.
+// `warp_at`: the place of the warp's first voxel, counted from `out`; `end`: that of the first
+// voxel that is not wanted.
 template <Output kOut>
 __device__ void Store(const Voxel (&v)[kGenerateRun], uint64_t warp_at, uint32_t lane_at,
                       uint64_t end, uint4* stage, void* out) {
@@ -203,8 +208,9 @@ __device__ void Store(const Voxel (&v)[kGenerateRun], uint64_t warp_at, uint32_t
   StoreSome<kOut>(v, warp_at + lane_at, left - static_cast<int32_t>(lane_at), out);
 }
 
-// Of a thread's run, voxels `at` and on of a warp's round, those that lie in one segment: from `begin` to `end` of
-// the round. kWhole: all do. The walks go on to the thread's run in the next round.
+// Makes the voxels of a thread's run, voxels `at` and on of a warp's round, that lie in one
+// segment: from `begin` to `end` of the round. kWhole: all of them do. The walks advance to the
+// thread's run in the next round.
 template <bool kWhole, bool kLong>
 __device__ void MakePart(const GenerateView& view, const SegmentRecord& record, uint32_t segment,
                          int32_t begin, int32_t end, int32_t at, Walks& walks,
@@ -228,13 +234,13 @@ __device__ void MakePart(const GenerateView& view, const SegmentRecord& record, 
     if (k > record.steps) return;  // beyond the batch's last voxel
     const Voxel exact = ExactVoxel<kLong>(view, record, segment, k);
 #pragma unroll
-    for (int32_t j = 0; j < kRun; ++j) {  // no array is looked into by a variable
+    for (int32_t j = 0; j < kRun; ++j) {  // arrays must not be indexed by a variable
       if (j == i) v[j] = exact;
     }
   }
 }
 
-// A thread's run across the ends of segments.
+// Makes a thread's run across the ends of segments.
 template <bool kLong>
 __device__ void MakeMixedRun(const GenerateView& view, uint32_t lo, uint32_t hi, uint64_t voxel,
                              Voxel (&v)[kGenerateRun]) {
@@ -279,8 +285,8 @@ __device__ void MakeCoverRun(const GenerateView& view, uint32_t lo, uint32_t hi,
   }
 }
 
-// Where a warp is: the segment of its next voxel, whose record lies in shared memory, and where the one after
-// it ends, whose record is on its way there.
+// The position of a warp: the segment of its next voxel, whose record is in shared memory, and the
+// end of the segment after it, whose record is being copied there.
 class WarpPlace {
  public:
   __device__ WarpPlace(const GenerateView& view, SegmentRecord (&slots)[2], uint32_t segment)
@@ -294,8 +300,8 @@ class WarpPlace {
   }
   __device__ uint32_t segment() const { return segment_; }
   __device__ bool IsLast() const { return segment_ + 1 == view_.count; }
-  // Where the segment begins (before it: negative) and ends, counted from a voxel in it or before it; ends far away
-  // are a little nearer.
+  // Returns where the segment begins (before the voxel: negative) or ends, counted from a voxel in
+  // it or before it; distant ends are reported a little nearer.
   __device__ int32_t BeginFrom(uint64_t voxel) const {
     return static_cast<int32_t>(begin_ - voxel);
   }
@@ -303,20 +309,21 @@ class WarpPlace {
     return static_cast<int32_t>(min(end_ - voxel, static_cast<uint64_t>(1) << 29));
   }
   __device__ const SegmentRecord& record() const { return slots_[current_]; }
-  // To the next segment, which has so many voxels (many: a few less). Called by the whole warp.
+  // Advances to the next segment and returns its number of voxels (for many: slightly fewer).
+  // Called by the whole warp.
   __device__ int32_t Advance() {
     ++segment_;
     begin_ = end_;
     end_ = next_end_;
     const int32_t voxels = EndFrom(begin_);
     current_ ^= 1;
-    __syncwarp();  // nobody reads the record that goes
+    __syncwarp();  // no thread reads the old record
     LookAhead();
     return voxels;
   }
 
  private:
-  // Waits for what is on its way, and sends for the next.
+  // Waits for the pending copy, and starts the next.
   __device__ void LookAhead() {
     __pipeline_wait_prior(0);
     __syncwarp();
@@ -341,9 +348,10 @@ class WarpPlace {
   uint64_t begin_, end_, next_end_ = 0;
 };
 
-// Each warp makes a run of voxels of its own, a round of kGenerateRound at a time: from segment to segment, or,
-// where most are shorter than a round, each thread finds its own. `first` and `end` count from the batch's first
-// voxel. Three blocks share a multiprocessor: registers that do not suffice cost more than warps that are missing.
+// Each warp makes a run of voxels, a round of kGenerateRound at a time: from segment to segment,
+// or, if most are shorter than a round, each thread finds its own segment. `first` and `end` count
+// from the batch's first voxel. Three blocks share a multiprocessor: too few registers cost more
+// than missing warps.
 template <Output kOut, bool kCover, bool kLong>
 __global__ void __launch_bounds__(kThreads, kCover || kLong ? 2 : 3)
     GenerateVoxels(const __grid_constant__ GenerateView view, uint64_t first, uint64_t end,
@@ -410,7 +418,7 @@ __global__ void __launch_bounds__(kThreads, kCover || kLong ? 2 : 3)
         walks.BeginNear(place.record(), at);
       }
     }
-    __pipeline_wait_prior(0);  // nothing is on its way into shared memory that is others' then
+    __pipeline_wait_prior(0);  // no copy may arrive in shared memory after it is reused
     if (left > 0) StoreSome<kOut>(v, to + lane_at, left - at, out);
   }
 }

@@ -1,6 +1,6 @@
-// Which voxels implicit shapes cover, before they are drawn: what P is made of along each axis, what is known
-// of each tile, then the tiles' rows (covered-inl.h), by interpreting programs; and of these what Φ and the
-// rings leave.
+// Finds which voxels implicit shapes cover, before they are drawn: the values along each axis from
+// which P is computed, the state of each tile, then the tiles' rows (covered-inl.h), by
+// interpreting programs; and then which of these Φ and the rings leave.
 #include "gpu/cuda/covered-inl.h"
 #include "gpu/cuda/implicit_kernels.h"
 #include "gpu/cuda/items-inl.h"
@@ -13,7 +13,7 @@ namespace {
 static_assert(kCoveredEdge == kTileSize);
 static_assert(kCoversNothing == Implicit::kNothing && kCoversEverything == Implicit::kEverything);
 
-// A program run as it stands.
+// Interprets a program directly.
 class InterpretedFormula {
  public:
   using Of = implicit::Field;
@@ -95,7 +95,7 @@ __global__ void __launch_bounds__(kCoveredThreads)
   FindCoveredItems<InterpretedFormula>(view, field, scratch);
 }
 
-// A thread a row.
+// Each thread handles a row.
 __global__ void BoundCoveredKernel(const TableEntry* table,
                                    const __grid_constant__ CoveredViews views) {
   const CoveredView& view = views.at(blockIdx.y);

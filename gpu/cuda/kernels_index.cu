@@ -15,7 +15,7 @@ namespace {
 
 constexpr uint32_t kThreads = kItemThreads;
 
-// f(slot, entry, item, tile) for each owned tile that item `i` of the row may touch.
+// Calls f(slot, entry, item, tile) for each owned tile that item `i` of the row may touch.
 template <typename F>
 __device__ void ForTiles(const TableEntry* table, const ItemList& list, uint64_t i,
                          const VolumeView& volume, F&& f) {
@@ -119,9 +119,10 @@ __global__ void AppendPairsKernel(const TableEntry* table, ItemList list, uint64
     return within.DrawsBlock(at);
   };
   for (uint64_t i = begin + Thread(); i < end; i += stride) {
-    // Room is taken once for all of an item. One pair at a time within the walk, some of the additions
-    // were lost as ptxas 13.0 optimised this kernel for compute capability 9.0, from run to run others;
-    // none without its optimisation, and none of those that other kernels make outside such a walk.
+    // The place for all pairs of an item is reserved by one addition. With an addition for each
+    // pair within the walk, some additions were lost when ptxas 13.0 optimised this kernel for
+    // compute capability 9.0, different ones in each run; none were lost without its optimisation,
+    // and none in other kernels that add outside such a walk.
     unsigned long long pairs = 0;
     ForTiles(table, list, i, volume,
              [&](uint32_t, const TableEntry&, uint32_t, uint32_t tile) { pairs += drawn(tile); });
@@ -174,7 +175,7 @@ __global__ void FindRowsKernel(const uint64_t* keys, uint32_t pairs, uint32_t ti
   row_begin[tile] = low;
 }
 
-// For threads that take items in turn.
+// Returns the number of blocks for threads that take items in turn.
 uint32_t SomeBlocks(uint64_t items) {
   constexpr uint64_t kMostBlocks = 1 << 16;
   return static_cast<uint32_t>(Min((items + kThreads - 1) / kThreads, kMostBlocks));

@@ -1,11 +1,11 @@
-// The regions that thin lines touch, from the lines or from their lists; and lines that go.
+// Finds the regions that thin lines touch, from the lines or from their lists; and removes lines.
 #include "gpu/cuda/line_kernels.h"
 #include "gpu/cuda/lines-inl.h"
 
 namespace voxeld::gpu::cuda {
 namespace {
 
-// f(region) for each that a line touches.
+// Calls f(region) for each region that a line touches.
 __device__ void ForRegions(const ThinLine& at, const RegionGrid& grid, auto&& f) {
   WalkRegions(grid, LoadLine(&at),
               [&](const int32_t[3], uint32_t region, int32_t, int32_t) { f(region); });

@@ -91,8 +91,8 @@ __global__ void __launch_bounds__(kThreads)
   }
 }
 
-// Pieces that wait for being written in the order of their blocks: single ones here and there are
-// what the memory is slowest at. A thread has a row; what does not fit is written at once.
+// Pieces that are written in the order of their blocks, because single writes to scattered
+// addresses are slowest. A thread has a row; pieces that do not fit are written at once.
 constexpr uint32_t kStagedEach = 18;
 constexpr uint32_t kStaged = kStagedEach * kThreads;
 constexpr uint32_t kMostSortedBlocks = 4 * kThreads;
@@ -102,14 +102,15 @@ struct PieceScratch {
   uint16_t order[kStaged];
 };
 
-// Up to so many chunks each sums the blocks for itself, which takes less than one more kernel.
+// Up to this many chunks, each of them sums the blocks for itself, which takes less time than
+// another kernel.
 constexpr uint32_t kFewLineChunks = 32;
 bool SumsWhereFilled(const RegionGrid& grid, uint32_t count) {
   return grid.block_count() <= kMostSortedBlocks && count <= kFewLineChunks * kLineChunk;
 }
 
-// What ScanBlocksKernel does, by each block for itself: begin[b] where the pieces of b begin. The first
-// writes down what others want to know.
+// Does the same as ScanBlocksKernel, in each block of threads: begin[b] is where the pieces of b
+// begin. The first block writes the results that later kernels need.
 __device__ void SumBlocksHere(const LineSort& sort, uint32_t* begin) {
   using Scan = cub::BlockScan<uint32_t, kThreads>;
   __shared__ typename Scan::TempStorage pieces_scan, chunks_scan;
@@ -137,7 +138,7 @@ __device__ void SumBlocksHere(const LineSort& sort, uint32_t* begin) {
   }
 }
 
-// `sum`: block_begin is not there yet.
+// `sum`: block_begin has not been computed.
 __global__ void __launch_bounds__(kThreads)
     FillPiecesKernel(LineSort sort, const ThinLine* lines, uint32_t count, bool sum) {
   extern __shared__ __align__(16) unsigned char memory[];
@@ -186,7 +187,7 @@ __global__ void __launch_bounds__(kThreads)
   for (uint32_t m = 0; m < mine; ++m) {
     const uint32_t slot = m * kThreads + threadIdx.x;
     const uint32_t at = found[scratch.places[slot] & 0xFFFF] + (scratch.places[slot] >> 16);
-    // Beyond it only where others were written at once.
+    // Places beyond it were written at once by other threads.
     if (at < kStaged) {
       scratch.order[at] = static_cast<uint16_t>(slot);
     } else {
@@ -231,7 +232,7 @@ __global__ void __launch_bounds__(kScanThreads) ScanBlocksKernel(LineSort sort) 
 
 // ---------------------------------------------------------------------------- pieces into regions
 
-// The block of regions whose chunk of pieces this is.
+// Returns the block of regions to which this chunk of pieces belongs.
 __device__ uint32_t BlockOf(const LineSort& sort, uint32_t chunk) {
   uint32_t low = 0, high = sort.grid.block_count();
   while (high - low > 1) {
@@ -246,22 +247,22 @@ constexpr uint32_t kSpansOfWarp = kPiecesOfWarp * kMostSpansOfPiece;
 constexpr uint32_t kLengths = 32;
 
 struct SpanScratch {
-  LinePiece order[kPieceChunk];  // by length, so that a warp's lanes have about as much to do
-  LineSpan spans[kWarps][kSpansOfWarp];  // as they were found
+  LinePiece order[kPieceChunk];          // by length, so that a warp's lanes have similar work
+  LineSpan spans[kWarps][kSpansOfWarp];  // in the order in which they were found
   uint32_t found[kWarps];
   uint32_t lengths[kLengths];
-  uint32_t at[kRegionsInBlock];  // spans by region, then the place of the next
+  uint32_t at[kRegionsInBlock];  // per region: its spans, then the place of the next
   uint32_t base;
 };
 
 constexpr uint32_t kPiecesEach = kPieceChunk / kThreads;
 
-// A chunk of pieces, of the `count` from `first` on; they lie in block b.
+// A chunk of pieces: the `count` pieces from `first` on, in block b.
 struct PieceChunk {
   uint32_t b, first, count;
   LinePiece mine[kPiecesEach];
 
-  // Of `chunk`, which b's are not behind. Its pieces are on their way.
+  // Loads `chunk`, whose block is b or a later one. The loads of its pieces are started.
   __device__ void Load(const LineSort& sort, uint32_t chunk) {
     while (sort.chunk_begin[b + 1] <= chunk) ++b;
     first = sort.block_begin[b] + (chunk - sort.chunk_begin[b]) * kPieceChunk;
@@ -274,7 +275,7 @@ struct PieceChunk {
   }
 };
 
-// Pieces into `order`.
+// Sorts pieces into `order`.
 __device__ void OrderPieces(const LinePiece mine[kPiecesEach], uint32_t count,
                             const ThinLine* lines, SpanScratch& scratch) {
   uint32_t rank[kPiecesEach], bucket[kPiecesEach];
@@ -307,7 +308,7 @@ __global__ void __launch_bounds__(kThreads, 4)
   if (sort.block_begin[sort.grid.block_count()] > sort.piece_capacity) return;
   const uint32_t warp = threadIdx.x / 32, lane = threadIdx.x % 32;
   const int bits[3] = {RegionBits(0), RegionBits(1), RegionBits(2)};
-  // A run of chunks, as a rule of the same block of regions.
+  // A run of chunks, usually of the same block of regions.
   const uint32_t begin_chunk =
       static_cast<uint32_t>(static_cast<uint64_t>(chunks) * blockIdx.x / gridDim.x);
   const uint32_t end_chunk =
@@ -324,10 +325,10 @@ __global__ void __launch_bounds__(kThreads, 4)
     OrderPieces(next.mine, count, lines, scratch);
     if (chunk + 1 < end_chunk) next.Load(sort, chunk + 1);
     for (uint32_t round = 0; round < kPieceChunk / kThreads; ++round) {
-      // What one warp has to do less in one round it has more in the next.
+      // A warp that has less work in one round has more in the next.
       const uint32_t group = round % 2 == 0 ? warp : kWarps - 1 - warp;
       const uint32_t p = round * kThreads + group * 32 + lane;
-      __syncwarp();  // or lanes that are done go on by themselves
+      __syncwarp();  // otherwise lanes that are done would run ahead
       if (p >= count) continue;
       const LinePiece piece = scratch.order[p];
       const ThinLine line = LoadLine(&lines[piece.line]);
@@ -338,7 +339,7 @@ __global__ void __launch_bounds__(kThreads, 4)
       WalkThin(line, k, begin, bits, [&](const int32_t box[3], int32_t from, int32_t to) {
         const uint32_t region = RegionGrid::InBlock(box);
         atomicAdd(&scratch.at[region], 1u);
-        // Lanes that are here together take places together.
+        // Lanes that are active together reserve their places together.
         const uint32_t here = __activemask();
         uint32_t place = 0;
         if (lane == static_cast<uint32_t>(__ffs(static_cast<int>(here))) - 1) {
@@ -401,7 +402,7 @@ size_t FillShared(const RegionGrid& grid, bool sum) {
 }  // namespace
 
 size_t SortLinesShared(const RegionGrid& grid) {
-  // What it has besides lies in static memory: less than so much.
+  // Its static memory is additional: less than this size.
   constexpr size_t kSums = 4096;
   return FillShared(grid, grid.block_count() <= kMostSortedBlocks) + kSums;
 }

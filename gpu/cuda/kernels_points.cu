@@ -28,7 +28,7 @@ __device__ PlacedPoint Placed(const RegionGrid& grid, const int32_t voxel[3], ui
   return PlacedPoint::Of(grid.RegionAt(region), voxel, word);
 }
 
-// Whatever the source has.
+// Makes a point from any source.
 __device__ PlacedPoint MakePoint(const TableEntry& entry, uint32_t item, const RegionGrid& grid) {
   const Line point = Points::ItemOf(entry.source, item);
   int32_t voxel[3];
@@ -37,13 +37,13 @@ __device__ PlacedPoint MakePoint(const TableEntry& entry, uint32_t item, const R
 }
 
 constexpr uint32_t kMakeThreads = 256;
-constexpr uint32_t kMadeEach = 8;  // by a thread
+constexpr uint32_t kMadeEach = 8;  // per thread
 constexpr uint32_t kMadeByBlock = kMakeThreads * kMadeEach;
-constexpr uint32_t kMadeAtOnce = 4;  // of these, as far as loading goes
+constexpr uint32_t kMadeAtOnce = 4;  // of these, loaded together
 static_assert(kMadeEach % kMadeAtOnce == 0);
 
-// Items `item` + e·kMakeThreads, as far as they are less than `end`; `to` is the first one's. Of
-// arrays of positions as they stand.
+// Makes items `item` + e·kMakeThreads that are less than `end`; `to` is the place of the first. For
+// positions in arrays, without vertices.
 __device__ void MakeSome(const TableEntry& entry, uint32_t item, uint32_t end,
                          const RegionGrid& grid, PlacedPoint* to) {
   const Source& source = entry.source;
@@ -85,7 +85,7 @@ __global__ void __launch_bounds__(kMakeThreads)
   const uint32_t d = DrawableOf(list, first);
   const uint64_t begin = list.first(d);
   const TableEntry& entry = table[list.slot(d)];
-  // As a rule all are of one drawable.
+  // Usually all are of one drawable.
   if (end <= list.first(d + 1) && entry.source.vertices == nullptr &&
       entry.source.record->index_count == 0) {
     MakeSome(entry, static_cast<uint32_t>(first - begin) + threadIdx.x,
@@ -121,21 +121,21 @@ __global__ void CountPointsKernel(const PlacedPoint* points, uint32_t count, Reg
   if (threadIdx.x % 32 == 0 && lanes != 0) atomicAdd(found, static_cast<uint32_t>(__popc(lanes)));
 }
 
-// A chunk's records in order; behind them, 16 bits each, by region: how many there are, then the
-// place of the next.
+// A chunk's records in order; after them, in 16 bits for each region: its number of records, then
+// the place of the next.
 __device__ unsigned char* SortMemory() {
   extern __shared__ __align__(16) unsigned char sort_memory[];
   return sort_memory;
 }
 
-// One more of what is counted in 16 bits; how many there were before.
+// Counts one more in 16 bits; returns the count before.
 __device__ uint32_t CountOne(uint32_t* counts, uint32_t l) {
   const uint32_t shift = l % 2 * 16;
   return atomicAdd(&counts[l / 2], 1u << shift) >> shift & 0xFFFF;
 }
 
-// Which of kRegionsEach regions have any, from the l-th on, bits in `any`; and, where nobody has
-// said so yet, that they are to be drawn anew. By whole warps; a block of regions has 8 lanes.
+// Notes which of kRegionsEach regions from the l-th on have any (the bits in `any`), and marks
+// those as dirty that were not noted before. Called by whole warps; a block of regions has 8 lanes.
 __device__ void NoteRegions(const PointSort& sort, uint32_t l, uint32_t any) {
   static_assert(kRegionsInBlock == 8 * kRegionsEach);
   const uint32_t lane = threadIdx.x % 32, shift = lane % 8 * kRegionsEach;
@@ -146,7 +146,7 @@ __device__ void NoteRegions(const PointSort& sort, uint32_t l, uint32_t any) {
   if (lane % 8 == 0 && all != 0) {
     block = sort.within.DrawnBlock(l / kRegionsInBlock);
     uint64_t& bits = sort.regions[block];
-    // Most have been set before.
+    // Most bits are already set.
     fresh = all & ~*static_cast<const volatile uint64_t*>(&bits);
     if (fresh != 0) {
       fresh &= ~static_cast<uint64_t>(atomicOr(reinterpret_cast<unsigned long long*>(&bits),
@@ -162,8 +162,8 @@ __device__ void NoteRegions(const PointSort& sort, uint32_t l, uint32_t any) {
   }
 }
 
-// From how many points each region has to the place of its first, of the regions that are drawn;
-// also into the lists. How many there are in all.
+// Converts the number of points in each drawn region to the place of its first point; writes it to
+// the lists too. Returns the number of all points.
 __device__ uint32_t SumRegions(const PointSort& sort, uint32_t chunk, uint32_t regions,
                                uint32_t* counts) {
   using Scan = cub::BlockScan<uint32_t, kPointThreads>;
@@ -205,8 +205,8 @@ __device__ uint32_t SumRegions(const PointSort& sort, uint32_t chunk, uint32_t r
   return total;
 }
 
-// A chunk of points, of which a thread has some. By the whole block; `counts` are 0 and all know
-// it. kAll: all regions are drawn.
+// Sorts a chunk of points, of which each thread has some. Called by the whole block; `counts` are 0
+// and visible to all threads. kAll: all regions are drawn.
 template <uint32_t kEach, bool kAll>
 __device__ __forceinline__ void SortChunk(const PointSort& sort, uint32_t chunk, uint32_t regions,
                                           PlacedPoint mine[kEach]) {
@@ -274,7 +274,7 @@ __global__ void __launch_bounds__(kPointThreads)
       const uint32_t i = e * kPointThreads + threadIdx.x;
       mine[e] = i < here ? LoadPoint(&from[i]) : PlacedPoint{};
     }
-    // The next ones are on their way while these are sorted.
+    // Load the next points while these are sorted.
     if (uint64_t{chunk} + gridDim.x < chunks) {
       const PlacedPoint* const next = from + static_cast<size_t>(gridDim.x) * kChunk;
       const uint32_t there = Min(count - (chunk + gridDim.x) * kChunk, kChunk);

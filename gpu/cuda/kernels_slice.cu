@@ -1,5 +1,5 @@
-// The pictures of dirty slices: sampled through footprints, toned, dithered, packed, and compared
-// with what they were, in one pass.
+// Draws the slice images of dirty slices: sampled through footprints, toned, dithered, packed, and
+// compared with the previous bytes, in one pass.
 #include "gpu/cuda/kernels.h"
 #include "gpu/cuda/pixels-inl.h"
 #include "gpu/slice/finish.h"
@@ -10,7 +10,7 @@ namespace voxeld::gpu::cuda {
 namespace {
 
 constexpr uint32_t kThreads = 256;
-constexpr uint32_t kColumns = 8;           // of a slice, to a block: the pixels of a byte of bits
+constexpr uint32_t kColumns = 8;           // of a slice, per block: the pixels of a byte of bits
 constexpr uint32_t kLineBytes = 48 << 10;  // of shared memory, for columns of voxels
 constexpr uint32_t kAll = 0xFFFFFFFFu;
 
@@ -20,7 +20,7 @@ __device__ uint32_t ColorAt(const VolumeView& volume, int32_t x, int32_t y, int3
   return volume.colors[static_cast<size_t>(tile) * kTileVoxels + volume.grid.IndexInTile(x, y, z)];
 }
 
-// The voxel `along` further on the inner axis.
+// Returns the colour of the voxel `along` further on the inner axis.
 __device__ uint32_t ColorAlong(const VolumeView& volume, uint32_t axis,
                                const display::FootprintEntry& outer, int32_t along) {
   return ColorAt(volume, outer.x + (axis == 0 ? along : 0), outer.y + (axis == 1 ? along : 0),
@@ -47,8 +47,8 @@ __device__ Rows InnerOf(const SliceView& view, uint32_t slice, uint32_t v) {
   return {view.inner.entries + row[0], view.inner.entries + row[1]};
 }
 
-// 0x00RRGGBB. The greatest of a product of lists is the greatest, over the inner list, of the
-// greatest over the outer: `line`, if there is one, has those.
+// Returns 0x00RRGGBB. The maximum over a product of lists is the maximum, over the inner list, of
+// the maximum over the outer: `line`, if not null, has the latter.
 __device__ uint32_t SampleMax(const VolumeView& volume, const SliceView& view, uint32_t slice,
                               uint32_t u, uint32_t v, const uint32_t* line) {
   uint32_t greatest = 0;
@@ -81,7 +81,7 @@ __device__ uint32_t SampleWeighted(const VolumeView& volume, const SliceView& vi
   return rgb;
 }
 
-// Bit planes: a byte of each plane is 8 neighbouring lanes' together.
+// For bit planes: 8 neighbouring lanes together write a byte of each plane.
 __device__ bool PutBits(const SliceView& view, uint32_t u, uint32_t v, bool inside, Levels q,
                         uint8_t* picture) {
   const size_t row = (view.width + 7) / 8, plane = row * view.height;
@@ -99,7 +99,8 @@ __device__ bool PutBits(const SliceView& view, uint32_t u, uint32_t v, bool insi
   return differs;
 }
 
-// Rows side by side: a byte has a pixel of the upper half and one of the lower, which threads apart put there.
+// For rows side by side: a byte has a pixel of the upper half and one of the lower, which different
+// threads write.
 __device__ bool PutPaired(const SliceView& view, uint32_t u, uint32_t v, Levels q,
                           uint8_t* picture) {
   const uint32_t half = view.height / 2, shift = v < half ? 0 : 3;
@@ -110,7 +111,7 @@ __device__ bool PutPaired(const SliceView& view, uint32_t u, uint32_t v, Levels 
     const uintptr_t place = reinterpret_cast<uintptr_t>(byte), within = place % sizeof(uint32_t);
     uint32_t* const word = reinterpret_cast<uint32_t*>(place - within);
     const uint32_t at = static_cast<uint32_t>(within) * 8 + shift;
-    // These bits are this thread's alone.
+    // Only this thread changes these bits.
     const uint32_t change = (*static_cast<volatile uint32_t*>(word) >> at & 7) ^ rgb;
     if (change == 0) continue;
     atomicXor(word, change << at);
@@ -119,7 +120,7 @@ __device__ bool PutPaired(const SliceView& view, uint32_t u, uint32_t v, Levels 
   return differs;
 }
 
-// A pixel's levels into its picture, by 8 neighbouring lanes at once.
+// Writes a pixel's levels to its slice image, by 8 neighbouring lanes at once.
 __device__ bool PutPixel(const SliceView& view, uint32_t u, uint32_t v, bool inside, Levels q,
                          uint8_t* picture) {
   switch (view.finish.format) {
@@ -135,19 +136,20 @@ __device__ bool PutPixel(const SliceView& view, uint32_t u, uint32_t v, bool ins
   return false;
 }
 
-// A pixel's place: of a picture, and of the outer footprints.
+// The place of a pixel in a slice image and in the outer footprints.
 struct PixelPlace {
-  uint32_t slice, u, v;  // of all slices
+  uint32_t slice, u, v;  // slice: among all slices
   size_t row;
   bool inside;
 };
 
-// A pixel's colour into the pictures of slice `s` of those owned, by 8 neighbouring lanes at once.
+// Writes a pixel's colour to the slice images of the owned slice `s`, by 8 neighbouring lanes at
+// once.
 __device__ void PutToned(const SliceView& view, uint32_t s, const PixelPlace& at, uint32_t rgb) {
   const Finish& finish = view.finish;
   const Light light = rgb != 0 ? finish.LightAt(rgb, at.row) : Light{0, 0, 0};
   for (uint32_t sub = 0; sub < view.sub_frames; ++sub) {
-    // A pixel without light is at the lowest level whatever the threshold.
+    // A pixel without light is at the lowest level, whatever the threshold is.
     Levels q = {0, 0, 0};
     if (rgb != 0) q = finish.LevelsAt(light, at.slice, at.u, at.v, sub);
     const uint32_t picture = s * view.sub_frames + sub;
@@ -158,7 +160,7 @@ __device__ void PutToned(const SliceView& view, uint32_t s, const PixelPlace& at
   }
 }
 
-// Where each pixel has a list of its own, a thread each.
+// For displays whose pixels each have a list of their own: a thread per pixel.
 __global__ void DrawFlatKernel(VolumeView volume, SliceIndexView index, SliceView view,
                                uint32_t begin) {
   const uint32_t s = begin + blockIdx.y;

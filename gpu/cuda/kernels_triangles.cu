@@ -1,4 +1,4 @@
-// Small triangles: made from drawables' items, and sorted by region.
+// Makes small triangles from drawables' items, and sorts them by region.
 #include <cub/block/block_scan.cuh>
 
 #include "gpu/cuda/lines-inl.h"
@@ -73,10 +73,10 @@ __global__ void CopyTrianglesKernel(ItemList list, uint64_t first, uint32_t coun
   for (uint32_t c = 0; c < 3; ++c) colors_to[(first + i) * 3 + c] = colors_from[at * 3 + c];
 }
 
-// Up to so many regions there is little to win by looking closer.
+// For this many regions or fewer, a closer test does not pay off.
 constexpr int32_t kFewRegions = 8;
 
-// f(region) for each region that is drawn and that the triangle may touch.
+// Calls f(region) for each drawn region that the triangle may touch.
 template <typename F>
 __device__ void ForRegions(const CompactTriangle& t, const RegionGrid& grid, F&& f) {
   int32_t lo[3], hi[3], at[3], count = 1;
@@ -128,7 +128,7 @@ __global__ void FillTrianglesKernel(TriangleSort sort, const CompactTriangle* tr
 constexpr uint32_t kScanThreads = 1024;
 constexpr uint32_t kScanEach = 16;
 
-// By one block: even a large volume has few regions.
+// Runs in one block: even a large volume has few regions.
 __global__ void __launch_bounds__(kScanThreads) SumRegionsKernel(TriangleSort sort) {
   using Scan = cub::BlockScan<uint32_t, kScanThreads>;
   __shared__ typename Scan::TempStorage scan;

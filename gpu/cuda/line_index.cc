@@ -8,12 +8,12 @@
 namespace voxeld::gpu::cuda {
 namespace {
 
-// Up to here what a batch may need at most is taken, and nobody waits for the count of what it does.
+// Up to this size the most that a batch may need is allocated, without waiting for the exact count.
 constexpr uint64_t kUncountedBytes = uint64_t{16} << 20;
 constexpr uint64_t kMostPlaces = 0xFFFFFFFFu;
 constexpr double kSpare = 1.1;
 
-// The words at the lines' ends, where they may differ from those at their beginnings.
+// Returns the words at the lines' ends, if they may differ from those at their beginnings.
 uint32_t* Ends(const auto& batch) {
   return batch.mixed ? batch.colors.template as<uint32_t>() : nullptr;
 }
@@ -22,7 +22,8 @@ LineArrays Arrays(const auto& batch) {
   return LineArrays::Of(batch.items.template as<void>(), batch.count);
 }
 
-// Boxes that a line touches at most, of a volume of so many along the axes.
+// Returns the greatest number of boxes that a line touches in a volume with `count` boxes along the
+// axes.
 uint64_t MostBoxes(const int32_t count[3], int shift) {
   uint64_t most = 1;
   for (int a = 0; a < 3; ++a) most += (static_cast<uint64_t>(count[a]) << shift) - 1;
@@ -38,7 +39,7 @@ bool LineIndex::Suits(const Api& api, const TileGrid& grid) {
 uint64_t LineIndex::MostRegions() const { return MostBoxes(grid().blocks, kBlockBits); }
 
 LineBatchList LineIndex::view() const {
-  LineBatchList list;  // Merge sees to it that they fit
+  LineBatchList list;  // Merge ensures that they fit
   for (const auto& [number, batch] : batches()) {
     LineBatchView& view = list.batches[list.count++];
     view.lines = Arrays(batch).lines;
@@ -55,14 +56,15 @@ LineBatchList LineIndex::view() const {
 
 // ------------------------------------------------------------------------------------------ sorting
 
-// With room for as many pieces and spans as `sort` says. needed[2]: how many there were; only if
-// `counted`, which waits for it. ResourceExhausted if the lists' pool does not have it.
+// Sorts with memory for as many pieces and spans as `sort` says. needed[2]: how many there were;
+// only set if `counted`, which waits for the device. Errors: ResourceExhausted if the lists' pool
+// has too little memory.
 absl::Status LineIndex::SortInto(Batch& batch, Block& regions, LineSort& sort, bool counted,
                                  uint32_t* needed) {
   const size_t blocks = grid().block_count();
   const size_t line_chunks = (size_t{batch.count} + kLineChunk - 1) / kLineChunk;
   const size_t chunks = sort.piece_capacity / kPieceChunk + blocks;
-  // What the sorting alone needs.
+  // Memory for the sorting alone.
   Block block_begin, line_offsets, pieces;
   struct Wanted {
     Block* block;
@@ -80,12 +82,12 @@ absl::Status LineIndex::SortInto(Batch& batch, Block& regions, LineSort& sort, b
   };
   batch.list_bytes = batch.sort_bytes = 0;
   for (const Wanted& want : wanted) {
-    *want.block = Block();  // of a try before
+    *want.block = Block();  // from an earlier try
     batch.sort_bytes += want.bytes;
     if (want.kept) batch.list_bytes += want.bytes;
   }
-  // With what is counted behind it, so that all that begins as 0 is one. Whatever the lines, it is
-  // little: it lies beside them.
+  // The counters follow it in one block, so that a single block is set to 0. It is small for any
+  // lines and is allocated outside the budget.
   regions = Block();
   absl::StatusOr<Block> zeros =
       device().Zeros(blocks * (sizeof(uint64_t) + sizeof(uint32_t)) + sizeof(uint32_t));
@@ -211,7 +213,7 @@ absl::Status LineIndex::SortAll(Batch& batch, uint8_t* region_dirty) {
     }
     pieces_a_line_ = std::max(1.0, kSpare * needed[0] / batch.count);
     if (needed[0] > sort.piece_capacity) {
-      // So many spans are not known yet.
+      // The spans of that many pieces are not known yet.
       sort.piece_capacity = needed[0];
       continue;
     }
@@ -222,7 +224,7 @@ absl::Status LineIndex::SortAll(Batch& batch, uint8_t* region_dirty) {
   }
 }
 
-// First the pieces are counted.
+// Counts the pieces first.
 absl::Status LineIndex::SortExactly(Batch& batch, Block& regions, const RegionGrid& within,
                                     uint8_t* region_dirty) {
   LineSort sort;

@@ -1,4 +1,4 @@
-// Thin lines by the regions that they touch. What is deferred and has no lists: unsorted-inl.h.
+// Thin lines by the regions that they touch. For deferred batches without lists: unsorted-inl.h.
 #pragma once
 
 #include <cstdint>
@@ -8,19 +8,19 @@
 
 namespace voxeld::gpu::cuda {
 
-// A batch's `begin`, `base`, `offsets`, `regions` and `spans` are SpanLists' arrays; `colors` are the
-// words at lines' ends.
+// A batch's `begin`, `base`, `offsets`, `regions` and `spans` are the arrays of SpanLists; `colors`
+// are the words at the lines' ends.
 class LineIndex final : public RegionIndex {
  public:
-  // `few_lines`: Tuning's.
+  // `few_lines`: see Tuning.
   LineIndex(Device& device, ListBudget& lists, uint32_t few_lines)
       : RegionIndex(device, lists, "lines", LineArrays::kBytes, sizeof(uint32_t)),
         few_lines_(few_lines) {}
 
-  // Whether a volume of that grid can have one, on such a device.
+  // Returns whether a volume of that grid can have this index on such a device.
   static bool Suits(const Api& api, const TileGrid& grid);
 
-  LineBatchList view() const;  // after Merge
+  LineBatchList view() const;  // valid after Merge
 
  private:
   uint64_t MostRegions() const override;
@@ -41,11 +41,11 @@ class LineIndex final : public RegionIndex {
                         uint32_t* needed);
   bool AreFew(const Batch& batch) const;
   uint64_t MostSpans(const Batch& batch) const;
-  // `few`: what of it is not the batch's.
+  // `few`: the arguments that are not the batch's.
   absl::Status SortFew(Batch& batch, FewLines& few, uint8_t* region_dirty);
 
   const uint32_t few_lines_;
-  // Of a line, on the average, as large batches had them; with some to spare.
+  // Averages per line, as large batches had them, with a margin.
   double pieces_a_line_ = 4, spans_a_line_ = 12, spans_a_piece_ = 4;
 };
 

@@ -1,5 +1,5 @@
 // Thin lines on the device (gpu/primitives/thin_line.h), sorted by the regions of the volume that
-// they touch. Plain data, as host and device see it.
+// they touch. Plain data, used by host and device.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,8 @@
 
 namespace voxeld::gpu::cuda {
 
-// A region is what a block of threads draws at once in shared memory: 32×32×16 voxels, 2×2×1 tiles.
+// A region is the part that a block of threads draws at once in shared memory: 32×32×16 voxels,
+// 2×2×1 tiles.
 VOXELD_HD inline constexpr int RegionBits(int axis) { return TrackBits(axis); }
 inline constexpr uint32_t kRegionVoxels = 1u << 14;
 // Regions are numbered by blocks of 4×4×4 (2^kBlockBits), and within a block.
@@ -18,7 +19,7 @@ inline constexpr uint32_t kRegionsInBlock = 1u << 3 * kBlockBits;
 
 struct RegionGrid {
   int32_t blocks[3] = {};
-  // Of the blocks, a box that holds all regions that are drawn: what lies elsewhere nobody needs.
+  // A box, in blocks, that holds all regions that are drawn: regions outside it are not needed.
   int32_t drawn_lo[3] = {}, drawn_hi[3] = {};
 
   VOXELD_HD static RegionGrid Of(const TileGrid& tiles) {
@@ -34,7 +35,7 @@ struct RegionGrid {
            static_cast<uint32_t>(blocks[2]);
   }
   VOXELD_HD uint32_t count() const { return block_count() * kRegionsInBlock; }
-  // Of one z.
+  // Returns the number of regions with the same z.
   VOXELD_HD uint32_t count_of_plane() const {
     return static_cast<uint32_t>(blocks[0] * blocks[1]) << 2 * kBlockBits;
   }
@@ -54,8 +55,8 @@ struct RegionGrid {
     BlockCoordinates(region / kRegionsInBlock, block);
     return DrawsBlock(block);
   }
-  // Regions that are drawn, and the number of one of them among these; of a block of such, its own
-  // number.
+  // Returns the number of drawn regions, and the number of a region among them; for a block of
+  // drawn regions, its number among all blocks.
   VOXELD_HD uint32_t drawn_count() const {
     uint32_t count = kRegionsInBlock;
     for (int a = 0; a < 3; ++a) count *= static_cast<uint32_t>(drawn_hi[a] - drawn_lo[a]);
@@ -88,7 +89,7 @@ struct RegionGrid {
     at[1] = static_cast<int32_t>(block % static_cast<uint32_t>(blocks[1]));
     at[2] = static_cast<int32_t>(block / static_cast<uint32_t>(blocks[1]));
   }
-  // Of a region's coordinates, within its block.
+  // Returns the number of a region within its block, from its coordinates.
   VOXELD_HD static uint32_t InBlock(const int32_t at[3]) {
     constexpr int32_t kMask = (1 << kBlockBits) - 1;
     return static_cast<uint32_t>((((at[2] & kMask) << kBlockBits | (at[1] & kMask)) << kBlockBits) |
@@ -107,23 +108,23 @@ struct RegionGrid {
   }
 };
 
-// A batch's lines: what sorting needs of each and, behind that of all, what drawing does, so that what
-// is looked up again and again lies close together.
+// A batch's lines: the sorting data of all lines, followed by the drawing data of all, so that data
+// that is read repeatedly lies close together.
 struct LineArrays {
   ThinLine* lines = nullptr;
   ThinTrack* tracks = nullptr;
 
-  static constexpr size_t kBytes = sizeof(ThinLine) + sizeof(ThinTrack);  // of a line
+  static constexpr size_t kBytes = sizeof(ThinLine) + sizeof(ThinTrack);  // per line
   static LineArrays Of(void* items, uint32_t count) {
     ThinLine* const lines = static_cast<ThinLine*>(items);
     return {lines, reinterpret_cast<ThinTrack*>(lines + count)};
   }
 };
 
-// A part of a line in a block of regions: `count` voxels from k on.
+// The part of a line in a block of regions: `count` voxels from k on.
 struct LinePiece {
   uint32_t line;
-  uint32_t bits;  // k; from bit 16 on the count
+  uint32_t bits;  // k, and from bit 16 on the count
 
   VOXELD_HD static LinePiece Of(uint32_t line, int32_t k, int32_t count) {
     return {line, static_cast<uint32_t>(k) | static_cast<uint32_t>(count) << 16};
@@ -132,11 +133,11 @@ struct LinePiece {
   VOXELD_HD uint32_t count() const { return bits >> 16; }
 };
 
-// A part of a line in a region: `count` voxels from k on.
+// The part of a line in a region: `count` voxels from k on.
 struct alignas(8) LineSpan {
   uint32_t line;
-  // k; from bit 16 on the count; from bit 23 on the region in its block; the top bit if the line
-  // runs from colour to colour.
+  // k; from bit 16 on the count; from bit 23 on the region in its block; the top bit is set if the
+  // line has a colour gradient.
   uint32_t bits;
 
   VOXELD_HD static LineSpan Of(uint32_t line, int32_t k, int32_t count, uint32_t region,
@@ -150,17 +151,18 @@ struct alignas(8) LineSpan {
   VOXELD_HD bool mixed() const { return bits >> 31 != 0; }
 };
 
-// Pieces that are sorted at once, all of one block, and the spans that they come to at most.
+// The number of pieces that are sorted at once, all of one block, and the greatest number of spans
+// of a piece.
 inline constexpr uint32_t kPieceChunk = 512;
 inline constexpr uint32_t kMostSpansOfPiece = 3 * ((1 << kBlockBits) - 1) + 1;
 
-// Spans by region. A block's chunks are chunk_begin[b] to chunk_begin[b + 1]; those of region r of it
-// in chunk c are spans[base[c] + offsets[c][r]] to spans[base[c] + offsets[c][r + 1]].
+// Spans by region. A block's chunks are chunk_begin[b] to chunk_begin[b + 1]; the spans of its
+// region r in chunk c are spans[base[c] + offsets[c][r]] to spans[base[c] + offsets[c][r + 1]].
 struct SpanLists {
   const uint32_t* chunk_begin = nullptr;
   const uint32_t* base = nullptr;
-  const uint16_t* offsets = nullptr;  // kRegionsInBlock + 1 a chunk
-  const uint64_t* regions = nullptr;  // by block, bits: which have any
+  const uint16_t* offsets = nullptr;  // kRegionsInBlock + 1 per chunk
+  const uint64_t* regions = nullptr;  // by block, bits: the regions that have any
   const LineSpan* spans = nullptr;
 
   VOXELD_HD bool Has(uint32_t region) const {
@@ -168,13 +170,13 @@ struct SpanLists {
   }
 };
 
-// Lines of one layer, with their spans by region. Without spans (null), of the lists there is
-// `regions` alone, and who draws looks through all lines.
+// Lines of one layer, with their spans by region. Without spans (null), the only list is `regions`,
+// and the drawing threads test all lines.
 struct LineBatchView {
   const ThinLine* lines = nullptr;
   const ThinTrack* tracks = nullptr;
-  const uint32_t* ends = nullptr;  // the word at E, where colours differ along a line; else null
-  uint32_t layer = 0;              // its slot
+  const uint32_t* ends = nullptr;  // the word at E, if colours differ along a line; else null
+  uint32_t layer = 0;              // the slot of the layer
   uint32_t count = 0;              // lines
   SpanLists lists;
 
@@ -196,19 +198,19 @@ inline constexpr uint32_t kLineChunk = 256;
 struct LineSort {
   RegionGrid grid;
   uint32_t piece_capacity = 0, span_capacity = 0;
-  uint32_t* block_counts = nullptr;  // by block; 0 at first
+  uint32_t* block_counts = nullptr;  // by block; initially 0
   uint32_t* block_begin = nullptr;   // by block, and the end
   uint32_t* line_offsets = nullptr;  // by chunk of lines and block
   LinePiece* pieces = nullptr;
-  // What the lists are to have, and how many spans there are in all, 0 at first: also of those for
-  // which there is no room.
+  // The resulting lists, and the number of all spans, initially 0, including those that did not
+  // fit.
   uint32_t* chunk_begin = nullptr;
   uint32_t* base = nullptr;
   uint16_t* offsets = nullptr;
-  uint64_t* regions = nullptr;  // 0 at first
+  uint64_t* regions = nullptr;  // initially 0
   LineSpan* spans = nullptr;
   uint32_t* span_count = nullptr;
-  uint8_t* dirty = nullptr;  // by region: those that have any are marked; or null
+  uint8_t* dirty = nullptr;  // by region: marks regions that have any; or null
 };
 
 }  // namespace voxeld::gpu::cuda

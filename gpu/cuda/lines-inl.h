@@ -8,7 +8,7 @@
 
 namespace voxeld::gpu::cuda {
 
-// Into the second cache.
+// Prefetches into the second-level cache.
 __device__ inline void AskFor(const void* what) {
 #if defined(__CUDA_ARCH__)
   asm volatile("prefetch.global.L2 [%0];" ::"l"(what));
@@ -21,7 +21,7 @@ __device__ inline ThinLine LoadLine(const ThinLine* line) {
   return {{a.x, a.y, a.z}, a.w, {b.x, b.y, b.z}, static_cast<uint32_t>(b.w)};
 }
 
-// f(box, region, k, end) for each region of those drawn that the line has voxels in.
+// Calls f(box, region, k, end) for each drawn region in which the line has voxels.
 __device__ void WalkRegions(const RegionGrid& grid, const ThinLine& line, auto&& f) {
   if (line.word == 0) return;
   const int bits[3] = {RegionBits(0), RegionBits(1), RegionBits(2)};
@@ -34,16 +34,16 @@ __device__ void WalkRegions(const RegionGrid& grid, const ThinLine& line, auto&&
   });
 }
 
-// A region's bit, by block as SpanLists has them.
+// Sets a region's bit, by block as in SpanLists.
 __device__ inline void SetRegion(uint64_t* regions, uint32_t region) {
   uint64_t& bits = regions[region / kRegionsInBlock];
   const uint64_t bit = uint64_t{1} << region % kRegionsInBlock;
-  // Most have been set before; one that is not seen to be is set once more.
+  // Most bits are already set; if that is not visible yet, a bit is set again.
   if ((*static_cast<const volatile uint64_t*>(&bits) & bit) != 0) return;
   atomicOr(reinterpret_cast<unsigned long long*>(&bits), static_cast<unsigned long long>(bit));
 }
 
-// Line i of `to` is item i of the list; what it is.
+// Makes line i of `to` from item i of the list, and returns it.
 __device__ inline ThinLine MakeLine(const TableEntry* table, const ItemList& list, uint64_t i,
                                     const LineArrays& to, uint32_t* ends) {
   const uint32_t d = DrawableOf(list, i);
@@ -55,7 +55,7 @@ __device__ inline ThinLine MakeLine(const TableEntry* table, const ItemList& lis
   const bool erase = entry.erase != 0;
   ThinLine thin = MakeThin(line, MakeWord(entry.priority, erase, line.color_s));
   uint32_t end = MakeWord(entry.priority, erase, line.color_e);
-  if (thin.n == 0) thin.word = end = Max(thin.word, end);  // both ends are the one voxel
+  if (thin.n == 0) thin.word = end = Max(thin.word, end);  // both ends are the same voxel
   to.lines[i] = thin;
   to.tracks[i] = TrackOf(thin);
   if (ends != nullptr) ends[i] = end;

@@ -1,4 +1,4 @@
-// What the lists of what lies where may take of a device's memory, of all indices together.
+// The budget of device memory for the lists of all indices together.
 #pragma once
 
 #include <cstdint>
@@ -9,10 +9,10 @@ namespace voxeld::gpu::cuda {
 
 // Thread-bound.
 struct ListBudget {
-  Pool pool;           // lists, and what making them takes, come out of it: its limit is the budget
-  uint64_t most_kept;  // what lists that stay from frame to frame may have of it
+  Pool pool;           // memory of lists and of their making: its limit is the budget
+  uint64_t most_kept;  // limit of the lists that are kept from frame to frame
 
-  // Whether what is there now, if it stays, leaves too little for making others.
+  // Returns whether the current lists, if they are kept, leave too little memory for making others.
   bool KeepsTooMuch() const { return pool.used() > most_kept; }
 };
 

@@ -9,7 +9,7 @@
 namespace voxeld::gpu::cuda {
 namespace {
 
-// nccl.h's, as far as they go.
+// Values of nccl.h, as far as they are used.
 constexpr int kSuccess = 0;     // ncclSuccess
 constexpr int kInProgress = 7;  // ncclInProgress
 constexpr int kUint8 = 1;       // ncclUint8
@@ -81,7 +81,7 @@ absl::StatusOr<std::string> Nccl::Version() const {
       !status.ok()) {
     return absl::FailedPreconditionError(status.message());
   }
-  // Major · 10,000, minor · 100, patch; before 2.9 major · 1,000.
+  // The version is major · 10,000 + minor · 100 + patch; before 2.9 it had major · 1,000.
   const int major = version >= 10000 ? version / 10000 : version / 1000;
   const int rest = version >= 10000 ? version % 10000 : version % 1000;
   return absl::StrCat(major, ".", rest / 100, ".", rest % 100);

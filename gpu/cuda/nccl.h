@@ -1,6 +1,7 @@
-// NCCL, opened at run time: what is used of it, by declarations of our own, so that nothing is built
-// or shipped with it. (The names, numbers and layouts are those of its documented interface, the same
-// since its version 2.7.) Knows no CUDA but the name of a stream.
+// NCCL, opened at run time: the functions that are used, with our own declarations, so that nothing
+// is built or shipped with it. (The names, numbers and layouts are those of its documented
+// interface, unchanged since its version 2.7.) Independent of CUDA, except for the name of a
+// stream.
 #pragma once
 
 #include <array>
@@ -21,13 +22,14 @@ namespace voxeld::gpu::cuda {
 // The library. Thread-safe.
 class Nccl {
  public:
-  using Id = std::array<std::byte, 128>;  // by which the ranks of a communicator meet
+  using Id = std::array<std::byte, 128>;  // identifies a communicator to its ranks
 
-  // Where it is looked for, in order: `path`, $VOXELD_NCCL, what the loader finds. `environment`: a
-  // variable's value; empty if it is not set.
+  // Returns the places to try, in order: `path`, $VOXELD_NCCL, the loader's path. `environment`
+  // returns a variable's value; empty if it is not set.
   static std::vector<std::string> Places(
       const std::string& path, const std::function<std::string(const char*)>& environment);
-  // The first that there is. FailedPrecondition names all that were tried, and why not.
+  // Opens the first place that works. Errors: FailedPrecondition names all places that were tried,
+  // and the reasons.
   static absl::StatusOr<std::shared_ptr<const Nccl>> Open(const std::vector<std::string>& places);
   static absl::StatusOr<std::shared_ptr<const Nccl>> Open(const std::string& path);
   ~Nccl();
@@ -48,23 +50,23 @@ class Nccl {
   const std::unique_ptr<Functions> functions_;
 };
 
-// One rank's end of a communicator. Thread-bound. What it queues goes into the stream that is named.
+// One rank's end of a communicator. Thread-bound. Work is queued in the given stream.
 class NcclComm {
  public:
-  // Of the device that is current; waits for all ranks. FailedPrecondition if it cannot be.
+  // Joins with the current device; waits for all ranks. Errors: FailedPrecondition on failure.
   static absl::StatusOr<std::unique_ptr<NcclComm>> Join(std::shared_ptr<const Nccl> nccl,
                                                         const Nccl::Id& id, int rank, int ranks);
-  // Aborts: waits for no other rank.
+  // Aborts, without waiting for other ranks.
   ~NcclComm();
   NcclComm(const NcclComm&) = delete;
   NcclComm& operator=(const NcclComm&) = delete;
 
   int rank() const { return rank_; }
-  // Rank 0's bytes into the same memory of all. DataLoss if it cannot be queued.
+  // Copies rank 0's bytes to the same memory of all ranks. Errors: DataLoss if it cannot be queued.
   absl::Status Broadcast(void* at, size_t bytes, CUstream_st* stream);
-  // The least of all ranks' values, in place of each.
+  // Replaces each rank's value by the least of all.
   absl::Status Least(int32_t* value, CUstream_st* stream);
-  // DataLoss if something has gone wrong since.
+  // Errors: DataLoss if an operation has failed since.
   absl::Status Check() const;
 
  private:

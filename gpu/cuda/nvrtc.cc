@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kSuccess = 0;             // NVRTC_SUCCESS
 constexpr int kErrorOfTheSource = 6;    // NVRTC_ERROR_COMPILATION
-constexpr size_t kMostOfTheLog = 2000;  // bytes of it that are told
+constexpr size_t kMostOfTheLog = 2000;  // the reported part of it, in bytes
 
 }  // namespace
 

@@ -1,6 +1,6 @@
-// CUDA's compiler as a library, opened at run time: what is used of it, by declarations of our own, so that
-// nothing is built or shipped with it. (The names and numbers are those of its documented interface,
-// https://docs.nvidia.com/cuda/nvrtc.)
+// CUDA's compiler as a library, opened at run time: the functions that are used, with our own
+// declarations, so that nothing is built or shipped with it. (The names and numbers are those of
+// its documented interface, https://docs.nvidia.com/cuda/nvrtc.)
 #pragma once
 
 #include <functional>
@@ -15,7 +15,7 @@
 
 namespace voxeld::gpu::cuda {
 
-// A source that others include by name.
+// A source that other sources include by name.
 struct NamedSource {
   const char* name;
   const char* text;
@@ -24,13 +24,15 @@ struct NamedSource {
 // The library. Thread-safe.
 class Nvrtc {
  public:
-  // Where it is looked for, in order: $VOXELD_NVRTC, what the loader finds, where CUDA is installed as a rule.
-  // Nowhere if that variable is "off". `environment`: a variable's value; empty if it is not set.
+  // Returns the places to try, in order: $VOXELD_NVRTC, the loader's path, CUDA's usual
+  // installation folders. No places if that variable is "off". `environment` returns a variable's
+  // value; empty if it is not set.
   static std::vector<std::string> Places(
       const std::function<std::string(const char*)>& environment);
-  // The first that there is. FailedPrecondition names all that were tried, and why not.
+  // Opens the first place that works. Errors: FailedPrecondition names all places that were tried,
+  // and the reasons.
   static absl::StatusOr<std::shared_ptr<const Nvrtc>> Open(const std::vector<std::string>& places);
-  // The first of Places that compiles for devices of that compute capability.
+  // Opens the first of Places that can compile for devices of that compute capability.
   static absl::StatusOr<std::shared_ptr<const Nvrtc>> OpenFor(
       const std::vector<std::string>& places, int major, int minor);
   static absl::StatusOr<std::shared_ptr<const Nvrtc>> OpenFor(int major, int minor);
@@ -38,11 +40,13 @@ class Nvrtc {
   Nvrtc(const Nvrtc&) = delete;
   Nvrtc& operator=(const Nvrtc&) = delete;
 
-  // FailedPrecondition if it compiles nothing for devices of that compute capability, as one that is older than the device may.
+  // Errors: FailedPrecondition if it cannot compile for devices of that compute capability, which
+  // is possible if it is older than the device.
   absl::Status Supports(int major, int minor) const;
   const std::string& place() const { return place_; }
-  // A module for devices of that compute capability, rounded as the engine's own kernels are. Takes tenths of
-  // a second and more. InvalidArgument has what the compiler says of a source that it does not take.
+  // Returns a module for devices of that compute capability, with the same rounding as the engine's
+  // own kernels. Takes tenths of a second or more. Errors: InvalidArgument with the compiler's
+  // messages for an invalid source.
   absl::StatusOr<std::string> Compile(const std::string& source,
                                       std::span<const NamedSource> sources, int major,
                                       int minor) const;

@@ -12,7 +12,7 @@
 namespace voxeld::gpu::cuda {
 namespace {
 
-// The name of what it lacks; null if it has all.
+// Returns the name of a missing function; null if none is missing.
 const char* Find(void* library, std::span<const WantedFunction> wanted) {
   for (const WantedFunction& function : wanted) {
     void* const found = dlsym(library, function.name());

@@ -9,7 +9,7 @@
 
 namespace voxeld::gpu::cuda {
 
-// A function of a library, and the pointer that is to point to it.
+// A function of a library, and the pointer to set to it.
 class WantedFunction {
  public:
   template <typename Result, typename... Arguments>
@@ -25,13 +25,14 @@ class WantedFunction {
   void* function_;
 };
 
-// Opens the first of `places` (paths, or names that the loader knows) that can be and has all of `wanted`; says which. It stays
-// open for good: it may have threads of its own. FailedPrecondition names `what` and all that were tried, and why not; what is wanted may
-// then point anywhere.
+// Opens the first of `places` (paths, or names that the loader knows) that can be opened and has
+// all of `wanted`; returns which. The library stays open permanently, because it may have threads
+// of its own. Errors: FailedPrecondition names `what` and all places that were tried, and the
+// reasons; the pointers of `wanted` are then undefined.
 absl::StatusOr<std::string> OpenLibrary(const char* what, const std::vector<std::string>& places,
                                         std::span<const WantedFunction> wanted);
 
-// A variable of this process's environment; empty if it is not set.
+// Returns a variable of this process's environment; empty if it is not set.
 std::string Environment(const char* name);
 
 }  // namespace voxeld::gpu::cuda

@@ -9,7 +9,7 @@
 namespace voxeld::gpu::cuda {
 namespace {
 
-// A bit each, where it is noted which pictures of a slice differ.
+// One bit each says which slice images of a slice differ.
 constexpr int32_t kMostSubFrames = 32;
 
 bool PutLeast(const display::FrameLayout& layout, const display::Tone& tone,
@@ -61,7 +61,7 @@ std::vector<PackedPlan::Group> GroupsOf(const std::vector<int32_t>& slice_of_z, 
       group.begin = first ? s : std::min(group.begin, s);
       group.end = first ? s + 1 : std::max(group.end, s + 1);
     }
-    if (group.end == 0 && z_end < nz) continue;  // the next one sees to what lies there
+    if (group.end == 0 && z_end < nz) continue;  // the next one includes this part
     groups.push_back(group);
   }
   return groups;

@@ -11,7 +11,7 @@ namespace voxeld::gpu::cuda {
 namespace {
 
 constexpr uint32_t kMostPass = 1u << 22, kLeastPass = 1024;  // items
-constexpr uint64_t kMostPairs = 1ull << 31;                  // of a batch
+constexpr uint64_t kMostPairs = 1ull << 31;                  // per batch
 
 }  // namespace
 
@@ -20,7 +20,7 @@ void PairIndex::Defer(std::vector<PairedDrawable> drawables) {
   whole_.clear();
   deferred_ = std::move(drawables);
   skip_ = 0;
-  used_ = UINT64_MAX;  // there is room now
+  used_ = UINT64_MAX;  // there may be memory now
 }
 
 BatchList PairIndex::view() const {
@@ -128,7 +128,7 @@ absl::Status PairIndex::AddPass(const TableEntry* table, const LayerLook* looks,
                                 const ItemList& list, uint64_t begin, uint32_t items,
                                 const VolumeView& volume) {
   absl::Status status;
-  // One place is for a pass of drawing.
+  // One batch is reserved for a pass of drawing.
   if (batches_.size() + whole_.size() + 1 >= kMaxBatches)
     status = MergeFrom(0, table, volume.grid.count());
   if (!status.ok()) return status;
@@ -175,7 +175,8 @@ absl::StatusOr<UploadedList> UploadDrawables(Device& device,
   return UploadList(device, slots, firsts);
 }
 
-// How many drawables have all their items among the first `items`; of which what is over is left.
+// Returns how many drawables have all their items among the first `items`; subtracts those items,
+// so that the rest remains.
 size_t CountWhole(std::span<const PairedDrawable> drawables, uint64_t& items) {
   size_t whole = 0;
   while (whole < drawables.size() && drawables[whole].items <= items) {
@@ -196,7 +197,8 @@ absl::StatusOr<size_t> PairIndex::Add(const TableEntry* table, const LayerLook* 
     return status;
   }
   const size_t whole = CountWhole(drawables, done);
-  // Of one behind others, whose part is there, the pairs come twice: that is drawn alike.
+  // If other drawables are deferred before it, the pairs of a part that is already there are made
+  // twice, which does not change the result.
   if (deferred_.empty()) skip_ = done;
   deferred_.insert(deferred_.end(), drawables.begin() + static_cast<ptrdiff_t>(whole),
                    drawables.end());
@@ -233,7 +235,7 @@ absl::Status PairIndex::AddDeferred(const TableEntry* table, const VolumeView& v
   absl::Status status;
   if (!deferred_.empty() && lists_.pool.used() < used_) {
     const absl::StatusOr<UploadedList> list = UploadDrawables(device_, deferred_);
-    if (absl::IsResourceExhausted(list.status())) return absl::OkStatus();  // later, then
+    if (absl::IsResourceExhausted(list.status())) return absl::OkStatus();  // try again later
     if (!list.ok()) return list.status();
     status = AddItems(table, nullptr, *list, volume, skip_);
     const size_t whole = CountWhole(deferred_, skip_);
@@ -311,7 +313,7 @@ absl::Status PairIndex::Merge(const TableEntry* table, uint32_t tiles) {
   while (first > 0 && batches_[first - 1].pairs <= 2 * pairs) pairs += batches_[--first].pairs;
   if (first + 1 == batches_.size()) return absl::OkStatus();
   const absl::Status status = MergeFrom(first, table, tiles);
-  // As many batches as there is room for are in order; what comes then is deferred.
+  // It is correct to have as many batches as fit; the remaining drawables are deferred.
   return absl::IsResourceExhausted(status) ? absl::OkStatus() : status;
 }
 

@@ -1,5 +1,5 @@
-// Pairs of items and tiles, raised into a region's words: whatever is neither thin line nor small triangle,
-// also where there is no list of pairs.
+// Raises pairs of items and tiles into a region's words: everything except thin lines, points and
+// small triangles with lists, and items without a list of pairs as well.
 #pragma once
 
 #include "gpu/cuda/filled-inl.h"
@@ -13,21 +13,21 @@
 namespace voxeld::gpu::cuda {
 
 struct PairScratch {
-  union {  // first: SharedBehind
+  union {  // must be first: SharedBehind
     SolidBlock solid;
     SmallSolids small_solids;
     ImplicitScratch implicit;
     SampleScratch samples;
   };
   uint64_t heavy[kDrawThreads];  // pairs for many threads; from the end on small solids,
-  uint32_t tiles[kDrawThreads];  // and which tile each is of
+  uint32_t tiles[kDrawThreads];  // and the tile of each
   uint32_t heavy_count;
-  uint32_t small_count, small_taken;  // by warps that draw them
+  uint32_t small_count, small_taken;  // small_taken: by warps that draw them
 
   __device__ uint32_t listed() const { return heavy_count + small_count; }
 };
 
-// Of the voxels that there are, the region that a tile lies in.
+// Returns the existing voxels of the region in which a tile lies.
 __device__ inline Box3 RegionAround(const TileGrid& grid, uint32_t tile) {
   Box3 box = grid.VoxelsOf(tile);
   for (int a = 0; a < 3; ++a) {
@@ -50,7 +50,7 @@ static __device__ __noinline__ Box3 BoundsOfTriangle(const TableEntry& entry, ui
   return BoundsOf(Triangles::ItemOf(entry.source, item), entry.source.radius);
 }
 
-// Whether an item is better drawn by many threads: thick ones, solids, large triangles.
+// Returns whether an item is better drawn by many threads: thick items, solids, large triangles.
 __device__ inline bool IsHeavy(const TableEntry& entry, uint32_t item, const Box3& box) {
   switch (entry.record.kind) {
     case PrimitiveKind::kPoints:
@@ -68,13 +68,14 @@ __device__ inline bool IsHeavy(const TableEntry& entry, uint32_t item, const Box
   }
 }
 
-// By the whole block rather than by a warp.
+// Returns whether the kind is drawn by the whole block rather than by a warp.
 __device__ inline bool IsForBlock(PrimitiveKind kind) {
   return IsSolid(kind) || kind == PrimitiveKind::kImplicit || kind == PrimitiveKind::kSamples ||
          kind == PrimitiveKind::kFilled;
 }
 
-// What the CPU has drawn of a tile, by a warp. Voxels are named as they lie in the tile.
+// Raises the voxels that the CPU has drawn for a tile, by a warp. Voxels are identified by their
+// places in the tile.
 __device__ inline void RaiseDrawn(const CpuVoxelsView& drawn, uint32_t item, const Box3& box,
                                   const TileGrid& grid, uint32_t* words) {
   constexpr uint32_t kMask = kTileSize - 1;
@@ -89,7 +90,7 @@ __device__ inline void RaiseDrawn(const CpuVoxelsView& drawn, uint32_t item, con
   }
 }
 
-// Every other heavy item, by a warp: each lane draws it in boxes of its own.
+// Draws any other heavy item, by a warp: each lane draws it in boxes of its own.
 __device__ inline void DrawByWarp(const TableEntry& entry, uint32_t item, const Box3& box,
                                   const TileGrid& grid, uint32_t* words) {
   if (entry.record.kind == kDrawnByCpu) return RaiseDrawn(entry.drawn, item, box, grid, words);
@@ -119,9 +120,9 @@ __device__ inline void DrawByWarp(const TableEntry& entry, uint32_t item, const 
   }
 }
 
-// A solid is drawn once in a region: with the first of its tiles there. owned: PairRows::owned.
+// A solid is drawn once in a region: with its first tile there. owned: PairRows::owned.
 __device__ inline bool IsFirstTile(const Solid& s, const Box3& tile, uint32_t owned) {
-  uint32_t halves[2], place = 0;  // of the region along x and y: bits
+  uint32_t halves[2], place = 0;  // place: of the region along x and y: bits
   for (int a = 0; a < 2; ++a) {
     const int32_t middle = (tile.lo[a] & -(2 * kTileSize)) + kTileSize;
     halves[a] = (s.bounds.lo[a] < middle ? 1 : 0) | (s.bounds.hi[a] > middle ? 2 : 0);
@@ -132,7 +133,8 @@ __device__ inline bool IsFirstTile(const Solid& s, const Box3& tile, uint32_t ow
   return (touched & owned & ((1u << place) - 1)) == 0;
 }
 
-// The small solids listed, a warp each: who is done takes the next. By the whole block.
+// Draws the listed small solids, each by a warp: a warp that is done takes the next. Called by the
+// whole block.
 static __device__ __noinline__ void DrawSmallSolids(const TableEntry* table, const TileGrid& grid) {
   PairScratch& scratch = SharedBehind<PairScratch>();
   const uint32_t count = scratch.small_count, warp = threadIdx.x / 32;
@@ -147,20 +149,20 @@ static __device__ __noinline__ void DrawSmallSolids(const TableEntry* table, con
   }
 }
 
-// Whether an earlier pair that is listed is of the same drawable. By the whole block.
+// Returns whether an earlier pair in the list is of the same drawable. Called by the whole block.
 __device__ inline bool IsListedBefore(const PairScratch& scratch, uint32_t i) {
   return __syncthreads_or(threadIdx.x < i &&
                           scratch.heavy[threadIdx.x] >> 32 == scratch.heavy[i] >> 32) != 0;
 }
 
-// Draws all that are listed, which are none then; by the whole block, which has come to a barrier. A function of its
-// own: it holds the code of all solids, and is called from four places.
+// Draws all listed pairs and clears the list. Called by the whole block, after a barrier. Not
+// inlined: it holds the code of all solids, and is called from four places.
 static __device__ __noinline__ void DrawHeavy(const TableEntry* table, const TileGrid& grid) {
   PairScratch& scratch = SharedBehind<PairScratch>();
   uint32_t* const words = SharedRegion().words;
   const uint32_t count = scratch.heavy_count;
   if (scratch.small_count != 0) DrawSmallSolids(table, grid);
-  // Several solids are drawn at once, one alone by all threads.
+  // Several solids are drawn at once; a single one is drawn by all threads.
   constexpr uint32_t kSeveral = 3;
   const bool several = count >= kSeveral;
   for (uint32_t i = threadIdx.x / 32; i < count; i += kDrawWarps) {
@@ -202,7 +204,7 @@ static __device__ __noinline__ void DrawHeavy(const TableEntry* table, const Til
         DrawSamples(entry, box);
         break;
       case PrimitiveKind::kFilled:
-        // All that the region has at once, unless it takes a look at all triangles.
+        // Draws the whole part in the region at once, unless it has to test all triangles.
         if (entry.source.inside == nullptr) {
           DrawFilled(entry, box);
         } else if (!IsListedBefore(scratch, i)) {
@@ -218,7 +220,7 @@ static __device__ __noinline__ void DrawHeavy(const TableEntry* table, const Til
   __syncthreads();
 }
 
-// Whether an item may have voxels in a tile.
+// Returns whether an item may have voxels in a tile.
 __device__ inline bool MayTouch(const TableEntry& entry, uint32_t item, uint32_t tile,
                                 const Box3& box) {
   Box3 bounds;
@@ -246,8 +248,8 @@ __device__ inline bool MayTouch(const TableEntry& entry, uint32_t item, uint32_t
   return !IsEmpty(Intersect(box, bounds));
 }
 
-// The value of a pair, if item `i` of those that are not listed is of that layer, and may have voxels
-// in the tile.
+// Computes the value of a pair; returns whether item `i` of the unlisted items is of that layer,
+// and may have voxels in the tile.
 __device__ inline bool FindUnlisted(const DrawView& view, uint64_t i, uint32_t layer, uint32_t tile,
                                     const Box3& box, uint64_t& value) {
   const uint32_t d = DrawableOf(view.unlisted, i);
@@ -259,7 +261,8 @@ __device__ inline bool FindUnlisted(const DrawView& view, uint64_t i, uint32_t l
   return MayTouch(entry, item, tile, box);
 }
 
-// A pair's voxels; true if it is listed to be drawn by many threads. owned: PairRows::owned.
+// Draws a pair's voxels; returns true if it was listed instead, to be drawn by many threads. owned:
+// PairRows::owned.
 __device__ inline bool DrawLight(const DrawView& view, uint64_t value, uint32_t tile,
                                  uint32_t owned, PairScratch& scratch) {
   const Box3 box = view.volume.grid.VoxelsOf(tile);
@@ -288,18 +291,18 @@ __device__ inline bool DrawLight(const DrawView& view, uint64_t value, uint32_t 
   return heavy;
 }
 
-// The layer's pairs of all tiles, by the whole block. What is heavy is listed: it is drawn
-// together, at the end, or when there is no more room for what may come.
+// Draws the layer's pairs of all tiles, by the whole block. Heavy items are listed: they are drawn
+// together, at the end, or when the list might overflow.
 __device__ inline void DrawPairs(const DrawView& view, const PairRows& rows, PairScratch& scratch) {
   const TileGrid& grid = view.volume.grid;
   for (uint32_t b = 0; b < view.pairs.count; ++b) {
-    uint32_t until[kRegionTiles];  // pairs of the tiles up to each
+    uint32_t until[kRegionTiles];  // pairs of the tiles up to each one
     for (uint32_t t = 0, sum = 0; t < kRegionTiles; ++t) {
       until[t] = sum += rows.end[t][b] - rows.begin[t][b];
     }
     const uint32_t end = until[kRegionTiles - 1];
-    // All threads find the same; they vote because they call functions (DrawRegionsKernel). The votes are barriers as
-    // well: between what is listed and whoever counts it.
+    // All threads have the same result; they vote because they call functions (DrawRegionsKernel).
+    // The votes are also barriers between the listing of items and the threads that count them.
     for (uint32_t round = 0; __syncthreads_or(round < end) != 0; round += kDrawThreads) {
       const bool full = scratch.listed() + Min(end - round, kDrawThreads) > kDrawThreads;
       if (__syncthreads_or(full) != 0) DrawHeavy(view.table, grid);
@@ -316,8 +319,9 @@ __device__ inline void DrawPairs(const DrawView& view, const PairRows& rows, Pai
   }
 }
 
-// What the layer has in one tile of items that are not listed, by the whole block. Rare, and apart, so
-// that pairs are drawn as they would be without it; its loop is left by vote, as it must be around calls.
+// Draws the layer's unlisted items in one tile, by the whole block. It is rare and in a function of
+// its own, so that pairs are drawn as they would be without it; its loop ends by vote, as required
+// around calls.
 static __device__ __noinline__ void DrawUnlisted(const DrawView& view, uint32_t tile,
                                                  uint32_t owned, RegionScratch& region,
                                                  PairScratch& scratch) {

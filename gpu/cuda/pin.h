@@ -6,7 +6,8 @@
 
 namespace voxeld::gpu::cuda {
 
-// Where it cannot be had (no device, a limit of the system), copies are slower, nothing else.
+// If memory cannot be pinned (no device, a limit of the system), copies are slower; there is no
+// other effect.
 void PinMemory(std::span<std::byte> memory);
 void PinReadOnlyMemory(std::span<std::byte> memory);  // that this process cannot write
 void UnpinMemory(std::span<std::byte> memory);

@@ -1,4 +1,4 @@
-// Pixels into pictures of bytes.
+// Writes pixels into slice images of bytes.
 #pragma once
 
 #include <cstddef>
@@ -9,14 +9,15 @@
 
 namespace voxeld::gpu::cuda {
 
-// Writes a byte; true if it was another.
+// Writes a byte; returns true if it changed.
 __device__ inline bool PutByte(uint8_t* at, uint32_t value) {
   if (*at == value) return false;
   *at = static_cast<uint8_t>(value);
   return true;
 }
 
-// The pixel (u, v) of a picture of bytes that are a pixel's alone; true if it was another.
+// Writes pixel (u, v) of a slice image in which each byte belongs to one pixel; returns true if it
+// changed.
 __device__ inline bool PutLevels(const SliceView& view, uint32_t u, uint32_t v, Levels q,
                                  uint8_t* picture) {
   const size_t pixel = static_cast<size_t>(v) * view.width + u;

@@ -8,7 +8,7 @@
 namespace voxeld::gpu::cuda {
 namespace {
 
-// Besides what it is asked for.
+// The shared memory that is used in addition to the requested size.
 constexpr size_t kSums = 8192;
 
 bool Fits(const Api& api, const RegionGrid& regions, uint32_t each) {
@@ -37,7 +37,7 @@ uint32_t PointIndex::ChunksOf(const Batch& batch) const {
 }
 
 PointBatchList PointIndex::view() const {
-  PointBatchList list;  // Merge sees to it that they fit
+  PointBatchList list;  // Merge ensures that they fit
   for (const auto& [number, batch] : batches()) {
     list.batches[list.count++] = {Points(batch),
                                   batch.spans.as<PlacedPoint>(),
@@ -58,7 +58,7 @@ absl::StatusOr<PointSort> PointIndex::TakeLists(Batch& batch, const RegionGrid& 
                                                 uint32_t records) {
   const size_t chunks = ChunksOf(batch);
   batch.within = within;
-  for (int a = 0; a < 3; ++a) {  // of none there is no negative number
+  for (int a = 0; a < 3; ++a) {  // an empty range must not give a negative number
     batch.within.drawn_hi[a] = std::max(within.drawn_lo[a], within.drawn_hi[a]);
   }
   const std::pair<Block*, size_t> wanted[] = {
@@ -68,7 +68,7 @@ absl::StatusOr<PointSort> PointIndex::TakeLists(Batch& batch, const RegionGrid& 
       {&batch.spans, std::max<size_t>(1, records) * sizeof(PlacedPoint)}};
   batch.list_bytes = 0;
   for (const auto& [block, bytes] : wanted) {
-    *block = Block();  // of a try before
+    *block = Block();  // from an earlier try
     batch.list_bytes += bytes;
   }
   batch.sort_bytes = batch.list_bytes;
@@ -135,11 +135,11 @@ absl::Status PointIndex::SortAll(Batch& batch, uint8_t* region_dirty) {
   return QueueSort(*sort, batch);
 }
 
-// First they are counted.
+// Counts them first.
 absl::Status PointIndex::SortExactly(Batch& batch, Block& regions, const RegionGrid& within,
                                      uint8_t* region_dirty) {
   const size_t blocks = grid().block_count();
-  // With what is counted behind it.
+  // The counters follow it in one block.
   absl::StatusOr<Block> zeros = device().Zeros(blocks * sizeof(uint64_t) + 2 * sizeof(uint32_t));
   if (!zeros.ok()) return zeros.status();
   uint32_t* const counted = reinterpret_cast<uint32_t*>(zeros->as<uint64_t>() + blocks);
@@ -186,8 +186,7 @@ absl::Status PointIndex::MarkAll(const Batch& batch, uint8_t* region_dirty) {
   });
 }
 
-// Records say nothing of the items that they are of: what has gone is taken out by sorting its
-// chunks anew.
+// Records do not name their items: removed points are taken out by sorting their chunks again.
 absl::Status PointIndex::Touch(const ItemList& list, uint32_t count, const Batch& batch,
                                uint8_t* region_dirty) {
   if (region_dirty != nullptr) {

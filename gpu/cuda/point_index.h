@@ -1,5 +1,6 @@
-// Points without thickness by the regions that they lie in: sorted in chunks, as they come, so that
-// what a chunk has in a region is a row. What is deferred keeps `regions`, a bit for each.
+// Points without thickness by the regions that they lie in: sorted in chunks, in their original
+// order, so that a chunk's points in a region are a row. Deferred batches keep `regions`, a bit for
+// each region.
 #pragma once
 
 #include <cstdint>
@@ -9,20 +10,21 @@
 
 namespace voxeld::gpu::cuda {
 
-// A batch's `base`, `offsets`, `regions` and `spans` are PointBatchView's arrays, `spans` its
-// records; `begin` says which chunks are touched, and `within` what the lists are of.
+// A batch's `base`, `offsets`, `regions` and `spans` are the arrays of PointBatchView, where
+// `spans` are its records; `begin` says which chunks are touched, and `within` which regions the
+// lists cover.
 class PointIndex final : public RegionIndex {
  public:
-  // `points_each`, `few_points`: Tuning's.
+  // `points_each`, `few_points`: see Tuning.
   PointIndex(Device& device, ListBudget& lists, uint32_t points_each, uint32_t few_points)
       : RegionIndex(device, lists, "points", sizeof(PlacedPoint), 0),
         points_each_(points_each),
         few_points_(few_points) {}
 
-  // Whether a volume of that grid can have one, on such a device.
+  // Returns whether a volume of that grid can have this index on such a device.
   static bool Suits(const Api& api, const TileGrid& grid);
 
-  PointBatchList view() const;  // after Merge
+  PointBatchList view() const;  // valid after Merge
 
  private:
   uint64_t MostRegions() const override { return 1; }
@@ -39,10 +41,10 @@ class PointIndex final : public RegionIndex {
   absl::Status Touch(const ItemList& list, uint32_t count, const Batch& batch,
                      uint8_t* region_dirty) override;
 
-  // Points of a thread in a chunk: as many as there is shared memory for.
+  // Returns how many points each thread has in a chunk: as many as fit in shared memory.
   uint32_t Each() const;
   uint32_t ChunksOf(const Batch& batch) const;
-  // Takes the lists' memory, of so many records.
+  // Allocates the lists' memory, for `records` records.
   absl::StatusOr<PointSort> TakeLists(Batch& batch, const RegionGrid& within, uint32_t records);
   absl::Status QueueSort(const PointSort& sort, const Batch& batch);
 

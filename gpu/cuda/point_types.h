@@ -1,5 +1,5 @@
 // Points without thickness on the device (gpu/primitives/compact_point.h), sorted by the regions of
-// the volume that they lie in. Plain data, as host and device see it.
+// the volume that they lie in. Plain data, used by host and device.
 #pragma once
 
 #include <cstdint>
@@ -9,10 +9,10 @@
 
 namespace voxeld::gpu::cuda {
 
-// A voxel and the word that it is raised to; 0: none.
+// A voxel and the word to which it is raised; 0: none.
 struct alignas(8) PlacedPoint {
-  // The voxel's place in its region, as it is drawn; of an item, not of a list, above it the
-  // region.
+  // The voxel's place in its region, as it is drawn; for an item, but not in a list, the upper bits
+  // are the region.
   uint32_t at = 0;
   uint32_t word = 0;
 
@@ -27,22 +27,23 @@ struct alignas(8) PlacedPoint {
 };
 static_assert(kRegionVoxels == 1u << PlacedPoint::kRegionShift);
 
-// Points are sorted in chunks, each by a block of so many threads, of which each has 1, 4 or 16.
+// Points are sorted in chunks, each by a block of this many threads, which have 1, 4 or 16 points
+// each.
 inline constexpr uint32_t kPointThreads = 1024;
 inline constexpr uint32_t kMostPointsEach = 16;
 static_assert(kPointThreads * kMostPointsEach < 1u << 16, "places in a chunk have 16 bits");
 
-// Points of one layer. Those of a chunk c in region r, r being the l-th of those that `within`
+// Points of one layer. Those of a chunk c in region r, where r is the l-th region that `within`
 // draws, are records[base[c] + offsets[c][l]] to records[base[c] + offsets[c][l + 1]]. Without
-// records (null), of the lists there is `regions` alone, and who draws looks through all points.
+// records (null), the only list is `regions`, and the drawing threads test all points.
 struct PointBatchView {
   const PlacedPoint* points = nullptr;
   const PlacedPoint* records = nullptr;
   const uint32_t* base = nullptr;
   const uint16_t* offsets = nullptr;
-  const uint64_t* regions = nullptr;  // by block, bits: which have any
+  const uint64_t* regions = nullptr;  // by block, bits: the regions that have any
   RegionGrid within;
-  uint32_t layer = 0;  // its slot
+  uint32_t layer = 0;  // the slot of the layer
   uint32_t count = 0;  // points
   uint32_t chunks = 0;
 
@@ -51,7 +52,8 @@ struct PointBatchView {
     return regions[region / kRegionsInBlock] >> region % kRegionsInBlock & 1;
   }
 };
-// Of a chunk's offsets, so that each chunk's begin at 16 bytes.
+// Returns the stride of chunks' offsets, so that each chunk's offsets begin at a multiple of 16
+// bytes.
 VOXELD_HD constexpr uint32_t PointStride(uint32_t regions) { return regions + 8; }
 
 struct PointBatchList {
@@ -62,20 +64,20 @@ struct PointBatchList {
 // The sorting of a batch.
 struct PointSort {
   RegionGrid within;
-  uint32_t each = 1;  // points of a thread in a chunk
-  // Records that there are, 0 at first: chunks take their places one behind the other. Null: a
-  // chunk's begin where its points do.
+  uint32_t each = 1;  // points of each thread in a chunk
+  // The number of records, initially 0: chunks take their places one after the other. Null: a
+  // chunk's records begin where its points do.
   uint32_t* taken = nullptr;
   uint32_t capacity = 0;  // of `records`
-  // What the lists are to have.
+  // The resulting lists.
   uint32_t* base = nullptr;
   uint16_t* offsets = nullptr;
-  uint64_t* regions = nullptr;  // 0 at first
+  uint64_t* regions = nullptr;  // initially 0
   PlacedPoint* records = nullptr;
-  // By chunk: not 0, if it is to be sorted anew. The sorting leaves it 0.
+  // By chunk: not 0 if it has to be sorted again. The sorting resets it to 0.
   uint32_t* touched = nullptr;
-  bool again = false;        // only those are, at the places that they have
-  uint8_t* dirty = nullptr;  // by region: those that have any are marked; or null
+  bool again = false;        // sort only those chunks, at their existing places
+  uint8_t* dirty = nullptr;  // by region: marks regions that have any; or null
 };
 
 }  // namespace voxeld::gpu::cuda

@@ -1,4 +1,4 @@
-// Points without thickness, raised into a region's words.
+// Raises points without thickness into a region's words.
 #pragma once
 
 #include "gpu/cuda/point_types.h"
@@ -7,10 +7,10 @@
 
 namespace voxeld::gpu::cuda {
 
-// What a chunk has in a region is drawn by one thread if it is few, by a warp if it is more, and by
-// all if it is many.
+// A chunk's points in a region are drawn by one thread if they are few, by a warp if they are more,
+// and by all threads if they are many.
 inline constexpr uint32_t kFewPointsOfChunk = 16;
-inline constexpr uint32_t kPointsHeld = 6;  // asked for together
+inline constexpr uint32_t kPointsHeld = 6;  // loaded together
 inline constexpr uint32_t kManyPointsOfChunk = 2048;
 
 __device__ inline PlacedPoint LoadRecord(const PlacedPoint* record) {
@@ -18,7 +18,7 @@ __device__ inline PlacedPoint LoadRecord(const PlacedPoint* record) {
   return {two.x, two.y};
 }
 
-// Every `stride`-th of `count` records from the `first` one on.
+// Draws every `stride`-th of `count` records from the `first` one on.
 __device__ inline void DrawRecords(const PlacedPoint* records, uint32_t first, uint32_t count,
                                    uint32_t stride, const RegionWords& words) {
   constexpr uint32_t kAtOnce = 4;
@@ -35,7 +35,8 @@ __device__ inline void DrawRecords(const PlacedPoint* records, uint32_t first, u
   }
 }
 
-// What chunks have more than few of, put down by threads and drawn by warps. By the whole block.
+// Draws the rows of chunks that are more than few, which threads have listed, by warps. Called by
+// the whole block.
 static __device__ __noinline__ void DrawManyPoints(const PlacedPoint* from, uint32_t count) {
   PointScratch& scratch = SharedPoints();
   if (threadIdx.x == 0) scratch.segments = 0;
@@ -60,7 +61,7 @@ static __device__ __noinline__ void DrawManyPoints(const PlacedPoint* from, uint
   __syncthreads();
 }
 
-// By the whole block: what the batch has in the region, if it has any there.
+// Draws the batch's points in the region, if it has any there. Called by the whole block.
 static __device__ __noinline__ void DrawPoints(const PointBatchView& batch) {
   const uint32_t region = SharedRegion().region;
   if (!batch.Has<true>(region)) return;
@@ -92,7 +93,7 @@ static __device__ __noinline__ void DrawPoints(const PointBatchView& batch) {
   }
 }
 
-// By the whole block, of points of which there are no lists.
+// Draws points without lists. Called by the whole block.
 static __device__ __noinline__ void DrawUnsortedPoints(const PlacedPoint* points, uint32_t count) {
   const uint32_t region = SharedRegion().region;
   const RegionWords words(SharedRegion().words);

@@ -11,7 +11,7 @@ namespace {
 constexpr size_t kLeast = 4096;
 constexpr size_t kKeptBytes = 64 << 20;  // are kept, however little is in use
 
-// In eighths of a power of two, so that a little more or less of something fits the same block.
+// Rounds up to eighths of a power of two, so that slightly different sizes fit the same block.
 size_t RoundUp(size_t size) {
   size = std::max(size, kLeast);
   const size_t step = std::bit_floor(size) / 8;

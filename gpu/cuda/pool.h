@@ -1,9 +1,10 @@
-// Device memory that is kept: blocks come from a pool of those given back, so a loop of frames that
-// needs what the one before needed allocates nothing.
+// Cached device memory: blocks come from a pool of released blocks, so a loop of frames with
+// similar needs allocates nothing.
 //
-// All work on the blocks is ordered by one stream: a block given back may be handed out again at
-// once. Who has work on them done in another stream beside has that wait for the first, and the first
-// for it before any block goes back. A pool may be a part of another, with a limit of its own.
+// All work on the blocks is ordered by one stream, so a released block may be handed out again at
+// once. Work on them in another stream must wait for the first stream, and the first stream must
+// wait for it before any block is released. A pool may be a part of another, with a limit of its
+// own.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +21,7 @@ namespace voxeld::gpu::cuda {
 
 class Pool;
 
-// A block of device memory; goes back to its pool.
+// A block of device memory, which returns to its pool when it is destroyed.
 class Block {
  public:
   Block() = default;
@@ -46,22 +47,22 @@ class Block {
   size_t size_ = 0;
 };
 
-// Thread-bound. Outlives its blocks.
+// Thread-bound. Must outlive its blocks.
 class Pool {
  public:
   explicit Pool(Api& api) : api_(api) {}
-  // A part of `whole`, which outlives it: what it holds counts there, too. It never holds more than
-  // `limit` bytes.
+  // Creates a part of `whole`, which must outlive it: memory that it holds counts in `whole`, too.
+  // It never holds more than `limit` bytes.
   Pool(Pool& whole, size_t limit);
   ~Pool();
   Pool(const Pool&) = delete;
   Pool& operator=(const Pool&) = delete;
 
-  // At least `size` bytes, 256-byte aligned. ResourceExhausted if the device has none left, or the
-  // limit is reached, even after what is kept has been freed.
+  // Returns at least `size` bytes, 256-byte aligned. Errors: ResourceExhausted if the device has no
+  // memory left, or the limit is reached, even after cached blocks have been freed.
   absl::StatusOr<Block> Acquire(size_t size);
   // The same for `count` values, with room to grow: a block that is too small is replaced, and its
-  // first `keep` values are copied over in `stream`.
+  // first `keep` values are copied in `stream`.
   template <typename T>
   absl::Status Grow(Block& block, size_t count, size_t keep, cudaStream_t stream) {
     if (count * sizeof(T) <= block.size()) return absl::OkStatus();
@@ -81,7 +82,8 @@ class Pool {
 
   // Starts to measure the peak of used(), here and in the parts.
   void BeginPeak();
-  // Frees the kept blocks of each pool (this one and its parts) that holds more than twice its peak since BeginPeak, plus 64 MiB.
+  // Frees the kept blocks of each pool (this one and its parts) that holds more than twice its peak
+  // since BeginPeak, plus 64 MiB.
   // Blocks until the device is idle.
   void TrimAfterPeak();
 
@@ -95,9 +97,9 @@ class Pool {
     free_.emplace(size, data);
     used_ -= size;
   }
-  // Whether there was anything.
+  // Returns whether there was anything to free.
   bool FreeKept();
-  // Of the whole that this is a part of, and of all its parts.
+  // Frees the cached blocks of the whole pool that this is a part of, and of all its parts.
   bool FreeAllKept();
   Block HandOut(void* data, size_t size) {
     used_ += size;

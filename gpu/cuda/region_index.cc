@@ -26,11 +26,11 @@ void RegionIndex::Reset(const TileGrid& grid, std::span<const uint8_t> owned) {
     }
   }
   for (int a = 0; a < 3; ++a) {
-    grid_.drawn_lo[a] = std::min(lo[a], hi[a]);  // none: nothing is drawn
+    grid_.drawn_lo[a] = std::min(lo[a], hi[a]);  // if empty, nothing is drawn
     grid_.drawn_hi[a] = hi[a];
   }
   merge_ = false;
-  // So that whatever they are, their places can be counted in 32 bits.
+  // For any items, their places can then be counted in 32 bits.
   most_items_ = uint64_t{0xFFFFFFFFu} / MostRegions();
 }
 
@@ -198,7 +198,7 @@ absl::Status RegionIndex::Sort(Batch& batch, uint8_t* region_dirty) {
   return Defer(batch, region_dirty);
 }
 
-// An error leaves the batch as it was, unless it is one of marking.
+// An error leaves the batch as it was, unless marking failed.
 absl::Status RegionIndex::Defer(Batch& batch, uint8_t* region_dirty) {
   absl::StatusOr<Block> regions = device_.Zeros(grid_.block_count() * sizeof(uint64_t));
   if (!regions.ok()) return regions.status();
@@ -251,7 +251,7 @@ absl::StatusOr<bool> RegionIndex::SortWithin(const RegionGrid& within, const See
   bool all = true;
   for (auto& [number, batch] : batches_) {
     if (!batch.deferred || !seen(batch.layer)) continue;
-    Block regions;  // the batch's own say more
+    Block regions;  // the batch's own cover more
     const uint64_t list_bytes = batch.list_bytes, sort_bytes = batch.sort_bytes;
     const absl::Status status = SortExactly(batch, regions, drawn, nullptr);
     batch.list_bytes = list_bytes;
@@ -279,7 +279,7 @@ absl::Status RegionIndex::MergeFrom(const std::vector<uint64_t>& numbers) {
   struct Range {
     const Batch* batch;
     std::vector<uint32_t> from;
-    std::vector<uint64_t> first;  // in the merged one; the end last
+    std::vector<uint64_t> first;  // in the merged batch; the end is last
   };
   std::vector<Range> ranges;
   for (const uint64_t number : numbers) {
@@ -313,7 +313,7 @@ absl::Status RegionIndex::MergeFrom(const std::vector<uint64_t>& numbers) {
   }
   if (absl::Status status = Sort(merged, nullptr); !status.ok()) return status;
   if (merged.deferred) {
-    // It may be that there is room but for their lists.
+    // There may be enough memory if their lists are dropped.
     bool dropped = false;
     for (const uint64_t old : numbers) {
       Batch& batch = batches_.at(old);
@@ -348,7 +348,7 @@ absl::Status RegionIndex::Merge() {
         const Batch& other = batches_.at(order[j].second);
         if (other.layer != batch.layer) continue;
         if (uint64_t{other.count} + batch.count > most_items_) continue;
-        // Or what has its lists might lose them.
+        // Otherwise a batch that has lists might lose them.
         if (other.deferred != batch.deferred && !crowded) continue;
         if (crowded || other.count / 2 <= batch.count) {
           chosen = {order[i].second, order[j].second};

@@ -1,4 +1,4 @@
-// A region being drawn, in shared memory: the words of the layer under way.
+// A region being drawn, in shared memory: the words of the current layer.
 #pragma once
 
 #include "gpu/assemble/blend.h"
@@ -13,24 +13,24 @@ inline constexpr uint32_t kDrawWarps = kDrawThreads / 32;
 inline constexpr uint32_t kSpansOfLane = 3;  // that a warp sorts at once
 inline constexpr uint32_t kSpansOfWarp = 32 * kSpansOfLane;
 inline constexpr uint32_t kMostSpans = kDrawWarps * kSpansOfWarp;
-inline constexpr uint32_t kSegments = 256;   // of a region's spans, that are looked at at once
-inline constexpr uint32_t kRegionTiles = 4;  // bit 0: the further in x, bit 1: in y
+inline constexpr uint32_t kSegments = 256;   // of a region's spans, that are handled at once
+inline constexpr uint32_t kRegionTiles = 4;  // bit 0: the farther in x, bit 1: in y
 
-// The number of a voxel of a region: x fastest, then y.
+// Returns the index of a voxel in a region: x fastest, then y.
 __device__ inline uint32_t IndexInRegion(int32_t x, int32_t y, int32_t z) {
   return static_cast<uint32_t>(z & 15) << 10 | static_cast<uint32_t>(y & 31) << 5 |
          static_cast<uint32_t>(x & 31);
 }
 
-// What is done with the layer under way.
+// The next step for the current layer.
 enum class DrawStep : uint32_t {
-  kNone,   // there is none any more
-  kSkip,   // nothing: it has nothing here to be seen
-  kMask,   // what it covers is the mask of the one that follows
-  kLayer,  // it is blended, as far as its mask has it
+  kNone,   // no layer is left
+  kSkip,   // nothing: it has nothing visible here
+  kMask,   // the voxels that it covers are the mask of the next layer
+  kLayer,  // it is blended, within its mask
 };
 
-// Which layer is looked for: that of the least rank beyond `last` that is seen, or one by its slot.
+// The layer to find: the visible one of the least rank beyond `last`, or one by its slot.
 struct LayerWanted {
   int32_t last = -1;
   uint32_t slot = kAllLanes;  // kAllLanes: any
@@ -41,41 +41,42 @@ struct LayerWanted {
 };
 
 struct RegionScratch {
-  // 0 whenever the drawing of a region begins: who writes it out leaves it so.
+  // All 0 when the drawing of a region begins: the function that writes it out resets them.
   alignas(16) uint32_t words[kRegionVoxels];
-  uint32_t line_batches, point_batches, triangle_batches;  // bits: those of the layer under way
-  uint32_t layer;                                          // its slot; kAllLanes: no more
+  uint32_t line_batches, point_batches, triangle_batches;  // bits: those of the current layer
+  uint32_t layer;                                          // its slot; kAllLanes: none is left
   uint32_t cutting;                // bits: which of its half-spaces cut the region
-  uint32_t outside;                // not 0: all of the region lies outside one of them
-  uint32_t region;                 // kAllLanes: there is none any more
-  uint32_t place;                  // in the list, of the one after it
+  uint32_t outside;                // not 0: the whole region lies outside one of them
+  uint32_t region;                 // kAllLanes: none is left
+  uint32_t place;                  // in the list, of the next region
   alignas(16) uint32_t least[64];  // PackedView::least of the first sub-frame
   uint32_t lit[kRegionTiles], differs[kRegionTiles];
   unsigned long long lit_change;  // of all regions that the block has drawn
-  uint32_t pairs;                 // not 0: the layer has some here, or items that are not listed
+  uint32_t pairs;                 // not 0: the layer has some here, or unlisted items
   DrawStep step;
   LayerWanted wanted;
-  uint32_t under;  // the layer whose mask is wanted; kAllLanes: none
+  uint32_t under;  // the layer whose mask is to be found; kAllLanes: none
 };
 
-// What lines are drawn with.
+// Scratch memory for drawing lines.
 struct SpanScratch {
   LineSpan spans[kMostSpans];        // a part for each warp
   uint32_t buckets[kDrawWarps][32];  // of its spans by length
-  // Segments of spans: how many lie before each, and what is to be added to a span's number among all
-  // to find it.
+  // Segments of spans: how many spans lie before each, and the number that has to be added to a
+  // span's number to find it.
   uint32_t segment_first[kSegments], segment_from[kSegments];
   uint32_t segments, spans_found;
 };
 
-// What points are drawn with: rows of records that are more than a thread draws by itself.
+// Scratch memory for drawing points: rows of records that are too many for a thread.
 struct PointScratch {
   const PlacedPoint* from[kDrawThreads];
   uint32_t count[kDrawThreads];
   uint32_t segments;
 };
 
-// What a block of threads draws, first in its shared memory; and behind it, what for.
+// The region that a block of threads draws comes first in its shared memory; the scratch memory for
+// drawing follows.
 __device__ inline unsigned char* SharedMemory() {
   extern __shared__ __align__(16) unsigned char shared_memory[];
   return shared_memory;
@@ -83,20 +84,21 @@ __device__ inline unsigned char* SharedMemory() {
 __device__ inline RegionScratch& SharedRegion() {
   return *reinterpret_cast<RegionScratch*>(SharedMemory());
 }
-// Behind the region. Who is not inlined asks here for what it needs, so that it is known to lie in
-// shared memory.
+// The memory after the region. Functions that are not inlined get their scratch memory here, so
+// that the compiler knows that it is shared memory.
 template <class Scratch>
 __device__ inline Scratch& SharedBehind() {
   static_assert(sizeof(RegionScratch) % 16 == 0);
   return *reinterpret_cast<Scratch*>(SharedMemory() + sizeof(RegionScratch));
 }
-// The word of a colour, where `word` is that of another.
+// Returns the word of a colour, where `word` is that of another colour.
 __device__ inline uint32_t Recolored(uint32_t word, uint32_t rgb) {
   return (word & ~kColorMask) | Interleave(rgb);
 }
 
-// Raises an item's voxels into the region's words. One type for all primitives, so that they share what they have in
-// common, as lines; and it holds its state itself, so that this stays in registers where a function has a copy.
+// Raises an item's voxels into the region's words. It is one type for all primitives, so that they
+// share code such as that of lines; and it holds its state itself, so that the state stays in
+// registers where a function has a copy.
 class RaiseVoxel {
  public:
   // word: of colour 0; if not `recolor`, of every colour.
@@ -110,7 +112,7 @@ class RaiseVoxel {
   }
 
  private:
-  uint32_t word_, rgb_ = 0;  // of the voxel before
+  uint32_t word_, rgb_ = 0;  // of the previous voxel
   bool recolor_;
 };
 
@@ -120,19 +122,21 @@ __device__ inline PointScratch& SharedPoints() {
   return *reinterpret_cast<PointScratch*>(SharedMemory() + sizeof(RegionScratch));
 }
 
-// Of the layer under way: rows of pairs, of a tile and a batch each.
+// For the current layer: rows of pairs, one for each tile and batch.
 struct PairRows {
   uint32_t begin[kRegionTiles][kMaxBatches], end[kRegionTiles][kMaxBatches];
-  uint32_t tile[kRegionTiles];  // their numbers; kAllLanes: it is not owned
-  uint32_t owned;               // bits: which are
+  uint32_t tile[kRegionTiles];  // their numbers; kAllLanes: not owned
+  uint32_t owned;               // bits: the owned ones
 };
 
-// A region's place: its tiles' numbers, kAllLanes where there is none or it is not owned.
+// The place of a region: the numbers of its tiles, kAllLanes for those that do not exist or are not
+// owned.
 struct RegionPlace {
-  Box3 box;  // of its voxels in the volume
+  Box3 box;  // its voxels in the volume
   int32_t tile[3];
 
-  // Of the region under way. Worked out where it is asked for, rather than kept while it is drawn.
+  // Computes the place of the current region. It is computed where needed rather than stored while
+  // the region is drawn.
   __device__ RegionPlace(const DrawView& view, const RegionScratch& scratch) {
     const uint32_t region = *static_cast<const volatile uint32_t*>(&scratch.region);
     int32_t at[3];
@@ -157,7 +161,7 @@ __device__ inline uint32_t LayerOf(uint64_t key) {
   return static_cast<uint32_t>(key) & (kMaxLayers - 1);
 }
 
-// The pairs of a tile, in a batch, that are of the layer of the least rank that is wanted.
+// Finds the pairs of a tile, in a batch, that belong to the wanted layer of the least rank.
 __device__ inline void FindPairs(const DrawView& view, const BatchView& batch, uint32_t tile,
                                  const LayerWanted& wanted, int32_t& best, uint32_t& begin,
                                  uint32_t& end, int32_t& least, uint32_t& layer) {
@@ -188,9 +192,9 @@ __device__ inline void FindPairs(const DrawView& view, const BatchView& batch, u
   }
 }
 
-// The layer of the least rank that is wanted and has something in the region, and what. By the first
-// warp: a lane looks after a batch, of pairs after a tile's part of some. kAll: there may be pairs,
-// and what has no lists.
+// Finds the wanted layer of the least rank that has something in the region, and its items. Called
+// by the first warp: a lane handles a batch; for pairs, a tile's part of some batches. kAll: there
+// may be pairs, and items without lists.
 template <bool kAll>
 __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place,
                              const LayerWanted& wanted, RegionScratch& scratch, PairRows* rows) {
@@ -270,7 +274,7 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place,
     scratch.triangle_batches = triangles;
   }
   __syncwarp();
-  // The same in all that have it.
+  // The layer is the same in all lanes that have it.
   const uint32_t having = __ballot_sync(kAllLanes, mine == least && least != kNone);
   if (having != 0 && lane == static_cast<uint32_t>(__ffs(static_cast<int>(having))) - 1) {
     scratch.layer = layer;
@@ -278,8 +282,8 @@ __device__ int32_t NextLayer(const DrawView& view, const RegionPlace& place,
   return least;
 }
 
-// How the layer found lies to the region. By the first warp: a lane looks after a half-space, the last ones after
-// cylinders.
+// Computes on which side of its clips the region lies, for the layer found. Called by the first
+// warp: a lane handles a half-space, the last lanes handle cylinders.
 constexpr uint32_t kFirstCylinder = 32 - kMaxClipCylinders;
 static_assert(kMaxHalfSpaces <= kFirstCylinder);
 __device__ inline void ClipRegion(const DrawView& view, const Box3& box, RegionScratch& scratch) {
@@ -289,7 +293,7 @@ __device__ inline void ClipRegion(const DrawView& view, const Box3& box, RegionS
   if (scratch.layer != kAllLanes) {
     const LayerLook& look = view.layers[scratch.layer];
     if (lane < look.half_spaces) side = SideOf(view.half_spaces[look.first_half_space + lane], box);
-    const uint32_t cylinder = lane - kFirstCylinder;  // of other lanes more than there can be
+    const uint32_t cylinder = lane - kFirstCylinder;  // in other lanes greater than any count
     if (cylinder < look.cylinders) {
       side = SideOf(view.cylinders[look.first_cylinder + cylinder], box);
     }
@@ -302,7 +306,7 @@ __device__ inline void ClipRegion(const DrawView& view, const Box3& box, RegionS
   }
 }
 
-// What cuts a region of what the layer found has: bits of ClipRegion, of these.
+// The clips of the found layer that cut the region: the bits of ClipRegion.
 struct CutBy {
   const VoxelHalfSpace* half_spaces = nullptr;
   const VoxelCylinder* cylinders = nullptr;
@@ -312,7 +316,7 @@ struct CutBy {
     return {view.half_spaces + look.first_half_space, view.cylinders + look.first_cylinder,
             cutting};
   }
-  // Whether a voxel of the region (its place there) lies inside all of it.
+  // Returns whether a voxel of the region (given by its index) lies inside all of them.
   __device__ bool Keeps(const Box3& box, uint32_t v) const {
     const int32_t x = box.lo[0] + static_cast<int32_t>(v & 31),
                   y = box.lo[1] + static_cast<int32_t>(v >> 5 & 31),

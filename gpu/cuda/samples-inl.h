@@ -1,7 +1,8 @@
-// A grid of samples in a tile, by a block of threads: what primitives/samples.h says of each voxel, with what
-// is the same for a column of them worked out once. Of LINEAR numbers, the samples around the tile
-// go into shared memory first, if they are not too many: a voxel reads eight of them. At a level,
-// depths go there, of the tile and one voxel around it, so that each is worked out once.
+// Draws a grid of samples in a tile, by a block of threads, as primitives/samples.h defines each
+// voxel; terms that are the same for a column of voxels are computed once. For LINEAR numbers, the
+// samples around the tile are first loaded into shared memory, if they are not too many: a voxel
+// reads eight of them. For a level, the depths of the tile's voxels and of one voxel around it are
+// stored there, so that each is computed once.
 #pragma once
 
 #include <type_traits>
@@ -13,20 +14,20 @@
 
 namespace voxeld::gpu::cuda {
 
-// Samples around a tile, and what else drawing it takes.
+// The samples around a tile, and the other data for drawing it.
 struct NearSamples {
   static constexpr int32_t kMostSide = 32;  // along x and y
   static constexpr int32_t kMost = 9216;
 
   uint32_t table[SampleHead::kTableEntries];  // words; 0: nothing
   alignas(16) float step[kTileSize]
-                        [4];  // of the voxels of a column: the part of coordinates that changes
-  int32_t lo[3], size[3];     // of the samples: from −1, for one before the grid, on
-  bool fit;                   // they are not too many
-  bool within;                // all voxels are, of the grid
+                        [4];  // for the voxels of a column: the part of coordinates that changes
+  int32_t lo[3], size[3];     // of the samples: from −1 on, which is one before the grid
+  bool fit;                   // the samples are not too many
+  bool within;                // all voxels are within the grid
   alignas(16) float samples[kMost];  // x fastest; beyond the grid its edge
 
-  // Rows along x lie so far apart.
+  // Returns the distance between rows along x.
   __device__ int32_t row() const { return (size[0] + 1) & -2; }
 };
 
@@ -39,7 +40,7 @@ struct SampleScratch {
   };
 };
 
-// Numbers around a place. `Number` is how they lie in memory.
+// Reads numbers around a place. `Number` is their type in memory.
 template <class Number>
 struct SampleReader {
   const Number* samples;
@@ -53,8 +54,8 @@ struct SampleReader {
     return static_cast<float>(__ldg(samples + row + x));
   }
 
-  // As Samples::Find and ValueIn; false outside of the grid. Without branches, so that several go on at once:
-  // outside, what is read is the grid's edge.
+  // The same as Samples::Find and ValueIn; returns false outside the grid. It has no branches, so
+  // that several evaluations overlap: outside, it reads the grid's edge.
   template <bool kNearest>
   __device__ bool Value(const float q[3], float* value) const {
     uint32_t first[3], second[3];
@@ -64,7 +65,7 @@ struct SampleReader {
       in = in && q[a] >= 0 && q[a] < static_cast<float>(size[a]);
       const int32_t last = static_cast<int32_t>(size[a]) - 1;
       const float p = kNearest ? q[a] : q[a] - 0.5f;
-      // Of what is far outside, which fits no whole number, a place at the edge.
+      // A place far outside, which does not fit in an integer, is clamped to the edge.
       const int32_t whole = static_cast<int32_t>(Clamp(p, 0.0f, static_cast<float>(last)));
       const int32_t below = !kNearest && p < 0 ? -1 : whole;
       first[a] = static_cast<uint32_t>(Clamp(below, 0, last));
@@ -87,7 +88,8 @@ struct SampleReader {
   }
 };
 
-// The grid's coordinates of voxels along z: Solid::Canonical, with the part that does not change first.
+// The grid's coordinates of voxels along z: Solid::Canonical, with the part that does not change
+// first.
 struct SampleColumn {
   float base[3];
 
@@ -101,7 +103,8 @@ struct SampleColumn {
   }
 };
 
-// Which samples voxels look at, and what their columns' coordinates change by. By a warp.
+// Finds the samples that voxels need, and the changes of coordinates along columns. Called by a
+// warp.
 __device__ inline void FindNear(const Solid& s, const SampleHead& head, const Box3& part,
                                 NearSamples& near) {
   const int32_t lane = static_cast<int32_t>(threadIdx.x % 32);
@@ -112,7 +115,7 @@ __device__ inline void FindNear(const Solid& s, const SampleHead& head, const Bo
   int32_t lo = 0, size = 0;
   bool within = true;
   if (lane < 3) {
-    // Of voxels' centres; in double, with room for the rounding of singles.
+    // The range of voxels' centres, in double, with a margin for rounding in single precision.
     double low = 0, high = 0, terms = 0;
     for (int c = 0; c < 3; ++c) {
       const double row = static_cast<double>(s.inverse[lane][c]);
@@ -127,8 +130,8 @@ __device__ inline void FindNear(const Solid& s, const SampleHead& head, const Bo
     size = NearSamples::kMost + 1;
     constexpr double kFar = 1e9;
     if (low > -kFar && high < kFar) {
-      // From the first sample of the first voxel to the second of the last, as far as there are any
-      // and their edge.
+      // From the first sample of the first voxel to the second of the last, within the grid and its
+      // edge.
       const double first = Clamp(low - room - 0.5, -1.0, samples - 1),
                    last = Clamp(high + room - 0.5, -1.0, samples - 1);
       lo = static_cast<int32_t>(FloorToInt(first));
@@ -147,7 +150,7 @@ __device__ inline void FindNear(const Solid& s, const SampleHead& head, const Bo
   }
 }
 
-// Sixteen threads have a row, two samples each.
+// Sixteen threads load a row, two samples each.
 template <class Number>
 __device__ inline void LoadNear(const SampleReader<Number>& reader, NearSamples& near) {
   const int32_t x = static_cast<int32_t>(threadIdx.x % 16) * 2,
@@ -168,13 +171,14 @@ __device__ inline void LoadNear(const SampleReader<Number>& reader, NearSamples&
   }
 }
 
-// A thread has every second voxel of a column of the tile.
+// A thread handles every second voxel of a column of the tile.
 inline constexpr uint32_t kSampleColumns = kTileSize * kTileSize,
                           kSampleStep = kDrawThreads / kSampleColumns;
 static_assert(kDrawThreads % kSampleColumns == 0);
 
-// Draws numbers through the table, by samples in shared memory. kPlain: all voxels lie within the grid,
-// and all numbers are some. A function of its own, as what follows: one copy for all kinds of numbers.
+// Draws numbers through the table, from samples in shared memory. kPlain: all voxels lie within the
+// grid, and no number is NaN. Not inlined, like the functions below: one copy for all types of
+// numbers.
 template <bool kPlain>
 static __device__ __noinline__ void DrawNear(const Solid& s, const SampleHead& head,
                                              const Box3& part) {
@@ -218,7 +222,7 @@ static __device__ __noinline__ void DrawNear(const Solid& s, const SampleHead& h
                              above[0], above[1], last[0],   last[1]};
     const float value = Samples::MixCorners(corner, t);
     const float place = (value - low) * scale;
-    // What is no number is 0 here, as in Samples::EntryOf.
+    // NaN becomes 0 here, as in Samples::EntryOf.
     const float entry = fminf(fmaxf(place, 0.0f), 255.0f);
     const uint32_t word = near.table[__float_as_uint(__fadd_rd(entry, kWhole)) & 0xFF];
     if (word == 0 || (!kPlain && implicit::IsNan(value))) continue;
@@ -226,7 +230,8 @@ static __device__ __noinline__ void DrawNear(const Solid& s, const SampleHead& h
   }
 }
 
-// The table's words, and of LINEAR numbers which samples the tile's voxels look at. By the whole block.
+// Prepares the table's words and, for LINEAR numbers, the samples that the tile's voxels need.
+// Called by the whole block.
 static __device__ __noinline__ void PrepareNumbers(const TableEntry& entry, const Box3& part) {
   NearSamples& near = SharedBehind<SampleScratch>().near;
   const Source& source = entry.source;
@@ -244,7 +249,7 @@ static __device__ __noinline__ void PrepareNumbers(const TableEntry& entry, cons
   __syncthreads();
 }
 
-// Numbers through the table.
+// Draws numbers through the table.
 template <class Number, bool kNearest>
 __device__ void DrawNumbers(const TableEntry& entry, const SampleView& view, const Box3& part,
                             uint32_t* words, SampleScratch& scratch) {
@@ -298,7 +303,7 @@ __device__ void DrawNumbers(const TableEntry& entry, const SampleView& view, con
   __syncthreads();
 }
 
-// Depths of the tile's voxels and those around it. By the whole block.
+// Computes the depths of the tile's voxels and those around it. Called by the whole block.
 template <class Number, bool kNearest>
 __device__ void FindDepths(const TableEntry& entry, const SampleView& view, const Box3& part,
                            SampleScratch& scratch) {
@@ -334,7 +339,8 @@ __device__ void FindDepths(const TableEntry& entry, const SampleView& view, cons
   __syncthreads();
 }
 
-// Raises the voxels that depths say to be covered, as Samples::IsAtLevel. By the whole block.
+// Raises the voxels that are covered according to the depths, as Samples::IsAtLevel. Called by the
+// whole block.
 static __device__ __noinline__ void RaiseLevel(const TableEntry& entry, const Box3& part) {
   constexpr int32_t kRows = SampleScratch::kRows;
   uint32_t* const words = SharedRegion().words;
@@ -352,7 +358,7 @@ static __device__ __noinline__ void RaiseLevel(const TableEntry& entry, const Bo
     const float depth = *at;
     const bool inside = depth <= 0;
     bool covered = solid && inside;
-    // Of a neighbour: it is on the other side, and not nearer to the level.
+    // Tests whether a neighbour is on the other side, and not nearer to the level.
     const auto faces = [&](int32_t step) {
       const float other = at[step];
       return (other <= 0) != inside && Abs(depth) <= Abs(other);
@@ -380,7 +386,7 @@ static __device__ __noinline__ void RaiseLevel(const TableEntry& entry, const Bo
   __syncthreads();
 }
 
-// Of any kind: colours, and grids with more samples than 32 bits count.
+// Draws any grid: colours, and grids with more samples than 32 bits can count.
 __device__ inline void DrawAnySamples(const TableEntry& entry, const Box3& part, uint32_t* words) {
   const uint32_t nx = static_cast<uint32_t>(part.hi[0] - part.lo[0]),
                  ny = static_cast<uint32_t>(part.hi[1] - part.lo[1]),

@@ -1,4 +1,4 @@
-// Boxes, spheres and cylinders, raised into a region's words.
+// Raises boxes, spheres and cylinders into a region's words.
 #pragma once
 
 #include "gpu/cuda/region_scratch-inl.h"
@@ -6,8 +6,8 @@
 
 namespace voxeld::gpu::cuda {
 
-// A solid in a tile, by the whole block: rows of what is inside, with a rim, then what is seen of
-// them.
+// Draws a solid in a tile, by the whole block: rows of inside voxels, with a rim, and then the
+// visible ones among them.
 template <class Shape>
 __device__ void DrawSolid(const TableEntry& entry, const Box3& box, uint32_t* words,
                           SolidBlock& block) {
@@ -52,11 +52,12 @@ __device__ void DrawSolid(const TableEntry& entry, const Box3& box, uint32_t* wo
   __syncthreads();
 }
 
-// Of a plane's rows of bits, one a lane, those whose neighbours are all inside, as SolidBlock::Enclosed; by a warp.
+// Returns those voxels whose neighbours are all inside, for a plane's rows of bits, one per lane,
+// as SolidBlock::Enclosed. Called by a warp.
 __device__ inline uint32_t EnclosedInPlane(uint32_t below, uint32_t here, uint32_t above,
                                            SurfaceRule rule) {
   const uint32_t lane = threadIdx.x % 32;
-  const auto both = [&](uint32_t rows) {  // those beside it along y
+  const auto both = [&](uint32_t rows) {  // those next to it along y
     return __shfl_sync(kAllLanes, rows, lane - 1 & 31) &
            __shfl_sync(kAllLanes, rows, lane + 1 & 31);
   };
@@ -66,8 +67,8 @@ __device__ inline uint32_t EnclosedInPlane(uint32_t below, uint32_t here, uint32
   return rows & both(rows);
 }
 
-// A solid in a tile, by a warp: a plane at a time, of which lane y has row y, voxel x − x0 as a bit. As many rows as fit are
-// looked at at once, a lane for each voxel.
+// Draws a solid in a tile, by a warp: a plane at a time, of which lane y has row y, with voxel x −
+// x0 as a bit. As many rows as fit are handled at once, with a lane for each voxel.
 template <class Shape>
 __device__ void DrawSolidByWarp(const TableEntry& entry, const Box3& box, uint32_t* words) {
   const Solid& s = entry.source.solid;
@@ -136,14 +137,14 @@ __device__ inline void DrawSolidByWarp(const TableEntry& entry, const Box3& box,
   }
 }
 
-// Solids so small that a warp works out all that one has in a region as columns along z, with a rim
-// of one voxel.
+// Solids so small that a warp computes the whole part of one in a region as columns along z, with a
+// rim of one voxel.
 struct SmallSolids {
-  static constexpr int32_t kReach = 8;  // voxels from the origin's
+  static constexpr int32_t kReach = 8;  // voxels from the origin's voxel
   static constexpr int32_t kSide = 2 * kReach + 1;
   static constexpr uint32_t kColumns = (kSide + 2) * (kSide + 2);
 
-  // Each warp's, x fastest: bit i is voxel i − 1 along z of what is drawn.
+  // For each warp, x fastest: bit i is voxel i − 1 along z of the drawn part.
   uint32_t columns[kDrawWarps][kColumns];
 
   __device__ static bool Has(const Solid& s) {
@@ -156,8 +157,8 @@ struct SmallSolids {
   }
 };
 
-// Of `count` voxels along z, as bits from `bit` on, those inside. base: the part of canonical
-// coordinates that does not change; step: what they change by with dz.
+// Returns the inside voxels among `count` voxels along z, as bits from `bit` on. base: the part of
+// canonical coordinates that does not change; step: their change with dz.
 template <class Shape>
 __device__ inline uint32_t InsideColumn(const float base[3], const float step[3], float dz,
                                         uint32_t bit, int32_t count) {
@@ -168,7 +169,7 @@ __device__ inline uint32_t InsideColumn(const float base[3], const float step[3]
     for (int r = 0; r < 3; ++r) q[r] = base[r] + step[r] * dz;
     if (Shape::Contains(q)) inside |= bit;
     bit <<= 1;
-    dz += 1.0f;  // exact: not far from the origin
+    dz += 1.0f;  // exact, because it is near the origin
   }
   return inside;
 }
@@ -186,8 +187,8 @@ __device__ inline uint32_t InsideColumn(PrimitiveKind kind, const float base[3],
   }
 }
 
-// Of a column, which lies at `at` among others, `width` in a row, those voxels whose neighbours are
-// all inside.
+// Returns those voxels of a column whose neighbours are all inside; the column is at `at` among
+// others, `width` in a row.
 __device__ inline uint32_t EnclosedInColumn(const uint32_t* at, int32_t width, SurfaceRule rule) {
   const auto along = [](uint32_t column) { return column & column << 1 & column >> 1; };
   if (rule == SurfaceRule::kThin) return along(*at) & at[-1] & at[1] & at[-width] & at[width];
@@ -198,7 +199,7 @@ __device__ inline uint32_t EnclosedInColumn(const uint32_t* at, int32_t width, S
   return all;
 }
 
-// bits: as SmallSolids has them; place: of bit 0.
+// bits: in the format of SmallSolids; place: the index of bit 0.
 __device__ inline void RaiseColumn(uint32_t* words, uint32_t place, uint32_t bits, uint32_t word) {
   for (; bits != 0; bits &= bits - 1) {
     const uint32_t bit = static_cast<uint32_t>(__ffs(static_cast<int>(bits))) - 1;
@@ -206,7 +207,7 @@ __device__ inline void RaiseColumn(uint32_t* words, uint32_t place, uint32_t bit
   }
 }
 
-// A small solid in a region, by a warp. columns: the warp's.
+// Draws a small solid in a region, by a warp. columns: the warp's.
 __device__ inline void DrawSmallSolid(const TableEntry& entry, const Box3& region, uint32_t* words,
                                       uint32_t* columns) {
   const Solid& s = entry.source.solid;
@@ -214,7 +215,8 @@ __device__ inline void DrawSmallSolid(const TableEntry& entry, const Box3& regio
   if (IsEmpty(part)) return;  // the same for every lane
   const bool surface = entry.record.fill == Fill::kSurface;
   const uint32_t word = MakeWord(entry.priority, entry.erase != 0, entry.source.UniformColor());
-  // What is looked at: of a surface the rim as well, beyond the bounds there is nothing.
+  // Which voxels are tested: for a surface the rim too, where voxels beyond the bounds are not
+  // inside.
   const int32_t rim = surface ? 1 : 0;
   int32_t lo[3], hi[3], origin[3], rest[3];
   for (int a = 0; a < 3; ++a) {
@@ -223,7 +225,7 @@ __device__ inline void DrawSmallSolid(const TableEntry& entry, const Box3& regio
     origin[a] = static_cast<int32_t>(s.origin[a]);
     rest[a] = kHalfVoxel - static_cast<int32_t>(s.rest[a]);
   }
-  // Solid::Distance, in 32 bits.
+  // The same as Solid::Distance, in 32 bits.
   const auto distance = [&](int a, int32_t voxel) {
     return static_cast<float>((voxel - origin[a]) * static_cast<int32_t>(kUnitsPerVoxel) +
                               rest[a]) *
@@ -239,7 +241,7 @@ __device__ inline void DrawSmallSolid(const TableEntry& entry, const Box3& regio
     for (int32_t i = lane; i < row * (hi[1] - lo[1] + 2); i += 32) columns[i] = 0;
     __syncwarp();
   }
-  const int32_t per = 65536 / width + 1;  // i·per / 65536 is i / width: they are few
+  const int32_t per = 65536 / width + 1;  // i·per / 65536 is i / width for these small numbers
   const float step[3] = {s.inverse[0][2], s.inverse[1][2], s.inverse[2][2]};
   const float dz = distance(2, lo[2]);
   for (int32_t i = lane; i < count; i += 32) {

@@ -1,4 +1,4 @@
-# The engine on CUDA: what nvcc compiles, headers that these alone include, and the host's part.
+# The engine on CUDA: the sources for nvcc, headers that only these include, and the host's part.
 set(VOXELD_CUDA_KERNELS
   kernels_draw_all.cu kernels_draw_lines.cu
   kernels_few_lines.cu kernels_filled.cu kernels_generate.cu kernels_implicit.cu kernels_index.cu kernels_line_regions.cu
@@ -10,7 +10,7 @@ set(VOXELD_CUDA_HOST
   api.cc broadcast_plan.cc compiled_formulas.cc cpu_voxels.cc cuda_core.cc cuda_engine.cc cuda_generator.cc cuda_pictures.cc cuda_volume.cc
   cuda_volume_arrays.cc cuda_volume_crowds.cc cuda_volume_enter.cc cuda_volume_implicit.cc cuda_volume_passes.cc device.cc formula_source.cc line_index.cc nccl.cc nvrtc.cc opened_library.cc packed_plan.cc pair_index.cc pin.cc point_index.cc pool.cc
   region_index.cc stopwatch.cc triangle_index.cc upload_plan.cc uploader.cc)
-# What a kernel that is compiled at run time includes: the host's part has it as text.
+# The files that a kernel compiled at run time includes: the host's part embeds their text.
 set(VOXELD_FORMULA_SOURCES
   gpu/portable.h gpu/implicit/number.h gpu/implicit/interval.h gpu/implicit/dual.h gpu/implicit/row.h gpu/cuda/covered_types.h
   gpu/cuda/covered-inl.h)

@@ -1,4 +1,4 @@
-// The spans of thin lines, raised into a region's words.
+// Raises the spans of thin lines into a region's words.
 #pragma once
 
 #include "gpu/cuda/lines-inl.h"
@@ -6,14 +6,14 @@
 
 namespace voxeld::gpu::cuda {
 
-// MixColors of words' colours, where both have the same priority and neither erases.
+// The same as MixColors for words' colours, if both have the same priority and neither erases.
 __device__ inline uint32_t MixWords(uint32_t start, uint32_t end, int32_t k, int32_t n) {
   const uint32_t mixed =
       MixColors(Deinterleave(start & kColorMask), Deinterleave(end & kColorMask), k, n);
   return (start & ~kColorMask) | Interleave(mixed);
 }
 
-// But for n: a register that is loaded and not used would be waited for where it is used anew.
+// Loads everything except n: the compiler would wait for an unused register when it is reused.
 __device__ inline ThinTrack LoadTrack(const ThinTrack* track) {
   const uint4 a = __ldg(reinterpret_cast<const uint4*>(track->axis));
   const uint2 b = __ldg(reinterpret_cast<const uint2*>(&track->axis[2]));
@@ -23,8 +23,9 @@ __device__ inline ThinTrack LoadTrack(const ThinTrack* track) {
           0};
 }
 
-// The words of the region, to be raised. On a device by its own instructions: the compiler would work
-// out where shared memory lies anew for each, and branch around those that are not to be done.
+// The words of the region, which are raised. On a device it uses the device's own instructions: the
+// compiler would compute the address in shared memory again for each word, and branch around those
+// that are not raised.
 class RegionWords {
  public:
 #if defined(__CUDA_ARCH__)
@@ -35,11 +36,11 @@ class RegionWords {
   __device__ void Raise(const ThinCursor& cursor, uint32_t word) const {
     asm volatile("red.shared.max.u32 [%0], %1;" ::"r"(At(cursor)), "r"(word) : "memory");
   }
-  // By its place in the region.
+  // Raises the voxel at that index in the region.
   __device__ void RaiseAt(uint32_t voxel, uint32_t word) const {
     asm volatile("red.shared.max.u32 [%0], %1;" ::"r"(at_ + voxel * 4), "r"(word) : "memory");
   }
-  // If kLess < count.
+  // Does so if kLess < count.
   template <uint32_t kLess>
   __device__ void RaiseIf(uint32_t count, const ThinCursor& cursor, uint32_t word) const {
     asm volatile(
@@ -76,7 +77,7 @@ class RegionWords {
   }
 };
 
-// A span of a line that runs from colour to colour, by its lane alone.
+// Draws a span of a line with a colour gradient, by its lane alone.
 static __device__ __noinline__ void DrawMixed(const ThinTrack* of, uint32_t end, LineSpan span) {
   const ThinTrack track = LoadTrack(of);
   if (track.word == 0) return;
@@ -88,8 +89,8 @@ static __device__ __noinline__ void DrawMixed(const ThinTrack* of, uint32_t end,
   }
 }
 
-// `left` voxels of one word from there on; 0 where a lane has none. All of a warp go on together
-// until the longest ends.
+// Draws `left` voxels of one word from there on; 0 for a lane that has none. All lanes of a warp
+// continue until the longest span ends.
 __device__ inline void DrawGroup(ThinCursor cursor, uint32_t left, uint32_t word,
                                  const RegionWords& words) {
   constexpr uint32_t kAtOnce = 4;
@@ -111,7 +112,8 @@ __device__ inline void DrawGroup(ThinCursor cursor, uint32_t left, uint32_t word
   }
 }
 
-// The region's next segments of spans, from chunk `first` on, up to kSegments. By the first warp.
+// Finds the region's next segments of spans, from chunk `first` on, up to kSegments. Called by the
+// first warp.
 __device__ inline void FindSegments(const SpanLists& lists, uint32_t first, uint32_t last,
                                     uint32_t region) {
   SpanScratch& scratch = SharedSpans();
@@ -150,17 +152,18 @@ __device__ inline void FindSegments(const SpanLists& lists, uint32_t first, uint
   }
 }
 
-// A warp's spans, a lane's among them: number i in spans[i / 32] of lane i % 32.
+// A warp's spans, distributed over its lanes: number i is in spans[i / 32] of lane i % 32.
 struct WarpSpans {
   LineSpan spans[kSpansOfLane];
   uint32_t count = 0;
 
-  // From span `first` of those found on; `most` at most, and one at least. Their tracks are asked for.
+  // Loads from span `first` of those found on, at least one and at most `most`, and prefetches
+  // their tracks.
   __device__ void Fetch(const LineSpan* from, const ThinTrack* tracks, uint32_t first,
                         uint32_t most) {
     const SpanScratch& scratch = SharedSpans();
     const uint32_t lane = threadIdx.x % 32, segments = scratch.segments;
-    // The segment that has the first one: the last that begins there or before.
+    // The segment that has the first span: the last one that begins there or before.
     constexpr uint32_t kStride = kSegments / 32;
     static_assert(kStride <= 32);
     const auto begins = [&](uint32_t segment) {
@@ -170,7 +173,7 @@ struct WarpSpans {
                                      __popc(__ballot_sync(kAllLanes, begins(lane * kStride))) - 1);
     segment += static_cast<uint32_t>(
         __popc(__ballot_sync(kAllLanes, lane < kStride && begins(segment + lane))) - 1);
-    // Of this one and the next ones each lane has one.
+    // Each lane has one of this segment and the next ones.
     const uint32_t mine = segment + lane;
     const uint32_t begin = mine < segments ? scratch.segment_first[mine] : scratch.spans_found;
     const uint32_t move = mine < segments ? scratch.segment_from[mine] : 0;
@@ -200,8 +203,8 @@ struct WarpSpans {
     }
   }
 
-  // Into `sorted`, by length, the longest first, so that lanes have as much to do; those of two
-  // colours before all.
+  // Sorts them into `sorted` by length, the longest first, so that lanes have equal work; spans
+  // with a colour gradient come first.
   __device__ void Sort(uint32_t buckets[32], LineSpan* sorted) const {
     const uint32_t lane = threadIdx.x % 32;
     if (count <= 32) {
@@ -232,11 +235,12 @@ struct WarpSpans {
   }
 };
 
-// Draws `count` spans, 32 at a time. By a warp.
+// Draws `count` spans, 32 at a time. Called by a warp.
 __device__ inline void DrawSorted(const ThinTrack* tracks, const uint32_t* ends,
                                   const LineSpan* spans, uint32_t count, const RegionWords& words) {
   const uint32_t lane = threadIdx.x % 32;
-  // The next spans' tracks are on their way while some are drawn; in the first round these are none.
+  // The next spans' tracks are loaded while the current ones are drawn; in the first round none are
+  // drawn.
   LineSpan span{0, 0};
   ThinTrack track{};
   for (uint32_t first = 0;; first += 32) {
@@ -254,8 +258,8 @@ __device__ inline void DrawSorted(const ThinTrack* tracks, const uint32_t* ends,
   }
 }
 
-// Draws the spans that have been found: each warp for itself. A function of its own, so that it has
-// all registers.
+// Draws the spans that have been found: each warp for itself. Not inlined, so that it has all
+// registers.
 static __device__ __noinline__ void DrawFound(const LineSpan* from, const ThinTrack* tracks,
                                               const uint32_t* ends) {
   SpanScratch& scratch = SharedSpans();
@@ -263,7 +267,7 @@ static __device__ __noinline__ void DrawFound(const LineSpan* from, const ThinTr
   const uint32_t warp = threadIdx.x / 32, found = scratch.spans_found;
   LineSpan* const sorted = &scratch.spans[warp * kSpansOfWarp];
   if (found == 0) return;
-  // All have as many, in as few parts as can be sorted at once.
+  // All warps have the same number, in as few parts as can be sorted at once.
   const uint32_t share = (found + kDrawThreads - 1) / kDrawThreads * 32;
   const uint32_t parts = (share + kSpansOfWarp - 1) / kSpansOfWarp;
   const uint32_t most = (share / 32 + parts - 1) / parts * 32;
@@ -277,7 +281,7 @@ static __device__ __noinline__ void DrawFound(const LineSpan* from, const ThinTr
   }
 }
 
-// Draws the `count` spans that lie in SharedSpans().
+// Draws the `count` spans in SharedSpans().
 static __device__ __noinline__ void DrawHeld(const ThinTrack* tracks, const uint32_t* ends,
                                              uint32_t count) {
   SpanScratch& scratch = SharedSpans();
@@ -295,10 +299,10 @@ static __device__ __noinline__ void DrawHeld(const ThinTrack* tracks, const uint
   DrawSorted(tracks, ends, sorted, spans.count, RegionWords(SharedRegion().words));
 }
 
-// By the whole block: what the batch has in the region, if it has any there.
+// Draws the batch's spans in the region, if it has any there. Called by the whole block.
 __device__ inline void DrawSpans(const LineBatchView& batch) {
   const uint32_t region = SharedRegion().region;
-  // Asked for together.
+  // Both are loaded together.
   const bool any = batch.lists.Has(region);
   const uint32_t first = batch.lists.chunk_begin[region / kRegionsInBlock];
   const uint32_t last = any ? batch.lists.chunk_begin[region / kRegionsInBlock + 1] : first;

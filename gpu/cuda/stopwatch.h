@@ -1,4 +1,4 @@
-// When the device was done with what lies in its stream.
+// Measures when the device has finished the work in its stream.
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -22,9 +22,9 @@ class Stopwatch {
   Stopwatch(const Stopwatch&) = delete;
   Stopwatch& operator=(const Stopwatch&) = delete;
 
-  // Sets the mark behind what has been queued in the device's stream.
+  // Sets the mark after the work queued in the device's stream.
   absl::Status Set(Mark mark);
-  // From one mark to a later one, which is waited for.
+  // Returns the nanoseconds from one mark to a later one, for which it waits.
   absl::StatusOr<int64_t> Between(Mark from, Mark to);
 
  private:

@@ -9,7 +9,7 @@
 namespace voxeld::gpu::cuda {
 namespace {
 
-// Up to here what a batch may need at most is taken, and nobody waits for the count of what it does.
+// Up to this size the most that a batch may need is allocated, without waiting for the exact count.
 constexpr uint64_t kUncountedBytes = uint64_t{32} << 20;
 
 uint32_t* Colors(const auto& batch) {
@@ -55,7 +55,7 @@ absl::Status TriangleIndex::SortInto(Batch& batch, const RegionGrid& within, uin
                                      bool counted) {
   const size_t regions = grid().count();
   const CompactTriangle* const triangles = batch.items.as<CompactTriangle>();
-  for (Block* block : {&batch.begin, &batch.spans}) *block = Block();  // of a try before
+  for (Block* block : {&batch.begin, &batch.spans}) *block = Block();  // from an earlier try
   batch.list_bytes = (regions + 1) * sizeof(uint32_t);
   batch.sort_bytes = batch.list_bytes + regions * sizeof(uint32_t);
   const absl::StatusOr<Block> counts = lists().Acquire(regions * sizeof(uint32_t));

@@ -1,4 +1,5 @@
-// Small triangles by the regions that they touch. What is deferred keeps `regions`, a bit for each.
+// Small triangles by the regions that they touch. Deferred batches keep `regions`, a bit for each
+// region.
 #pragma once
 
 #include <cstdint>
@@ -8,13 +9,13 @@
 
 namespace voxeld::gpu::cuda {
 
-// A batch's `begin` and `spans` are TriangleBatchView's arrays `begin` and `places`.
+// A batch's `begin` and `spans` are the arrays `begin` and `places` of TriangleBatchView.
 class TriangleIndex final : public RegionIndex {
  public:
   TriangleIndex(Device& device, ListBudget& lists)
       : RegionIndex(device, lists, "triangles", sizeof(CompactTriangle), 3 * sizeof(uint32_t)) {}
 
-  TriangleBatchList view() const;  // after Merge
+  TriangleBatchList view() const;  // valid after Merge
 
  private:
   uint64_t MostRegions() const override;
@@ -30,7 +31,8 @@ class TriangleIndex final : public RegionIndex {
                      uint8_t* region_dirty) override;
 
   uint64_t MostPlaces(const Batch& batch) const;
-  // With room for as many places as there can be, or, if `counted`, which waits for it, as there are.
+  // Sorts with memory for the greatest possible number of places, or, if `counted`, which waits for
+  // the device, for the exact number.
   absl::Status SortInto(Batch& batch, const RegionGrid& within, uint8_t* region_dirty,
                         bool counted);
 };

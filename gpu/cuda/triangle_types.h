@@ -1,5 +1,5 @@
 // Small triangles on the device (gpu/primitives/compact_triangle.h), sorted by the regions of the
-// volume that they touch. Plain data, as host and device see it.
+// volume that they touch. Plain data, used by host and device.
 #pragma once
 
 #include <cstdint>
@@ -11,16 +11,16 @@ namespace voxeld::gpu::cuda {
 
 // Triangles of one layer. Those of region r are triangles[places[begin[r]]] to
 // triangles[places[begin[r + 1] − 1]]. Without such lists `begin` is null, and `places` are bits by
-// region, which have any: who draws looks through all triangles.
+// region, for the regions that have any: the drawing threads test all triangles.
 struct TriangleBatchView {
   const CompactTriangle* triangles = nullptr;
-  const uint32_t* colors = nullptr;  // 0x00RRGGBB, three each, where they differ; else null
+  const uint32_t* colors = nullptr;  // 0x00RRGGBB, three each, if they differ; else null
   const uint32_t* begin = nullptr;
   const uint32_t* places = nullptr;
-  uint32_t layer = 0;  // its slot
+  uint32_t layer = 0;  // the slot of the layer
   uint32_t count = 0;  // triangles
 
-  // Whether it has any in a region; kListed: it has lists.
+  // Returns whether it has any in a region; kListed: it has lists.
   template <bool kListed>
   VOXELD_HD bool Has(uint32_t region) const {
     if (!kListed && begin == nullptr) return (places[region / 32] >> region % 32 & 1) != 0;
@@ -34,7 +34,8 @@ struct TriangleBatchList {
   uint32_t count = 0;
 };
 
-// Regions that something touches of so many voxels along the axes.
+// Returns the greatest number of regions that something of that extent, in voxels along the axes,
+// touches.
 VOXELD_HD constexpr uint32_t RegionsOfExtent(const int32_t voxels[3]) {
   uint32_t regions = 1;
   for (int a = 0; a < 3; ++a) {
@@ -43,14 +44,14 @@ VOXELD_HD constexpr uint32_t RegionsOfExtent(const int32_t voxels[3]) {
   return regions;
 }
 
-// The sorting of a batch: counted by region, summed, put there.
+// The sorting of a batch: counted by region, summed, and written.
 struct TriangleSort {
   RegionGrid grid;
-  uint32_t* counts = nullptr;  // by region; 0 at first, and again at the end
+  uint32_t* counts = nullptr;  // by region; 0 initially, and again at the end
   uint32_t* begin = nullptr;   // by region, and the end
   uint32_t* places = nullptr;
   uint32_t capacity = 0;     // of `places`
-  uint8_t* dirty = nullptr;  // by region: those that have any are marked; or null
+  uint8_t* dirty = nullptr;  // by region: marks regions that have any; or null
 };
 
 }  // namespace voxeld::gpu::cuda

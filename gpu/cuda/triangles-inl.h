@@ -1,4 +1,4 @@
-// Small triangles, raised into a region's words.
+// Raises small triangles into a region's words.
 #pragma once
 
 #include "gpu/cuda/region_scratch-inl.h"
@@ -12,8 +12,8 @@ __device__ inline CompactTriangle LoadTriangle(const CompactTriangle* triangle) 
   return {{{a.x, a.y}, {a.z, a.w}, {b.x, b.y}}, b.z, b.w};
 }
 
-// What is rare is kept apart, and finds all anew, so that the rest has the registers. x, y, z: the
-// region's first voxel.
+// The rare case is a separate function that loads everything again, so that the common case has
+// more registers. x, y, z: the region's first voxel.
 __device__ __noinline__ inline void RaiseMixed(const TriangleBatchView& batch, uint32_t triangle,
                                                int32_t x, int32_t y, int32_t z, int32_t place) {
   const CompactTriangle t = LoadTriangle(&batch.triangles[triangle]);
@@ -37,7 +37,7 @@ __device__ __noinline__ inline void RaiseFlat(const TriangleBatchView& batch, ui
   EmitCompactFlat(t, color, box, RaiseVoxel(mixed ? Recolored(t.word, 0) : t.word, mixed));
 }
 
-// One row of what a triangle has in the region; at: the region's first voxel.
+// Draws one row of a triangle's part in the region; at: the region's first voxel.
 __device__ inline void DrawTriangleRow(const TriangleBatchView& batch, uint32_t triangle,
                                        int32_t row, const int32_t at[3]) {
   const CompactTriangle t = LoadTriangle(&batch.triangles[triangle]);
@@ -52,10 +52,10 @@ __device__ inline void DrawTriangleRow(const TriangleBatchView& batch, uint32_t 
   });
 }
 
-// By the whole block: teams of warps take some triangles each, and a team's lanes a row each of what
-// these have in the region, so that all have about as much to do. b: of the view's batches; of one
-// without lists (if not kListed) all triangles are looked at, and of most there are no rows. Not
-// inlined: lines want the registers.
+// Draws a batch, by the whole block: teams of warps take some triangles each, and a team's lanes a
+// row each of the triangles' parts in the region, so that all have similar work. b: the number of
+// the batch in the view. Without lists (if not kListed) all triangles are tested, and most have no
+// rows. Not inlined, because lines need the registers.
 template <bool kListed>
 __device__ __noinline__ inline void DrawTriangles(const DrawView& view, uint32_t b) {
   RegionScratch& scratch = SharedRegion();
@@ -67,7 +67,7 @@ __device__ __noinline__ inline void DrawTriangles(const DrawView& view, uint32_t
   const bool listed = kListed || batch.begin != nullptr;
   const uint32_t begin = listed ? batch.begin[region] : 0;
   const uint32_t count = listed ? batch.begin[region + 1] - begin : batch.count;
-  uint32_t team = 1;  // warps
+  uint32_t team = 1;  // in warps
   while (team < kDrawWarps && team * count < kDrawWarps) team *= 2;
   const uint32_t teams = kDrawWarps / team;
   const uint32_t group = Min((count + teams - 1) / teams, 32u);

@@ -1,4 +1,4 @@
-// What lies in device memory, as host and device see it. Plain data.
+// The data in device memory, used by host and device. Plain data.
 #pragma once
 
 #include <cstdint>
@@ -10,48 +10,50 @@
 
 namespace voxeld::gpu::cuda {
 
-// In place of a primitive's kind: the CPU has drawn it, and its items are what it covers of a tile
-// each.
+// Replaces a primitive's kind if the CPU has drawn it: each of its items is the part that it covers
+// of a tile.
 inline constexpr PrimitiveKind kDrawnByCpu = PrimitiveKind{0};
 
-// As CpuVoxels has them, in device memory.
+// CpuVoxels in device memory.
 struct CpuVoxelsView {
   const uint32_t* tiles = nullptr;
   const uint64_t* begin = nullptr;
   const uint64_t* voxels = nullptr;
 };
 
-// A drawable in the table, by slot. `source.record` points to `record`, its arrays into device
-// memory; vertices are mapped and snapped where they are needed.
+// A drawable in the table, by slot. `source.record` points to `record`, its arrays point into
+// device memory; vertices are mapped and snapped when needed.
 struct TableEntry {
   Source source;
   GeometryRecord record;
-  CpuVoxelsView drawn;  // of kDrawnByCpu, which has no source
+  CpuVoxelsView drawn;  // for kDrawnByCpu, which has no source
   uint32_t priority = 0;
   uint32_t erase = 0;
-  uint32_t layer = 0;  // its slot
+  uint32_t layer = 0;  // the slot of the layer
   uint32_t alive = 0;
 };
 
 // A layer, by slot.
 struct LayerLook {
-  int32_t rank = -1;   // in the order of combination; none: the slot is free
-  uint32_t seen = 0;   // not 0: visible, and without a mask that is not there
-  uint32_t drawn = 0;  // not 0: seen, or the mask of one that is
-  int32_t mask = -1;   // the slot of its mask; none: −1
+  int32_t rank = -1;   // in the order of combination; −1: the slot is free
+  uint32_t seen = 0;   // not 0: visible, and its mask, if it has one, exists
+  uint32_t drawn = 0;  // not 0: seen, or the mask of a seen layer
+  int32_t mask = -1;   // the slot of its mask; −1: none
   uint32_t opacity = 255;
   BlendMode blend = BlendMode::kOver;
-  // Its half-spaces and cylinders (gpu/clip.h) in the arrays of all layers'; at most kMaxHalfSpaces, kMaxClipCylinders.
+  // Its half-spaces and cylinders (gpu/clip.h) in the arrays of all layers; at most kMaxHalfSpaces,
+  // kMaxClipCylinders.
   uint32_t first_half_space = 0, half_spaces = 0;
   uint32_t first_cylinder = 0, cylinders = 0;
   bool operator==(const LayerLook&) const = default;
 };
 
-// Some drawables' items in one row: those of slot(i) are the items from first(i) on, up to
-// first(i + 1). A few are there themselves, as a kernel's argument, so that nothing need be uploaded.
+// The items of some drawables in one row: those of slot(i) are the items from first(i) on, up to
+// first(i + 1). A few are stored in the struct itself, which is a kernel's argument, so that
+// nothing has to be uploaded.
 inline constexpr uint32_t kFewRows = 4;
 struct ItemList {
-  const uint32_t* slots = nullptr;   // null: a few
+  const uint32_t* slots = nullptr;   // null: use `few`
   const uint64_t* firsts = nullptr;  // count + 1
   uint32_t count = 0;
   uint32_t few_slots[kFewRows] = {};
@@ -88,46 +90,46 @@ struct BatchView {
   const uint32_t* row_begin = nullptr;
 };
 
-inline constexpr uint32_t kMaxBatches = 32;  // a lane looks after one
+inline constexpr uint32_t kMaxBatches = 32;  // a lane handles one
 struct BatchList {
   BatchView batches[kMaxBatches];
   uint32_t count = 0;
 };
 
-// Dirty regions are listed, drawn and packed in groups of planes of regions along z, so that one
-// group's pictures are on their way while the next is drawn.
+// Dirty regions are listed, drawn and packed in groups of planes of regions along z, so that slice
+// images of one group are copied while the next is drawn.
 inline constexpr uint32_t kMostDrawGroups = 8;
 struct DrawGroups {
   uint32_t count = 1;
   int32_t end[kMostDrawGroups] = {0x7FFFFFFF};  // planes, half-open
 };
 
-// What kernels count. All before lit_voxels begins at 0 with every frame: who ends the last slices
-// leaves it so.
+// The counters of kernels. All before lit_voxels are 0 when a frame begins: the kernel that
+// finishes the last slices resets them.
 struct Counters {
   uint32_t tiles_drawn = 0;
   uint32_t slices_drawn = 0;
   uint32_t pictures_changed = 0;
-  uint32_t ended = 0;                    // blocks of threads that have ended their slices
+  uint32_t ended = 0;                    // blocks of threads that have finished their slices
   uint32_t dirty[kMostDrawGroups] = {};  // regions in the list of each group
-  uint32_t taken[kMostDrawGroups] = {};  // of it, by those who draw
+  uint32_t taken[kMostDrawGroups] = {};  // places in it that drawing blocks have taken
   uint64_t lit_voxels = 0;
 };
 
-// The volume: colours, interleaved, kTileVoxels a tile.
+// The volume: interleaved colours, kTileVoxels per tile.
 struct VolumeView {
   TileGrid grid;
   const uint8_t* owned = nullptr;  // a TileOwner for each tile
   uint8_t* dirty = nullptr;
-  // Of regions (line_types.h): they are drawn whole.
+  // By region (line_types.h), because regions are drawn whole.
   uint8_t* region_dirty = nullptr;
-  uint32_t* dirty_list = nullptr;  // a group's behind all that the groups before may have
+  uint32_t* dirty_list = nullptr;  // each group's after all that earlier groups may have
   uint32_t* lit = nullptr;         // voxels of each tile
-  uint32_t* colors = nullptr;      // null: pictures are packed as tiles are drawn
+  uint32_t* colors = nullptr;      // null: slice images are packed as tiles are drawn
   Counters* counters = nullptr;
 };
 
-// Which slices look at which tiles (display::TileToSlices), and what is known of each owned slice.
+// Which slices look at which tiles (display::TileToSlices), and the state of each owned slice.
 struct SliceIndexView {
   uint32_t stride[3] = {};  // of the outer plane of tiles
   uint32_t inner_axis = 2;  // 0 to 2
@@ -136,7 +138,7 @@ struct SliceIndexView {
   const uint32_t* begin = nullptr;
   const int32_t* slices = nullptr;
   const uint8_t* inner_seen = nullptr;
-  int32_t first = 0, last = 0;    // the slices owned, half-open
+  int32_t first = 0, last = 0;    // the owned slices, half-open
   uint32_t* dirty = nullptr;      // by slice − first
   uint32_t* lit_tiles = nullptr;  // by slice − first
 };
@@ -146,22 +148,22 @@ struct ListsView {
   const display::FootprintEntry* entries = nullptr;
 };
 
-// Everything about slicing.
+// All data for slicing.
 struct SliceView {
   ListsView outer, inner;
   uint32_t width = 0, height = 0, inner_sets = 1, inner_axis = 2;
-  uint32_t columns = 0;   // outer lists of a slice
-  uint32_t flat_row = 0;  // as FootprintTable has it
+  uint32_t columns = 0;   // outer lists per slice
+  uint32_t flat_row = 0;  // as in FootprintTable
   uint32_t line = 0;      // voxels along the inner axis that inner lists reach
   display::Sampling sampling = display::Sampling::kMax;
   Finish finish;
   uint32_t sub_frames = 1;
   uint32_t bytes_per_picture = 0;
-  uint8_t* bytes = nullptr;  // pictures of the owned slices
+  uint8_t* bytes = nullptr;  // slice images of the owned slices
   uint64_t* changed_in = nullptr;
   uint64_t* told = nullptr;     // the same, in the host's memory
-  uint32_t* differs = nullptr;  // of each picture: its bytes are not what they were
-  uint32_t* blank = nullptr;    // of each owned slice: all its pictures are zeros
+  uint32_t* differs = nullptr;  // for each slice image: its bytes have changed
+  uint32_t* blank = nullptr;    // for each owned slice: all its slice images are zeros
 };
 
 }  // namespace voxeld::gpu::cuda

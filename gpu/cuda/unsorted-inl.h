@@ -1,5 +1,5 @@
-// Thin lines of which there are no lists: each block of threads looks through all of them, and cuts
-// them to its region.
+// Draws thin lines without lists: each block of threads tests all of them, and cuts them to its
+// region.
 #pragma once
 
 #include "gpu/cuda/lines-inl.h"
@@ -8,8 +8,8 @@
 
 namespace voxeld::gpu::cuda {
 
-// The line's voxels in the region at `at` are those from k to end − 1, as WalkThin finds them; false:
-// it has none.
+// Finds the line's voxels in the region at `at`: k to end − 1, as WalkThin finds them. Returns
+// false if it has none.
 __device__ inline bool CutToRegion(const ThinLine& line, const int32_t at[3], int32_t& k,
                                    int32_t& end) {
   k = 0;
@@ -26,7 +26,7 @@ __device__ inline bool CutToRegion(const ThinLine& line, const int32_t at[3], in
   for (int a = 0; a < 3; ++a) {
     const int32_t d = line.d[a];
     ThinAxis axis;
-    if (from[a] != at[a]) {  // its next box is this one
+    if (from[a] != at[a]) {  // its next box is this region
       axis.Begin(line, a, d < 0 ? at[a] + 1 : at[a] - 1, RegionBits(a));
       k = Max(k, axis.next);
     }
@@ -36,7 +36,7 @@ __device__ inline bool CutToRegion(const ThinLine& line, const int32_t at[3], in
   return k < end;
 }
 
-// By the whole block.
+// Called by the whole block.
 static __device__ __noinline__ void DrawUnsorted(const ThinLine* lines, const ThinTrack* tracks,
                                                  const uint32_t* ends, uint32_t count,
                                                  const RegionGrid* regions) {
@@ -59,7 +59,7 @@ static __device__ __noinline__ void DrawUnsorted(const ThinLine* lines, const Th
     }
     __syncthreads();
     const uint32_t here = found;
-    // There is room for as many as one more round may find.
+    // Draw when another round might not fit.
     if (here > kMostSpans - kDrawThreads || first + kDrawThreads >= count) {
       DrawHeld(tracks, ends, here);
       __syncthreads();

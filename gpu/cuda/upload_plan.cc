@@ -16,7 +16,7 @@ void UploadPlan::AddInline(const GeometryView& view) {
     copies_.push_back({.from = reinterpret_cast<const std::byte*>(view.positions.data())});
   }
   Copy& copy = copies_.front();
-  // Records ascend, and so do the arrays within each.
+  // Records are in ascending order, and so are the arrays in each.
   const auto include = [&](auto array) {
     if (array.empty()) return;
     const auto* end = reinterpret_cast<const std::byte*>(array.data() + array.size());
@@ -34,7 +34,7 @@ size_t UploadPlan::AddBulk(const GeometryView& view) {
   if (segment_ == view.bulk_segment && !copies_.empty()) {
     Copy& last = copies_.back();
     const std::byte* const end = last.from + last.size;
-    // What is between belongs to the block before.
+    // The bytes between them belong to the same block as those before.
     if (from >= end && from < end + kAlign) {
       const auto distance = static_cast<size_t>(from - last.from);
       last.size = distance + size;

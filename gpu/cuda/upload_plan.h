@@ -1,5 +1,5 @@
-// Which copies bring the arrays of a delta to the device: as few as there can be, into one piece of
-// memory.
+// Plans the copies that bring the arrays of a delta to the device: as few as possible, into one
+// piece of memory.
 #pragma once
 
 #include <cstddef>
@@ -18,16 +18,16 @@ class UploadPlan {
     size_t to = 0;  // offset in the device's memory
   };
 
-  // A geometry with vertices whose arrays lie in the delta. All such come before the first AddBulk:
-  // they go over as one, the records between them included.
+  // Adds a geometry with vertices whose arrays are in the delta. All of these must be added before
+  // the first AddBulk: they are copied as one, including the records between them.
   void AddInline(const GeometryView& view);
-  // One whose arrays lie in bulk memory. Answers where its positions come to lie; its other arrays
-  // keep their distance from them. What lies side by side in a segment goes over as one.
+  // Adds a geometry whose arrays are in bulk memory. Returns the offset of its positions; its other
+  // arrays keep their distance from them. Adjacent data of a segment is copied as one.
   size_t AddBulk(const GeometryView& view);
 
   const std::vector<Copy>& copies() const { return copies_; }
   size_t size() const { return size_; }  // of the device's memory
-  // What comes to lie at the beginning, if there are such arrays.
+  // Returns the start of the data at the beginning, if there are such arrays.
   const std::byte* inline_begin() const { return copies_.empty() ? nullptr : copies_[0].from; }
 
  private:

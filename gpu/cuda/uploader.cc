@@ -10,8 +10,8 @@
 namespace voxeld::gpu::cuda {
 namespace {
 
-// From so many bytes on a broadcast, and the agreement before it (0.2 ms), is worth its while: that
-// long a copy to one device takes of 10 MB alone, of 4 MB if the others' share its bus.
+// The size from which a broadcast, and the agreement before it (0.2 ms), pay off: copying 10 MB to
+// a single device takes that long, or 4 MB if the others share its bus.
 constexpr size_t kBroadcastFrom = size_t{4} << 20;
 constexpr size_t kPiece = size_t{4} << 20;
 
@@ -60,7 +60,7 @@ absl::Status Uploader::CopyAll(const UploadPlan& plan, const Block& block) {
   return absl::OkStatus();
 }
 
-// A piece goes out while the next comes in, on the stream of copies.
+// Broadcasts a piece while the next is copied in, on the stream of copies.
 absl::Status Uploader::Broadcast(const UploadPlan& plan, const Block& block) {
   const bool first = comm_->rank() == 0;
   const auto after = [&](cudaStream_t before, cudaStream_t then) {
@@ -69,7 +69,7 @@ absl::Status Uploader::Broadcast(const UploadPlan& plan, const Block& block) {
     if (!status.ok()) return status;
     return device_.Run("cudaStreamWaitEvent", [&] { return cudaStreamWaitEvent(then, event_, 0); });
   };
-  // The memory may have been another's.
+  // Earlier work in the stream may still use the memory.
   absl::Status status;
   if (first) status = after(device_.stream(), device_.copies());
   for (const BroadcastStep& step : BroadcastSteps(plan, kPiece)) {
@@ -126,7 +126,7 @@ absl::Status Uploader::Join(const std::string& library, const Invitation& invita
   absl::StatusOr<std::unique_ptr<NcclComm>> comm = NcclComm::Join(nccl_, invitation, rank, ranks);
   if (!comm.ok()) return comm.status();
   comm_ = *std::move(comm);
-  // Their ways to each other are made when they are first used: now, when there is time.
+  // Connections between the ranks are made when they are first used: do it now, when there is time.
   if (const absl::StatusOr<bool> all = AllHave(true); !all.ok()) return all.status();
   status = comm_->Broadcast(agreed_.as<int32_t>(), sizeof(int32_t), device_.stream());
   return status.ok() ? Wait() : status;

@@ -1,5 +1,6 @@
-// Brings the arrays of deltas to the device: from the host's memory or, once it has joined the other
-// ranks of its display, large ones from the first rank's device, which alone copies from the host.
+// Brings the arrays of deltas to the device: from the host's memory or, once it has joined the
+// other ranks of its display, large ones from the first rank's device, the only one that then
+// copies from the host.
 #pragma once
 
 #include <memory>
@@ -22,11 +23,11 @@ class Uploader final : public RankLink {
   Uploader(const Uploader&) = delete;
   Uploader& operator=(const Uploader&) = delete;
 
-  // Memory of the plan's size (not 0), with what comes into it queued in the device's stream. What
-  // the plan copies from must stay until Wait. ResourceExhausted if some rank that takes part has no
-  // memory: then all say so, and nothing has happened.
+  // Returns memory of the plan's size (not 0), with the copies into it queued in the device's
+  // stream. The sources of the copies must stay valid until Wait. Errors: ResourceExhausted if a
+  // rank that takes part has no memory: then all ranks return it, and nothing has changed.
   absl::StatusOr<Block> Upload(const UploadPlan& plan);
-  // For the work queued.
+  // Waits for the queued work.
   absl::Status Wait();
 
   absl::StatusOr<Invitation> Invite(const std::string& library) override;
@@ -37,13 +38,13 @@ class Uploader final : public RankLink {
   absl::Status OpenLibrary(const std::string& library);
   absl::Status CopyAll(const UploadPlan& plan, const Block& block);
   absl::Status Broadcast(const UploadPlan& plan, const Block& block);
-  // Copies that were queued before an error end before their memory goes.
+  // Lets copies that were queued before an error finish before their memory is freed.
   absl::Status GivenUp(const absl::Status& why);
   absl::StatusOr<bool> AllHave(bool mine);
 
   Device& device_;
   std::shared_ptr<const Nccl> nccl_;
-  std::unique_ptr<NcclComm> comm_;  // null: by itself
+  std::unique_ptr<NcclComm> comm_;  // null: not joined
   Block agreed_;                    // a number
   cudaEvent_t event_ = nullptr;
 };

@@ -7,7 +7,7 @@ namespace voxeld::gpu::cuda {
 
 inline constexpr uint32_t kAllLanes = 0xFFFFFFFFu;
 
-// Of a warp's values, the sum of those up to this lane's own.
+// Returns the sum of the warp's values up to and including this lane's.
 __device__ inline uint32_t SumUntil(uint32_t value) {
   for (uint32_t lanes = 1; lanes < 32; lanes <<= 1) {
     const uint32_t other = __shfl_up_sync(kAllLanes, value, lanes);
@@ -16,7 +16,7 @@ __device__ inline uint32_t SumUntil(uint32_t value) {
   return value;
 }
 
-// Of those of the lanes before this one; and of all.
+// Returns the sum of the values of the lanes before this one; and, in `total`, of all lanes.
 __device__ inline uint32_t SumBefore(uint32_t value) { return SumUntil(value) - value; }
 __device__ inline uint32_t SumBefore(uint32_t value, uint32_t& total) {
   const uint32_t sum = SumUntil(value);
