@@ -217,7 +217,7 @@ class Guides(unittest.TestCase):
         use = readme[readme.index("## Use\n"):]
         pasted = next(one.text for one in blocks(use) if "voxelctl play" in one.text)
         reader.serve("voxeld\n")
-        self.assertIn("export PATH=$PWD/build/demo/bin:$PATH", readme[:readme.index("## Use\n")])
+        self.assertIn("export PATH=$PWD/build/demo/bin:$PATH", pasted)
         # Fewer pictures; those of a gallery are tested elsewhere.
         short = re.sub(r"(?m)^voxelctl gallery .*\n", "", pasted).replace("turn.gif", "turn.gif --frames 4")
         said = reader.shell(short)

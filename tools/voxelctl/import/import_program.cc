@@ -78,7 +78,16 @@ absl::StatusOr<std::vector<std::string>> Command(const std::vector<std::string>&
                                                  const ImportOptions& options,
                                                  const std::vector<std::string>& more) {
   std::string program = FindProgram();
-  if (program.empty()) return NoProgram(EscapeForTerminal(paths.front()));
+  if (program.empty()) {
+    // What is wrong with a file of any type comes first.
+    for (const std::string& path : paths) {
+      std::error_code ignored;
+      if (std::filesystem::is_directory(path, ignored)) continue;
+      const absl::StatusOr<SourceFile> file = ReadSourceFile(path, options.other_files);
+      if (!file.ok()) return file.status();
+    }
+    return NoProgram(EscapeForTerminal(paths.front()));
+  }
   std::vector<std::string> command = {std::move(program)};
   for (std::string& argument : ArgumentsOf(options)) command.push_back(std::move(argument));
   command.insert(command.end(), more.begin(), more.end());
