@@ -1,5 +1,6 @@
-// Assembly on the CPU: from a delta to the colours of tiles, and whole frames of what is mostly assembly. Items are
-// voxels a second. `PlainLines` is the peer of `RandomLines`: compare within one run.
+// Benchmarks of assembly on the CPU: from a delta to the blended colours of tiles, and whole frames
+// that consist mostly of assembly. Items are voxels a second. `PlainLines` is the reference for
+// `RandomLines`: compare the two within one run.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -29,10 +30,10 @@ void Check(const absl::Status& status) {
 struct Draft {
   PrimitiveKind kind = PrimitiveKind::kSegments;
   std::vector<float> positions;
-  std::vector<uint32_t> colors;  // a vertex
+  std::vector<uint32_t> colors;  // one per vertex
 };
 
-// What replaces the geometry of the only drawable of the only layer.
+// Returns a delta that replaces the geometry of the only drawable of the only layer.
 std::vector<std::byte> DeltaOf(const Draft& scene, uint64_t id) {
   GeometryRecord g;
   g.id = id;
@@ -60,7 +61,8 @@ std::vector<std::byte> LayerDelta() {
   return bytes;
 }
 
-// `items` of `corners` each: within a cube of `extent` voxels, or anywhere in the volume (0). A colour each.
+// Makes `items` primitives of `corners` vertices each, every one in its own colour: inside a cube
+// of `extent` voxels, or anywhere in the volume if `extent` is 0.
 Draft RandomScene(uint64_t seed, PrimitiveKind kind, size_t corners, size_t items, float extent,
                   const int32_t size[3]) {
   std::mt19937_64 random(seed);
@@ -83,7 +85,7 @@ Draft RandomScene(uint64_t seed, PrimitiveKind kind, size_t corners, size_t item
   return scene;
 }
 
-// A volume without slices: draw list to blended tiles.
+// Measures a volume without slices: from the draw list to blended tiles.
 void Assemble(benchmark::State& state, const Draft (&scenes)[2], const int32_t size[3],
               uint64_t voxels) {
   const std::unique_ptr<Executor> executor = MakeExecutor(static_cast<int>(state.range(0)));
@@ -97,7 +99,7 @@ void Assemble(benchmark::State& state, const Draft (&scenes)[2], const int32_t s
     Check(volume.Apply(delta, nullptr));
     benchmark::DoNotOptimize(volume.Update(nullptr));
   };
-  for (int i = 0; i < 2; ++i) {  // memory is had before
+  for (int i = 0; i < 2; ++i) {  // allocates the memory before the measurement
     delta = DeltaOf(scenes[id % 2], id + 1);
     ++id;
     frame();
@@ -129,7 +131,7 @@ size_t DenseVoxels() {
          static_cast<size_t>(kLineVolume[2]);
 }
 
-// N + 1 a line.
+// A line of N steps has N + 1 voxels.
 uint64_t VoxelsOf(const Draft& scene) {
   uint64_t voxels = 0;
   for (size_t i = 0; i < scene.positions.size(); i += 6) {
@@ -166,7 +168,8 @@ void RandomLines(benchmark::State& state) {
   Assemble(state, {LineScene(0), LineScene(1)}, kLineVolume, voxels);
 }
 
-// Equilateral triangles of `edge` voxels in random directions, a colour each.
+// Makes equilateral triangles with edges of `edge` voxels in random directions, each in its own
+// colour.
 Draft Tiles(uint64_t seed, size_t count, float edge, const int32_t size[3]) {
   std::mt19937_64 random(seed);
   std::normal_distribution<float> normal;
@@ -202,7 +205,7 @@ void SmallTriangles(benchmark::State& state) {
   Assemble(state, scenes, kSize, 0);
 }
 
-// An inline engine over a stack, with the slices' pictures.
+// An inline engine over a stack of slices, with its slice images.
 class Frames {
  public:
   Frames(int32_t width, int32_t height, int32_t slices, display::PixelFormat format, int threads) {
@@ -282,7 +285,7 @@ void WholeFrames(benchmark::State& state, Frames& frames, const Draft (&scenes)[
   state.counters["slice_ms"] = benchmark::Counter(slice, benchmark::Counter::kAvgIterations);
 }
 
-// Segments of `length` voxels in random directions.
+// Makes segments of `length` voxels in random directions.
 Draft Threads(uint64_t seed, size_t count, float length, const int32_t size[3]) {
   std::mt19937_64 random(seed);
   std::normal_distribution<float> normal;

@@ -1,17 +1,17 @@
-// What it costs that an engine lives in a process of its own: whole frames, from a change to the
+// Measures what it costs to run an engine in its own process: whole frames, from a change to the
 // end of its frame, in this process and through a worker.
 //
-//   voxel-boundary-bench [--engines cpu,cpu_worker] [--lines 1000,1000000] [--repetitions 15]
-//                        [--size 128] [--threads 0] [--json]
+//    voxel-boundary-bench [--engines cpu,cpu_worker] [--lines 1000,1000000] [--repetitions 15]
+//                         [--size 128] [--threads 0] [--json]
 //
-// Engines: cpu, cpu_worker; cuda (in this process, where the build has CUDA), cuda_worker. A
-// worker's times are compared with those of the engine of its kind in this process, when both are
-// measured. Engines take turns within each repetition, whose first is not counted, and only one
-// works at a time. A change is written to staging, applied and drawn without waiting between, as
-// the daemon does it: either all lines, or one of the hundred geometries that they lie in.
+// Engines: cpu, cpu_worker; cuda (in this process, if the build has CUDA), cuda_worker. A worker's
+// times are compared with those of the same engine in this process, if both are measured. Engines
+// take turns within each repetition, and only one works at a time; the first repetition is not
+// counted. A change is written to staging, applied and drawn without waiting in between, as the
+// daemon does it: either all lines change, or one of the hundred geometries that hold them.
 //
-// A worker's segments are registered with CUDA. In this process the frame's buffer is, staging is
-// not.
+// A worker registers its segments with CUDA. In this process the frame's buffer is registered and
+// staging is not.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -40,7 +40,7 @@
 namespace voxeld::bench {
 namespace {
 
-constexpr int kParts = 100;        // geometries that the lines lie in
+constexpr int kParts = 100;        // geometries that hold the lines
 constexpr float kLineLength = 20;  // voxels along each axis, at most
 
 struct Options {
@@ -97,9 +97,9 @@ gpu::Target StackTarget(int32_t n) {
   return target;
 }
 
-using Lines = std::vector<float>;  // vertices two by two
+using Lines = std::vector<float>;  // pairs of vertices
 
-// Two sets of kParts parts, between which the scene changes.
+// Two sets of kParts parts; the scene alternates between them.
 struct Scene {
   std::vector<Lines> parts[2];
 
@@ -120,7 +120,7 @@ struct Scene {
   }
 };
 
-// An engine at its work.
+// An engine that is being measured.
 class Subject {
  public:
   Subject(std::string name, const gpu::Target& target, int threads)
@@ -144,12 +144,12 @@ class Subject {
   Subject& operator=(const Subject&) = delete;
 
   const std::string& name() const { return name_; }
-  // The engine of the same kind in this process.
+  // Returns the name of the engine of the same kind in this process.
   std::string baseline() const { return name_.substr(0, name_.find('_')); }
   const std::vector<std::byte>& pictures() const { return bytes_; }
 
-  // Replaces parts [begin, end) by those of `set` and draws a frame; nanoseconds from the change to
-  // the frame's end.
+  // Replaces parts [begin, end) by those of `set` and draws a frame. Returns: nanoseconds from the
+  // change to the end of the frame.
   int64_t Draw(const std::vector<Lines>& set, int begin, int end) {
     const sync::TimeNs start = clock_.Now();
     const gpu::LayerRecord layer{.id = 1};
@@ -200,7 +200,8 @@ class Subject {
   const sync::SystemClock clock_;
 };
 
-// One change drawn by each engine in turn, over and over; all must show the same.
+// Lets each engine draw one change in turn, repeatedly; all of them must produce the same slice
+// images.
 std::vector<Row> Measure(const std::vector<std::unique_ptr<Subject>>& subjects, const Scene& scene,
                          const std::string& name, int parts, int repetitions) {
   std::vector<Row> rows;

@@ -1,6 +1,8 @@
-// voxel-dither OUT.png: what dither makes of a ramp at one bit, and its spectrum, as one picture for people. From the top: the
-// ramp; ordered; blue noise; blue noise of the next slice. Then the power of 1/8, 1/4 and 1/2 of the pixels lit, ordered above and
-// blue noise below: no waves at the middle, black is none, white four times what pixels at random would have.
+// voxel-dither OUT.png: draws one picture that shows dither of a ramp at one bit, and its spectrum.
+// From the top: the ramp; ordered dither; blue noise; blue noise of the next slice. Below them is
+// the power spectrum with 1/8, 1/4 and 1/2 of the pixels lit, ordered above and blue noise below.
+// The constant part is in the middle; black means no power, and white means four times the power of
+// randomly lit pixels.
 #include <png.h>
 
 #include <algorithm>

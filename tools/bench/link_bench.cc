@@ -1,14 +1,14 @@
-// What a display's driver and its transport cost, and what they reach: pre-rendered volumes, always one
-// waiting in the mailbox.
+// Measures what a display's driver and its transport cost and which rate they reach, with
+// pre-rendered volumes of which one always waits in the mailbox.
 //
-//   voxel-link-bench [DEVICE] [--usb] [--plain] [--seconds 10] [--share 1] [--json]
+//    voxel-link-bench [DEVICE] [--usb] [--plain] [--seconds 10] [--share 1] [--json]
 //
-// DEVICE is "key=value,…", the simulated driver's options; the default is a display of 192 one-bit
-// frames of 912x1140 pixels a volume at 15 volumes a second, at the end of a cable of 400 MB/s.
-// Without --usb the device is a model in this process, and its processor time is told apart. With
-// --usb it is a device of this system that has those options; --plain sends it packets that are
-// ready in memory, through libusb alone. --share is the part of the pictures that change from
-// volume to volume.
+// DEVICE is "key=value,…", the options of the simulated driver. The default is a display of 192
+// one-bit frames of 912x1140 pixels per volume at 15 volumes a second, at the end of a cable of 400
+// MB/s. Without --usb the device is a model in this process, and its CPU time is reported
+// separately. With --usb it is a device of this system that has those options; --plain sends it
+// packets that are ready in memory, through libusb alone. --share is the share of the slice images
+// that change from volume to volume.
 #include <pthread.h>
 #include <sys/resource.h>
 
@@ -63,13 +63,13 @@ TimeNs ProcessCpu() {
   return ns(usage.ru_utime) + ns(usage.ru_stime);
 }
 
-// Volumes whose bytes are made beforehand; a share below 1 changes some pictures of the volume
-// before.
+// Volumes whose bytes are made beforehand. With a share below 1, a volume differs from the previous
+// one in some slice images only.
 class Frames {
  public:
   Frames(const display::FrameLayout& layout, double share) : layout_(layout), share_(share) {
     std::mt19937_64 random(1);
-    // Shown, on its way, waiting, and one to be made.
+    // One volume is shown, one is being sent, one waits, and one is being made.
     for (size_t i = 0; i < (share < 1 ? 1 : 5); ++i) {
       auto frame = std::make_shared<SliceFrame>();
       frame->layout = layout;
@@ -103,17 +103,17 @@ class Frames {
  private:
   const display::FrameLayout layout_;
   const double share_;
-  std::vector<std::shared_ptr<SliceFrame>> ring_;  // the newest first
+  std::vector<std::shared_ptr<SliceFrame>> ring_;  // newest first
   uint64_t volume_ = 0;
 };
 
 struct Result {
   uint64_t presented = 0, lost = 0, underruns = 0, bytes = 0, recoveries = 0;
   double seconds = 0;
-  double driver = 0, transport = 0, model = 0;  // of a core
+  double driver = 0, transport = 0, model = 0;  // shares of a core
 };
 
-// Owns a display for a while, as the daemon's pipeline does.
+// Owns a display for some time, as the daemon's pipeline does.
 class Run final : private Display::Listener {
  public:
   Run(Display& display, const TimedModel* model, sync::Clock& clock, double share)
@@ -158,7 +158,7 @@ class Run final : private Display::Listener {
     woken_ = false;
   }
 
-  // Adds (+1) or takes away (−1) what was used so far.
+  // Adds (+1) or subtracts (−1) the CPU time used so far.
   void Account(double sign) {
     timespec own{};
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &own);
@@ -279,7 +279,7 @@ Result InProcess(const Options& options, sync::Clock& clock) {
 
 Result OnUsb(const Options& options, sync::Clock& clock) {
   display::DisplayOptions what = DisplayOptionsOf(options.device, "voxlink");
-  // The device's own affairs.
+  // These options concern only the device itself.
   for (const char* key : {"pacing", "speed", "faults"}) what.options.erase(key);
   const std::unique_ptr<display::LibusbBus> bus = Must(display::LibusbBus::Make(clock));
   const std::unique_ptr<Display> display = Must(display::CreateDisplay(

@@ -43,10 +43,10 @@ std::string Begin(double height, const std::string& title) {
 }
 
 struct Axis {
-  std::vector<double> marks;  // two or more, the ends among them
+  std::vector<double> marks;  // two or more, including both ends
   double begin = 0, length = 1;
 
-  // Whole decades around all values.
+  // Returns an axis of whole decades around all values.
   static Axis OfDecades(const std::vector<double>& values, double begin, double length) {
     const auto [least, greatest] = std::minmax_element(values.begin(), values.end());
     const int first = static_cast<int>(std::floor(std::log10(*least)));

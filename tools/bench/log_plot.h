@@ -1,4 +1,4 @@
-// Plots with logarithms on their axes, and bars, as SVG that needs nothing else.
+// Logarithmic plots and bar charts, as self-contained SVG.
 #pragma once
 
 #include <string>
@@ -10,12 +10,12 @@ namespace voxeld::bench {
 struct Curve {
   std::string name;
   bool ours = false;                              // drawn thicker
-  std::vector<std::pair<double, double>> points;  // above 0, x ascending
-  bool guide = false;                             // drawn dashed and grey: no measurement
+  std::vector<std::pair<double, double>> points;  // positive, x ascending
+  bool guide = false;                             // drawn dashed and grey: not a measurement
 };
 
-// Decades are marked on both axes; on x `x_marks` instead, above 0 and ascending, if there are any:
-// the axis goes from the first to the last then.
+// Returns a plot with decades marked on both axes. If `x_marks` is not empty, x has these marks
+// instead, positive and ascending, and its axis goes from the first to the last.
 std::string LogLogSvg(const std::string& title, const std::string& x_label,
                       const std::string& y_label, const std::vector<Curve>& curves,
                       const std::vector<double>& x_marks = {});
@@ -23,10 +23,10 @@ std::string LogLogSvg(const std::string& title, const std::string& x_label,
 struct Bar {
   std::string name;
   bool ours = false;
-  double value = 0;  // above 0
+  double value = 0;  // positive
 };
 
-// Lengths go with the logarithm; each value stands beside its bar.
+// Returns a bar chart of logarithmic lengths; each value is printed beside its bar.
 std::string LogBarsSvg(const std::string& title, const std::string& label,
                        const std::vector<Bar>& bars);
 

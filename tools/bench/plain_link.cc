@@ -37,8 +37,8 @@ absl::Status Failed(const std::string& what, int result) {
   return absl::InternalError(absl::StrCat(what, ": ", libusb_error_name(result)));
 }
 
-// One whole volume as packets, and where their headers are: number and sequence are set for each
-// volume that is sent.
+// One whole volume as packets, and the positions of their headers. The volume number and the
+// sequence are set for each volume that is sent.
 class Packets {
  public:
   explicit Packets(const display::FrameLayout& layout) {
@@ -63,7 +63,8 @@ class Packets {
 
   const std::vector<std::byte>& bytes() const { return bytes_; }
 
-  // Sets the headers of volume `number` that begin in [from, to), and numbers them from `sequence` on.
+  // Sets the headers of volume `number` that begin in [from, to), and numbers them from `sequence`
+  // on.
   void Number(uint64_t number, uint32_t& sequence, size_t from, size_t to) {
     if (from == 0) next_ = 0;
     for (; next_ < headers_.size() && headers_[next_] < to; ++next_) {
@@ -95,7 +96,8 @@ class Packets {
 class PlainLink {
  public:
   explicit PlainLink(const display::FrameLayout& layout) : layout_(layout) {
-    // A transfer's headers are written while the volume before is still on its way.
+    // Two volumes, because a transfer's headers are written while the previous volume is still
+    // being sent.
     for (size_t i = 0; i < 2; ++i) volumes_.push_back(std::make_unique<Packets>(layout));
   }
   ~PlainLink() {
@@ -110,7 +112,7 @@ class PlainLink {
     if (absl::Status status = Begin(); !status.ok()) return status;
     const auto start = steady_clock::now();
     const auto end = start + std::chrono::nanoseconds(static_cast<int64_t>(seconds * 1e9));
-    // The last volume that is begun is sent to its end.
+    // A volume that has begun is sent completely.
     const auto more = [&] { return offset_ > 0 || !Over(end); };
     while (error_.empty() && (shown_ < sent_ || more())) {
       while (error_.empty() && !idle_.empty() && more()) SendNext();

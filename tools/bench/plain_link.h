@@ -1,5 +1,5 @@
-// What streaming would be at its simplest: packets that are ready in memory, handed to libusb as fast as
-// it takes them. What a driver is compared with.
+// Streaming at its simplest, as a reference for a driver: packets that are ready in memory are
+// passed to libusb as fast as it accepts them.
 #pragma once
 
 #include <cstdint>
@@ -14,9 +14,9 @@ struct PlainResult {
   double seconds = 0;
 };
 
-// Streams volumes of `layout` to the first voxlink device of the system for about `seconds`, with
-// the device's geometry unchecked. Internal with what libusb or the device said when anything is
-// not as it should be: every volume must be shown.
+// Streams volumes of `layout` to the first voxlink device of the system for about `seconds`,
+// without checking the device's geometry. Every volume must be shown; otherwise returns Internal
+// with the message of libusb or the device.
 absl::StatusOr<PlainResult> StreamPlainly(const display::FrameLayout& layout, double seconds);
 
 }  // namespace voxeld::bench

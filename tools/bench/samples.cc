@@ -11,7 +11,7 @@
 namespace voxeld::bench {
 namespace {
 
-// Of the sorted times [begin, end).
+// Returns the median of the sorted times [begin, end).
 int64_t Middle(const std::vector<int64_t>& times, size_t begin, size_t end) {
   const size_t last = begin + end - 1;
   return (times[last / 2] + times[last - last / 2]) / 2;

@@ -1,4 +1,4 @@
-// Times of one thing done several times, and a table of several such things.
+// Repeated measurements of one operation, and a table of several operations.
 #pragma once
 
 #include <cstdint>
@@ -8,31 +8,32 @@
 
 namespace voxeld::bench {
 
-// Of a set of times: the median and the quartiles, each a time that was measured or the mean of two
-// neighbours (Tukey's hinges, the median counted with both halves).
+// The median and the quartiles of a set of times. Each is a measured time or the mean of two
+// neighbours (Tukey's hinges; the median counts in both halves).
 struct Quartiles {
   int64_t low_ns = 0, median_ns = 0, high_ns = 0;
 };
 
-// `times_ns` must not be empty.
+// Requires: `times_ns` is not empty.
 Quartiles QuartilesOf(std::vector<int64_t> times_ns);
 
 struct Row {
   std::string scene, engine;
-  std::string baseline;  // the engine that it is compared with; its own name: none
+  std::string baseline;  // the engine to compare with; its own name: none
   std::vector<int64_t> times_ns;
 };
 
-// How many times the median of its baseline for the same scene a row's median is; nothing without
-// one.
+// Returns the median of a row divided by the median of its baseline for the same scene; nothing
+// without a baseline.
 std::optional<double> RatioOf(const Row& row, const std::vector<Row>& rows);
 
-// As Markdown, milliseconds.
+// Returns the rows as a Markdown table, in milliseconds.
 std::string TableOf(const std::vector<Row>& rows);
-// As a JSON array of objects: scene, engine, baseline, times_ns, low_ns, median_ns, high_ns, ratio.
+// Returns the rows as a JSON array of objects: scene, engine, baseline, times_ns, low_ns,
+// median_ns, high_ns, ratio.
 std::string JsonOf(const std::vector<Row>& rows);
 
-// "a,b" → {"a", "b"}; empty parts are left out.
+// Splits "a,b" into {"a", "b"}; empty parts are left out.
 std::vector<std::string> SplitList(const std::string& list);
 
 }  // namespace voxeld::bench

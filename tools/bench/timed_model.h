@@ -1,4 +1,4 @@
-// A device model whose processor time is told apart from that of the thread which carries it.
+// A device model whose CPU time is measured separately from that of the thread which runs it.
 #pragma once
 
 #include <pthread.h>
@@ -17,7 +17,7 @@ class TimedModel final : public display::UsbDeviceModel {
  public:
   explicit TimedModel(std::unique_ptr<display::UsbDeviceModel> inner) : inner_(std::move(inner)) {}
 
-  // Thread-safe: what the model used, and what its carrier's thread used, the model included.
+  // CPU time of the model, and of its carrier's thread including the model. Thread-safe.
   int64_t inside_ns() const { return inside_; }
   int64_t thread_ns() const {
     timespec time{};
@@ -26,7 +26,7 @@ class TimedModel final : public display::UsbDeviceModel {
     return Ns(time);
   }
 
-  // What runs when a transfer is complete is the carrier's.
+  // The completion callback runs the carrier's code, so its time is not the model's.
   void SetComplete(Complete complete) override {
     inner_->SetComplete([this, complete = std::move(complete)](auto... arguments) {
       const int64_t begin = Own();

@@ -1,5 +1,6 @@
-// What a frame's time is held against: the least that its machine needs for the same bytes, and peers that draw the
-// same lines. Each is timed in turns with the frames.
+// Upper bounds that a frame's time is compared with: the least time that the machine needs for the
+// same bytes, and reference implementations that draw the same lines. Each is timed alternately
+// with the frames.
 #pragma once
 
 #include <cstddef>
@@ -16,18 +17,19 @@ class Ceiling {
  public:
   virtual ~Ceiling() = default;
   virtual std::string name() const = 0;
-  // Once.
+  // Runs the reference once.
   virtual absl::Status Run() = 0;
 };
 
-// Of bytes that a frame of `scene` must read and write: read + written, as Traffic says.
+// Returns the number of bytes that a frame of `scene` must read and write, added together, as its
+// Traffic says.
 size_t BytesCopied(const Scene& scene);
 
-// memcpy on that many threads.
+// Measures memcpy of `bytes` on `threads` threads.
 std::unique_ptr<Ceiling> CopyCeiling(size_t bytes, int threads);
 
-// A volume cleared and the scene's lines drawn into it by a plain loop, on that many threads: no bins, no
-// priorities, no slices.
+// Measures a plain loop on `threads` threads that clears a volume and draws the scene's lines into
+// it: without bins, priorities and slices.
 std::unique_ptr<Ceiling> PlainLinesPeer(const Scene& scene, int threads);
 
 }  // namespace voxeld::bench::frame

@@ -1,4 +1,4 @@
-// The CUDA engine in this process, and its bus; FailedPrecondition in builds without CUDA.
+// The CUDA engine in this process, and its bus. Errors: FailedPrecondition in builds without CUDA.
 #pragma once
 
 #include <cstddef>
@@ -11,18 +11,19 @@
 
 namespace voxeld::bench::frame {
 
-// keep_tiles: pictures are sliced from tiles also where they could be packed as they are drawn.
+// With `keep_tiles`, slice images are sliced from tiles even if they could be packed while they are
+// drawn.
 absl::StatusOr<std::unique_ptr<gpu::Engine>> MakeCudaEngine(const gpu::EngineOptions& options,
                                                             bool keep_tiles);
 
-// A frame's buffer that the device writes directly.
+// Pins a frame's buffer so that the device can write to it directly.
 void PinFrame(std::span<std::byte> bytes);
 void UnpinFrame(std::span<std::byte> bytes);
 
-// That many bytes from the device to pinned memory.
+// Measures copying `bytes` from the device to pinned memory.
 absl::StatusOr<std::unique_ptr<Ceiling>> DeviceToHostCeiling(size_t bytes);
 
-// That many bytes within the device's memory.
+// Measures copying `bytes` within the device's memory.
 absl::StatusOr<std::unique_ptr<Ceiling>> DeviceCopyCeiling(size_t bytes);
 
 }  // namespace voxeld::bench::frame

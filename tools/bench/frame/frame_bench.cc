@@ -31,12 +31,12 @@ json SpreadJson(const std::vector<double>& values) {
   return {{"median", Median(values)}, {"least", *least}, {"greatest", *greatest}};
 }
 
-// Of all rounds of one row, in milliseconds.
+// The times of all rounds of one row, in milliseconds.
 struct Times {
   std::vector<double> apply, assemble, slice, copy, device, host, ceiling;
   std::vector<std::vector<double>> peers;
   gpu::FrameResult last;
-  uint32_t most_tiles = 0;  // drawn for a frame, also of those that are not counted
+  uint32_t most_tiles = 0;  // the most that a frame drew, uncounted frames included
 
   void Add(const FrameTimes& frame) {
     apply.push_back(static_cast<double>(frame.apply_ns) / kMs);
@@ -56,7 +56,7 @@ absl::StatusOr<double> TimeOf(Ceiling& ceiling) {
   return static_cast<double>(clock.Now() - start) / kMs;
 }
 
-// What is measured beside the engine.
+// The references that are measured beside the engine.
 struct Beside {
   std::unique_ptr<Ceiling> ceiling;
   std::vector<std::unique_ptr<Ceiling>> peers;
@@ -76,10 +76,11 @@ absl::StatusOr<Beside> BesideOf(const Scene& scene, bool cuda, int threads) {
   return out;
 }
 
-// The first two frames put up the scene and make room: neither is counted.
+// The first two frames send the scene and allocate memory, so neither is counted.
 constexpr int kWarmRounds = 2;
 
-// `alone`: the same scene on one GPU, drawn in turns; null: that is not asked for.
+// The same scene on one GPU, drawn alternately. `subject` is null unless the comparison was
+// requested.
 struct Alone {
   Subject* subject = nullptr;
   Times times;
@@ -119,7 +120,7 @@ absl::StatusOr<Times> Measure(Subject& subject, Alone& alone, Beside& beside, in
   return times;
 }
 
-// The median over rounds of what one takes of the other.
+// Returns the median over rounds of `of` divided by `to`.
 double RatioOf(const std::vector<double>& of, const std::vector<double>& to) {
   std::vector<double> ratios;
   for (size_t i = 0; i < of.size(); ++i) ratios.push_back(of[i] / to[i]);
@@ -197,7 +198,7 @@ void AddAlone(const Scene& scene, const Subject& subject, const Times& times, co
                     {"apply_ms", SpreadJson(alone.times.apply)}};
   row["speedup"] = {{"device", RatioOf(device(alone.times), device(times))},
                     {"host", RatioOf(alone.times.host, times.host)}};
-  row["same_bytes"] = true;  // or there would be no row
+  row["same_bytes"] = true;  // otherwise there would be no row
 }
 
 absl::Status CheckOptions(const FrameOptions& options) {
@@ -237,7 +238,8 @@ absl::Status CheckOptions(const FrameOptions& options) {
   return absl::OkStatus();
 }
 
-// Which numbers of threads make a row each: where there is a peer or a memcpy to stand beside, one thread too.
+// Returns the thread counts that get a row each. If there is a reference or a memcpy to compare
+// with, one thread is measured too.
 std::vector<int> ThreadsOf(const FrameOptions& options, const Scene& scene) {
   if (options.engine == "cuda") return {0};
   if (options.threads > 0) return {options.threads};

@@ -7,7 +7,7 @@
 namespace voxeld::bench::frame {
 namespace {
 
-constexpr int64_t kUnits = 256;  // a voxel
+constexpr int64_t kUnits = 256;  // units per voxel
 
 }  // namespace
 
@@ -16,7 +16,7 @@ uint32_t RandomColor(std::mt19937_64& random) {
   return color == 0 ? 1 : color;
 }
 
-// Half-open.
+// The range is half-open.
 LineSet::Units LineSet::Between(Units lo, Units hi) {
   return lo + static_cast<Units>(random_() % static_cast<uint64_t>(hi - lo));
 }

@@ -1,5 +1,5 @@
-// Sets of lines whose voxels are counted as they are made. Ends lie on multiples of 2⁻⁸ voxel, where the engine
-// snaps them to, so the count is exact.
+// Sets of lines whose voxels are counted while they are made. Ends are multiples of 2⁻⁸ voxel, to
+// which the engine snaps them, so the count is exact.
 #pragma once
 
 #include <cstdint>
@@ -10,25 +10,26 @@
 
 namespace voxeld::bench::frame {
 
-// Voxels [lo, hi).
+// The voxels [lo, hi).
 struct Extent {
   int32_t lo[3] = {0, 0, 0};
   int32_t hi[3];
 };
 
-// THIN lines, vertices two by two, in one geometry: the ends of each have its colour.
+// THIN lines in one geometry, as pairs of vertices; both ends of a line have its colour.
 class LineSet {
  public:
   explicit LineSet(uint64_t seed) : random_(seed) {}
 
-  // Ends uniform in `extent`.
+  // Adds a line whose ends are uniform in `extent`.
   void AddUniform(const Extent& extent);
-  // Of `voxels` voxels exactly, in `extent`, which must be that long on some axis.
+  // Adds a line of exactly `voxels` voxels in `extent`, which must be at least that long on some
+  // axis.
   void AddOfLength(const Extent& extent, int32_t voxels);
 
   size_t lines() const { return content_.colors.size() / 2; }
   uint64_t voxels() const { return voxels_; }
-  Content Take();  // and it is empty
+  Content Take();  // empties the set
 
  private:
   using Units = int64_t;  // 2⁻⁸ voxel
@@ -40,7 +41,7 @@ class LineSet {
   uint64_t voxels_ = 0;
 };
 
-// A colour that is not black.
+// Returns a colour that is not black.
 uint32_t RandomColor(std::mt19937_64& random);
 
 }  // namespace voxeld::bench::frame

@@ -13,7 +13,7 @@ void DrawPlainLines(const float* positions, const uint32_t* colors, size_t begin
       steps = distance > steps ? distance : steps;
     }
     const float scale = steps > 0 ? 1 / steps : 0;
-    // Centres of voxels lie on whole numbers here, so that rounding is floor(p + ½).
+    // Voxel centres have integer coordinates here, so rounding is floor(p + ½).
     const float x0 = s[0] - 0.5F, y0 = s[1] - 0.5F, z0 = s[2] - 0.5F;
     const float dx = (e[0] - s[0]) * scale, dy = (e[1] - s[1]) * scale, dz = (e[2] - s[2]) * scale;
     const uint32_t color = colors[line * 2];

@@ -1,5 +1,6 @@
-// The peer of the line scenes: a plain loop over each line that writes its voxels where they lie. Compiled for the
-// processor of the machine that builds it (-march=native), so its source includes nothing whose functions others share.
+// The reference for the line scenes: a plain loop over each line that writes its voxels directly
+// into the volume. It is compiled for the processor of the build machine (-march=native), so its
+// source includes nothing whose functions other sources share.
 #pragma once
 
 #include <cstddef>
@@ -7,10 +8,12 @@
 
 namespace voxeld::bench::frame {
 
-// Lines [begin, end), two vertices of three floats each, all inside nx × ny × … voxels, x fastest: voxel ⌊S + (E−S)·k/N⌋
-// in single precision for k = 0..N, N the greatest distance of the ends' voxels on an axis, takes the colour of the
-// line's first vertex. Single precision may end up to one voxel below 0 on an axis: before `volume` there is room for
-// PlainLinesRoom() voxels. Several threads may write into one volume.
+// Draws lines [begin, end) into a volume of nx × ny × … voxels, x fastest. Each line has two
+// vertices of three floats, all inside the volume. Voxel ⌊S + (E−S)·k/N⌋ in single precision, for k
+// = 0..N, takes the colour of the line's first vertex; N is the greatest distance of the ends'
+// voxels on an axis. Single precision may end up to one voxel below 0 on an axis.
+// Requires: room for PlainLinesRoom() voxels before `volume`. Several threads may write to one
+// volume.
 constexpr size_t PlainLinesRoom(size_t nx, size_t ny) { return nx * ny + nx + 1; }
 void DrawPlainLines(const float* positions, const uint32_t* colors, size_t begin, size_t end,
                     int nx, int ny, uint32_t* volume);

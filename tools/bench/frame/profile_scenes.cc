@@ -18,7 +18,7 @@ constexpr const char* kProfiles[] = {"vortex",    "perspecta", "vx1",       "vx2
                                      "depthcube", "helix",     "lattice-8", "lattice-20"};
 constexpr double kBalls = 400, kLines = 20'000;
 
-// The display that a profile describes; its driver plays no part.
+// Returns the display that a profile describes; its driver is not used.
 absl::StatusOr<display::DisplayInfo> DisplayOf(const std::string& name) {
   absl::StatusOr<display::Profile> profile = display::LoadProfile(name);
   if (!profile.ok()) return profile.status();

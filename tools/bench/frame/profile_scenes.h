@@ -1,4 +1,4 @@
-// Slicing to the shipped profiles' displays.
+// Scenes that measure slicing for the displays of the shipped profiles.
 #pragma once
 
 #include <cstdint>
@@ -9,9 +9,10 @@
 
 namespace voxeld::bench::frame {
 
-// A row for each profile: 400 solid balls and 20,000 lines in colours of their own, all of which move a voxel to and fro. What is
-// measured is slicing, against a copy of as many bytes as the volume and the pictures have. Profiles are
-// found as the daemon finds them (display/profiles/profile.h).
+// Returns a row for each profile: 400 solid balls and 20,000 lines in colours of their own, all of
+// which move by a voxel back and forth. Slicing is measured, against a copy of as many bytes as the
+// volume and the slice images have. Profiles are found as the daemon finds them
+// (display/profiles/profile.h).
 std::vector<MakeScene> ProfileScenes(uint64_t seed, double share);
 
 }  // namespace voxeld::bench::frame

@@ -13,7 +13,7 @@
 namespace voxeld::bench::frame {
 namespace {
 
-constexpr double kBeside = 0.6;  // the guide's time, of the slowest's
+constexpr double kBeside = 0.6;  // time of the guide, as a share of the slowest
 
 }  // namespace
 

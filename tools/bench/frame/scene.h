@@ -1,4 +1,4 @@
-// The scenes whose frames are measured, the same for one seed on every machine.
+// The scenes whose frames are measured; they are the same for one seed on every machine.
 #pragma once
 
 #include <array>
@@ -13,8 +13,8 @@
 
 namespace voxeld::bench::frame {
 
-// A geometry and the one drawable that puts it into a layer; of `record` the id and the counts are
-// whoever's who writes it into a delta.
+// A geometry and the one drawable that puts it into a layer. The code that writes it into a delta
+// sets the id and the counts of `record`.
 struct Content {
   gpu::GeometryRecord record;
   std::vector<float> positions;
@@ -24,40 +24,45 @@ struct Content {
   gpu::Affine transform;
 };
 
-// What the frame's time is compared with, besides.
+// The traffic that the frame's time is also compared with.
 enum class Traffic {
   kPictures,  // a copy of the frame's bytes
-  kVolumeAndPictures,  // a copy that reads and writes as many bytes as the volume and the pictures have together
+  // a copy that reads and writes as many bytes as the volume and the slice images together
+  kVolumeAndPictures,
 };
 
-// In voxel coordinates: the view is the identity.
+// A scene in voxel coordinates: its view is the identity.
 struct Scene {
   std::string name;  // of the row: "lines1g", "moving, 5 % of the lines"
   gpu::Target target;
   std::vector<gpu::LayerRecord> layers;
   std::vector<Content> contents;
-  // Not empty: in every frame the one takes the other's place. Else every layer moves by one voxel along x, there
-  // and back, and nothing leaves the volume: the draw list is the same, and all of it is drawn anew.
+  // If not empty, every frame replaces one of the two by the other. Otherwise every layer moves by
+  // one voxel along x, there and back, and nothing leaves the volume: the draw list stays the same,
+  // and all of it is drawn again.
   std::array<std::vector<Content>, 2> changing;
-  // That a frame draws, each as often as something covers it: of `changing` alone where that is not empty.
-  // 0: not to be counted from outside; the engine's count of those that came out lit stands for it.
+  // Voxels that a frame draws, each counted as often as something covers it; those of `changing`
+  // alone if that is not empty. 0 if they cannot be counted from outside: the engine's count of lit
+  // voxels is used instead.
   uint64_t voxels = 0;
-  uint64_t scene_voxels = 0;      // of all
-  double volumes_per_second = 0;  // that the display shows; 0: as fast as may be
-  bool slicing_only = false;      // what is measured is slice_ns
+  uint64_t scene_voxels = 0;      // of the whole scene
+  double volumes_per_second = 0;  // the display's rate; 0: as fast as possible
+  bool slicing_only = false;      // slice_ns is what is measured
   Traffic traffic = Traffic::kPictures;
   bool in_device =
-      false;  // on a GPU that copy is within its memory; else of the pictures to the host
-  bool plain_peer = false;  // measured beside a plain loop over the same lines
+      false;  // on a GPU, copy within its memory; otherwise copy the slice images to the host
+  bool plain_peer = false;  // also measured against a plain loop over the same lines
 };
 
-// Made when it is its turn: some are large. An error: a description that it is made of cannot be read.
+// Makes a scene when its turn comes, because some are large. Fails if a description that it needs
+// cannot be read.
 using MakeScene = std::function<absl::StatusOr<Scene>()>;
 
-// "lines1g", …
+// Returns the names of all scenes: "lines1g", …
 std::vector<std::string> SceneNames();
 
-// The rows of a scene of SceneNames(). `share`, above 0 and up to 1: of its primitives.
+// Returns the rows of a scene of SceneNames(). `share`, above 0 and up to 1, is the share of its
+// primitives to keep.
 std::vector<MakeScene> ScenesOf(const std::string& name, uint64_t seed, double share);
 
 }  // namespace voxeld::bench::frame

@@ -51,7 +51,8 @@ Scene OneLayer(std::string name, gpu::Target target) {
 
 namespace {
 
-// The display's voxels; without the last layer along x, so that what lies in it may move there.
+// Returns the display's voxels. If the scene `moves`, the last layer along x is left out, so that
+// the contents can move into it.
 Extent ExtentOf(const gpu::Target& target, bool moves) {
   const display::VoxelGrid& grid = target.geometry.grid;
   return {{0, 0, 0}, {grid.nx - (moves ? 1 : 0), grid.ny, grid.nz}};
@@ -81,7 +82,7 @@ Scene ShortLines(uint64_t count, uint64_t seed) {
   return scene;
 }
 
-// All lines anew in each frame.
+// Makes a scene whose lines are all replaced in each frame.
 Scene Replaced(const std::string& name, gpu::Target target, uint64_t count, int32_t voxels,
                uint64_t seed) {
   Scene scene = OneLayer(name, std::move(target));
@@ -97,8 +98,8 @@ Scene Replaced(const std::string& name, gpu::Target target, uint64_t count, int3
 
 constexpr int32_t kMovingVoxels = 20;
 
-// Of `count` lines those that lie in a box at the volume's corner, `side` of it along each axis, at
-// most `most` of them: they change, and stay in it.
+// Makes `count` lines of which those inside a box at the volume's corner change and stay in the
+// box. Its side is the share `side` of the volume's; at most `most` lines change.
 Scene MovingInBox(uint64_t count, double side, size_t most, const std::string& where,
                   uint64_t seed) {
   Scene scene = OneLayer("", Stack(512, 512, 256, PixelFormat::kBitPlanes));
@@ -137,7 +138,7 @@ Scene MovingInBox(uint64_t count, double side, size_t most, const std::string& w
   return scene;
 }
 
-// A sphere of 2 · `around` · (`bands` − 1) triangles.
+// Makes a sphere of 2 · `around` · (`bands` − 1) triangles.
 Content UvSphere(double radius, double middle, int bands, int around) {
   Content mesh;
   mesh.record.kind = gpu::PrimitiveKind::kTriangles;
@@ -170,7 +171,7 @@ Content UvSphere(double radius, double middle, int bands, int around) {
   return mesh;
 }
 
-// 101,120 triangles.
+// Makes a mesh of 101,120 triangles.
 Scene Mesh(gpu::SurfaceRule rule, double share) {
   const bool thin = rule == gpu::SurfaceRule::kThin;
   Scene scene =
@@ -182,7 +183,7 @@ Scene Mesh(gpu::SurfaceRule rule, double share) {
   return scene;
 }
 
-// What it encloses.
+// Makes the volume that the mesh encloses.
 Scene FilledMesh(double share) {
   Scene scene = Mesh(gpu::SurfaceRule::kThin, share);
   scene.name = "mesh, filled";
@@ -218,7 +219,8 @@ Content Solid(gpu::PrimitiveKind kind, std::initializer_list<float> params, uint
   return solid;
 }
 
-// Lines, points, triangles and solids in four layers of 256³ voxels: opaque, half opaque over it, added, erasing.
+// Lines, points, triangles and solids in four layers of 256³ voxels: opaque, half opaque above it,
+// added, erasing.
 Scene Mixed(double share, uint64_t seed) {
   using gpu::PrimitiveKind;
   Scene scene = OneLayer("mixed", Stack(256, 256, 256, PixelFormat::kRgb888));
@@ -281,8 +283,8 @@ gpu::Target LatticeTarget(int32_t n) {
   return TargetOf(std::move(geometry), PixelFormat::kRgb888);
 }
 
-// Two panels of 128×64, 360 slices a turn, in 128×128×64 voxels that are all lit, also when they have moved. Where panels
-// are tilted footprints are kept pixel by pixel.
+// Two panels of 128×64, 360 slices per turn, in 128×128×64 voxels that are all lit, also after they
+// have moved. If the panels are tilted, footprints are stored per pixel.
 Scene LitRotor(const char* name, float tilt_deg, uint64_t seed) {
   display::Rotor rotor;
   rotor.slices_per_turn = 360;
@@ -321,7 +323,7 @@ Scene LitRotor(const char* name, float tilt_deg, uint64_t seed) {
 
 gpu::Target LargeStack() { return Stack(1024, 1024, 256, PixelFormat::kBitPlanes); }
 
-// What changes lies in a part of the volume, and what is dirty with it.
+// Rows whose changes, and with them the dirty region, lie in a part of the volume.
 std::vector<MakeScene> MovingRows(uint64_t seed, double share) {
   const uint64_t count = Share(1'000'000, share);
   std::vector<MakeScene> rows = {[=] { return MovingInBox(count, 1.0 / 8, 1000, "a cube", seed); }};
@@ -339,7 +341,7 @@ struct Named {
   std::vector<MakeScene> (*rows)(uint64_t seed, double share);
 };
 
-// Lines from anywhere to anywhere: 1,100 voxels each, on the average, in 2048³.
+// Lines between random places: 1,100 voxels each on average, in 2048³.
 Scene HugeLines(uint64_t count, uint64_t seed) {
   Scene scene = OneLayer("huge", Stack(2048, 2048, 2048, PixelFormat::kBitPlanes));
   const Extent extent = ExtentOf(scene.target, true);

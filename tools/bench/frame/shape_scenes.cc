@@ -19,7 +19,7 @@ namespace {
 using display::PixelFormat;
 using gpu::implicit::Graph;
 
-// In voxels, from the middle of n³ of them.
+// Returns the shape in voxels, relative to the middle of n³ voxels.
 Content Shape(const Graph& graph, Graph::Node surface, int32_t n) {
   Content content;
   content.record.kind = gpu::PrimitiveKind::kImplicit;
@@ -29,7 +29,7 @@ Content Shape(const Graph& graph, Graph::Node surface, int32_t n) {
   return content;
 }
 
-// Of a cube with that share of 512³.
+// Returns the side of a cube with that share of the volume of 512³.
 int32_t SideOf(double share) {
   return std::max<int32_t>(64, static_cast<int32_t>(std::lround(512 * std::cbrt(share))));
 }
@@ -114,14 +114,14 @@ Scene SampledVolume(bool by_level, double share) {
   head.bricks = gpu::BrickWords(head.size);
   content.indices.resize(gpu::SampleWords(head.size, static_cast<uint32_t>(head.format)));
   std::memcpy(content.indices.data(), &head, sizeof(head));
-  // The upper three quarters of the numbers, from dark to light.
+  // The upper three quarters of the values are coloured, from dark to light.
   for (uint32_t i = 64; i < gpu::SampleHead::kTableEntries; ++i) {
     content.indices[gpu::kSampleHeadWords + i] =
         gpu::SampleHead::kDrawn | i << 16 | (i / 2) << 8 | (255 - i);
   }
   auto* const samples = reinterpret_cast<uint16_t*>(
       &content.indices[gpu::kSampleHeadWords + gpu::SampleHead::kTableEntries + head.bricks]);
-  // Waves in three directions.
+  // The samples are waves in three directions.
   size_t at = 0;
   for (uint32_t z = 0; z < count; ++z) {
     for (uint32_t y = 0; y < count; ++y) {
@@ -132,7 +132,7 @@ Scene SampledVolume(bool by_level, double share) {
     }
   }
   gpu::FillBricks(content.record, content.indices);
-  // Turned by 30° about two axes, so that it fills most of the display.
+  // The volume is turned by 30° about two axes, so that it fills most of the display.
   const double c = std::cos(std::numbers::pi / 6), s = std::sin(std::numbers::pi / 6);
   constexpr double kScale = 1.4;
   const double turn[9] = {c, -s * c, s * s, s, c * c, -c * s, 0, s, c};

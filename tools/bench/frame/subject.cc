@@ -27,7 +27,7 @@ gpu::DrawableRecord DrawableOf(const Content& content, uint64_t id, uint64_t geo
           .transform = content.transform};
 }
 
-// Nothing is lost for being slow: the first frames map and pin gigabytes.
+// The deadline is generous because the first frames map and pin gigabytes.
 constexpr int64_t kDeadline = 60 * sync::kSecond;
 
 size_t SizeOf(const Content& content) {
@@ -81,8 +81,9 @@ absl::Status Subject::SetTarget() {
   return done.get_future().get();
 }
 
-// Geometries and drawables: those of `contents` from 1 on, those of `changing` behind them, its geometries under one
-// set of numbers in even frames and another in odd ones.
+// Writes geometries and drawables to staging. Those of `contents` have numbers from 1 on and those
+// of `changing` follow; the geometries of `changing` use one set of numbers in even frames and
+// another in odd ones.
 absl::StatusOr<gpu::StagingBlock> Subject::Change(size_t* size) {
   const bool first = drawn_ == 0;
   const auto& set = scene_.changing[drawn_ % 2];

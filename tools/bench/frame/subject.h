@@ -1,4 +1,4 @@
-// An engine at its work on one scene.
+// An engine that is measured on one scene.
 #pragma once
 
 #include <cstdint>
@@ -14,13 +14,14 @@
 
 namespace voxeld::bench::frame {
 
-// One frame: the change written and taken in, and the frame itself, each waited for.
+// The times of one frame. The change is applied first and then the frame is drawn; each step is
+// waited for.
 struct FrameTimes {
-  int64_t apply_ns = 0;  // Apply, until it is done; the change lay in staging already
-  int64_t host_ns = 0;   // SubmitFrame, until the bytes are in the caller's buffer
+  int64_t apply_ns = 0;  // from Apply until it is done; the change is already in staging
+  int64_t host_ns = 0;   // from SubmitFrame until the bytes are in the caller's buffer
   gpu::FrameResult result;
 
-  // Until the pictures were packed in the engine's memory.
+  // Returns the time until the slice images were packed in the engine's memory.
   int64_t device_ns() const { return result.assemble_ns + result.slice_ns; }
 };
 
@@ -28,12 +29,12 @@ class Subject {
  public:
   struct Machine {
     std::string engine = "cpu";  // or "cuda"
-    int threads = 0;             // of the CPU engine; 0: one a core
-    // 0: in this process. Else as a display has it: so many GPUs, from 0 on, each in a process of its
-    // own (of the CPU engine, so many processes).
+    int threads = 0;             // of the CPU engine; 0: one per core
+    // 0: draws in this process. Otherwise draws as for a display on that many GPUs, from 0 on, each
+    // in a process of its own (for the CPU engine: that many processes).
     int gpus = 0;
     std::string nccl;         // gpu::EngineOptions::nccl
-    bool keep_tiles = false;  // of the CUDA engine in this process
+    bool keep_tiles = false;  // for the CUDA engine in this process
   };
   // The scene must outlive the subject.
   static absl::StatusOr<std::unique_ptr<Subject>> Create(const Machine& machine,
@@ -45,7 +46,7 @@ class Subject {
   const gpu::EngineInfo& info() const { return engine_->info(); }
   const std::vector<std::byte>& pictures() const { return bytes_; }
 
-  // Changes the scene as it says, and draws. The first also puts up what stays.
+  // Applies the scene's change and draws a frame. The first call also sends the contents that stay.
   absl::StatusOr<FrameTimes> Draw();
 
  private:

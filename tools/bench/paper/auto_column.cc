@@ -16,7 +16,7 @@ using gpu::generate::BytesOf;
 using gpu::generate::Candidate;
 using gpu::generate::Generator;
 
-// No ceiling of its own: what it is measured against are the other columns.
+// This column has no ceiling of its own: it is compared with the other columns.
 class Chosen final : public Column {
  public:
   explicit Chosen(std::unique_ptr<AutoGenerator> generator) : generator_(std::move(generator)) {}

@@ -12,7 +12,7 @@ namespace {
 using gpu::generate::BytesOf;
 using gpu::generate::Generator;
 
-// Below it one thread writes.
+// Below this size one thread writes.
 constexpr uint64_t kSharedBytes = (128 << 10) * 12;
 
 class CpuColumn final : public Column {

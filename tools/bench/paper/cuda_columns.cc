@@ -22,7 +22,8 @@ absl::Status ToStatus(const char* what, cudaError_t error) {
   return absl::InternalError(std::string(what) + ": " + cudaGetErrorString(error));
 }
 
-// Work that was queued once and is launched again as a whole, so that what a launch costs is shared.
+// Work that was queued once and is launched repeatedly as a whole, so that the cost of a launch is
+// shared.
 class Graph {
  public:
   Graph() = default;
@@ -55,7 +56,7 @@ class Graph {
   cudaGraphExec_t graph_ = nullptr;
 };
 
-// Beyond it a launch and a wait are no part of a call that is worth naming.
+// Above this size, the launch and the wait are a negligible part of a call.
 constexpr uint64_t kTogetherBelow = uint64_t{64} << 20;  // bytes
 constexpr int kTogether = 64;
 

@@ -15,7 +15,7 @@ std::string PaperName(size_t machine) {
   return absl::StrCat(std::string(kHardware[machine].name), " (", kHardware[machine].year, ")");
 }
 
-// Of what ends on the host, under a name for people.
+// Returns the readable name of a row whose result ends on the host.
 std::string OurName(const json& row) {
   if (row["engine"] == "cuda") return "ours, CUDA with the copy";
   if (row["engine"] == "auto") return "ours, auto";

@@ -1,4 +1,4 @@
-// The paper's Figures 5 to 9 with ours in them.
+// The paper's Figures 5 to 9 with our measurements added.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -8,8 +8,8 @@
 
 namespace voxeld::bench::paper {
 
-// Names of files and their contents, of a report's rows (paper_bench.h). Those of tables that were not measured
-// are left out. All times include the copy to the host.
+// Returns file names and contents, made from a report's rows (paper_bench.h). Figures of tables
+// that were not measured are left out. All times include the copy to the host.
 std::vector<std::pair<std::string, std::string>> FiguresOf(const nlohmann::json& report);
 
 }  // namespace voxeld::bench::paper

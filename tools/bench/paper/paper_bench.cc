@@ -27,7 +27,8 @@ double Median(std::vector<double> values) {
   return n % 2 == 1 ? values[n / 2] : (values[n / 2 - 1] + values[n / 2]) / 2;
 }
 
-// A short one is timed when it has just been done: what was done in between took the caches.
+// Times a call. A short call is timed directly after an untimed one, because the work in between
+// displaced the caches.
 absl::StatusOr<double> Timed(Column& column, absl::Status (Column::*what)(), bool is_short) {
   if (is_short) {
     if (absl::Status status = (column.*what)(); !status.ok()) return status;
@@ -38,7 +39,7 @@ absl::StatusOr<double> Timed(Column& column, absl::Status (Column::*what)(), boo
 }
 
 struct Figures {
-  std::vector<double> calls, ceilings;  // seconds, in turns
+  std::vector<double> calls, ceilings;  // seconds, alternately
 };
 
 absl::StatusOr<Figures> Measure(Column& column, double seconds,
@@ -56,7 +57,7 @@ absl::StatusOr<Figures> Measure(Column& column, double seconds,
       if (!timed.ok()) return timed.status();
       ceiling = *timed;
     }
-    if (i == 0) continue;  // the first touches memory and wakes what sleeps
+    if (i == 0) continue;  // the first round touches memory and wakes idle parts
     out.calls.push_back(*call);
     out.ceilings.push_back(ceiling);
     sum += *call * column.repeats();
@@ -142,7 +143,7 @@ absl::StatusOr<std::vector<std::unique_ptr<Column>>> Columns(
   if (Has(options.engines, "cpu")) columns = CpuColumns();
   if (Has(options.engines, "cuda")) {
     auto cuda = CudaColumns();
-    // Only whoever asked for it is owed it.
+    // A missing CUDA is an error only if engines were named.
     if (!cuda.ok() && !options.engines.empty()) return cuda.status();
     if (!cuda.ok()) progress(absl::StrCat("no CUDA: ", std::string(cuda.status().message())));
     if (cuda.ok()) std::move(cuda->begin(), cuda->end(), std::back_inserter(columns));
@@ -163,7 +164,7 @@ std::string ColumnName(const json& row) {
   return row["host_copy"] ? "CUDA, to the host" : "CUDA, on the device";
 }
 
-// Milliseconds, in three figures.
+// Formats milliseconds with three significant digits.
 std::string Ms(double ms) {
   return ms < 1 ? absl::StrFormat("%.3g", ms) : absl::StrFormat("%.*f", ms < 100 ? 2 : 0, ms);
 }
@@ -211,7 +212,7 @@ absl::StatusOr<json> MeasurePaper(const PaperOptions& options,
 }
 
 std::string PaperText(const json& report) {
-  // Rows of one batch stand together.
+  // Rows of one batch are printed together.
   std::string out = absl::StrFormat("seed %d; vectors: %s\n", uint64_t(report["seed"]),
                                     std::string(report["vectors"]));
   if (report.contains("ceilings_gb_per_s")) {

@@ -1,5 +1,6 @@
-// What the paper measured: Al-Oraiqat and Zori, "3D Primitives GPGPU Generation for Volume Visualization in 3D
-// Graphics Systems", Tables 2 to 4. Times in milliseconds, the copy to the host included.
+// The measurements of the paper: Al-Oraiqat and Zori, "3D Primitives GPGPU Generation for Volume
+// Visualization in 3D Graphics Systems", Tables 2 to 4. Times are in milliseconds and include the
+// copy to the host.
 #pragma once
 
 #include <array>
@@ -11,7 +12,7 @@ namespace voxeld::bench::paper {
 
 struct Hardware {
   std::string_view name;
-  int year;  // in which it came out
+  int year;  // of release
 };
 inline constexpr size_t kMachines = 5;
 inline constexpr std::array<Hardware, kMachines> kHardware = {{{"Core 2 Quad Q9550", 2008},
@@ -21,11 +22,11 @@ inline constexpr std::array<Hardware, kMachines> kHardware = {{{"Core 2 Quad Q95
                                                                {"GTX 1070", 2016}}};
 
 struct Row {
-  uint64_t voxels;  // of each segment
+  uint64_t voxels;  // per segment
   std::array<double, kMachines> ms;
 };
 
-// One segment.
+// Table 2: one segment.
 inline constexpr std::array<Row, 10> kTable2 = {
     {{1000, {0.05, 1.84, 1.57, 0.91, 0.45}},
      {2000, {0.08, 1.86, 1.58, 0.92, 0.46}},
@@ -38,7 +39,7 @@ inline constexpr std::array<Row, 10> kTable2 = {
      {500000, {8.74, 7.89, 7.01, 4.51, 2.22}},
      {1000000, {16.3, 12.79, 11.42, 7.31, 3.65428571}}}};
 
-// 1024 segments of one length.
+// Table 3: 1024 segments of one length.
 inline constexpr uint64_t kSegments = 1024;
 inline constexpr std::array<Row, 11> kTable3 = {
     {{20, {3.2, 3.42, 1.46, 0.84, 0.42}},
@@ -53,7 +54,7 @@ inline constexpr std::array<Row, 11> kTable3 = {
      {100000, {2640.33, 1527.20, 681.79, 436.34, 218.17}},
      {200000, {5315.296, 2993.31, 1336.30, 855.23, 427.62}}}};
 
-// 1024 segments of different lengths, a thousand million voxels together.
+// Table 4: 1024 segments of different lengths, 10⁹ voxels in total.
 inline constexpr uint64_t kGigavoxel = 1'000'000'000;
 inline constexpr std::array<double, kMachines> kTable4 = {119729.2, 29932.29, 13000.30, 8051.23,
                                                           4071.01};

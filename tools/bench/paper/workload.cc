@@ -11,7 +11,8 @@ using gpu::generate::Output;
 using gpu::generate::Segment;
 using gpu::generate::StepsOf;
 
-// Directions are spread evenly; a length half a voxel beyond the last step survives all rounding.
+// Makes segments. Directions are spread evenly; a length of half a voxel beyond the last step is
+// safe against rounding.
 class Maker {
  public:
   explicit Maker(uint64_t seed) : random_(seed) {}
@@ -55,7 +56,7 @@ Workload OfLengths(const std::string& table, const std::vector<uint64_t>& length
   return out;
 }
 
-// Lengths of 0.05 to 1.95 times the mean that add up to `total`.
+// Returns lengths of 0.05 to 1.95 times the mean that add up to `total`.
 std::vector<uint64_t> Lengths(uint64_t count, uint64_t total, uint64_t seed) {
   Maker maker(seed);
   std::vector<uint64_t> lengths;
@@ -63,11 +64,11 @@ std::vector<uint64_t> Lengths(uint64_t count, uint64_t total, uint64_t seed) {
   for (uint64_t i = 0; i < count; ++i) {
     const double length =
         static_cast<double>(total) / static_cast<double>(count) * maker.Within(0.05, 1.95);
-    // Ends less than a voxel apart may lie in two.
+    // Ends less than a voxel apart may lie in two voxels.
     lengths.push_back(std::max<uint64_t>(2, static_cast<uint64_t>(length)));
     sum += lengths.back();
   }
-  // What is missing, or too much, is shared by all.
+  // The difference to `total` is spread over all lengths.
   for (uint64_t i = 0; sum != total; i = (i + 1) % count) {
     const auto difference = static_cast<int64_t>(total) - static_cast<int64_t>(sum);
     const int64_t part = difference / static_cast<int64_t>(count) + (difference > 0 ? 1 : -1);

@@ -1,4 +1,5 @@
-// A client that commits one line now and then, alone and beside another owner that uploads a large scene again and again.
+// Measures a client that occasionally commits one line, alone and beside another owner that
+// repeatedly uploads a large scene.
 #include <algorithm>
 #include <memory>
 #include <utility>
@@ -20,7 +21,7 @@ constexpr int kEntitiesAMessage = 10'000;
 constexpr int kLineVariants = 4;  // of the line
 constexpr sync::TimeNs kQuietLimit = 120 * sync::kSecond;
 
-// The large scene is dim and the line is in front of it, so that the line always changes the volume.
+// The large scene is dim and the line is in front of it, so the line always changes the volume.
 v1::StreamRequest LayerOf(const std::string& name, int order, uint32_t opacity) {
   v1::StreamRequest request;
   v1::LayerState* state = request.mutable_layer_state();
@@ -30,7 +31,7 @@ v1::StreamRequest LayerOf(const std::string& name, int order, uint32_t opacity) 
   return request;
 }
 
-// One frame: every entity is a line of its own, and all are committed at once.
+// Returns one frame in which every entity is a line of its own and all are committed at once.
 Frames LargeFrame(int entities) {
   std::vector<Message> messages = {Message(LayerOf("large", 0, 100))};
   for (int first = 0; first < entities; first += kEntitiesAMessage) {
@@ -90,7 +91,7 @@ absl::StatusOr<nlohmann::json> RunBeside(const BesideOptions& options, const Sur
       {.program = with.daemon,
        .displays = {absl::StrCat("sim=simulated,rate=", options.volumes_per_second, ",",
                                  options.display)},
-       // A million entities are more than a commit may bring by default.
+       // The limits are raised because a commit may not contain a million entities by default.
        .config = "[limits]\nmax_uncommitted_bytes = 1_073_741_824\nmax_operations_per_commit = "
                  "1_000_100\n"});
   if (!daemon.ok()) return daemon.status();
@@ -98,7 +99,7 @@ absl::StatusOr<nlohmann::json> RunBeside(const BesideOptions& options, const Sur
   Party small(loop, (*daemon)->unix_target(), OneLine());
   Party large(loop, (*daemon)->unix_target(), LargeFrame(options.entities));
   Latencies* now = nullptr;
-  uint64_t seen = 0;  // the newest frame that has been seen
+  uint64_t seen = 0;  // the newest frame that was shown
   small.session.OnReceipt([&](const v1::Receipt& receipt) {
     const auto took_ms = [&](uint64_t frame_id) {
       return static_cast<double>(Now() - small.sender.SentAt(frame_id)) / sync::kMillisecond;
@@ -106,7 +107,7 @@ absl::StatusOr<nlohmann::json> RunBeside(const BesideOptions& options, const Sur
     if (now == nullptr) return;
     if (receipt.has_accepted()) now->accepted_ms.push_back(took_ms(receipt.frame_id()));
     if (receipt.has_outcome() && receipt.outcome().has_presented()) {
-      // A commit that this one has superseded is seen with it.
+      // A commit that this one superseded became visible with it.
       for (; seen < receipt.frame_id(); ++seen) {
         now->lit_volumes.push_back(took_ms(seen + 1) / 1000 * options.volumes_per_second);
       }

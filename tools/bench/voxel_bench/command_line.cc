@@ -16,7 +16,7 @@ namespace {
 constexpr double kMostSeconds = 86'400;
 constexpr int kMostRounds = 1000;
 
-// NaN is in no range.
+// Rejects NaN too.
 CLI::Validator Between(double least, double most) {
   return CLI::Validator(
       [least, most](const std::string& text) -> std::string {

@@ -1,4 +1,4 @@
-// What the command line of voxel-bench asks for.
+// The command line of voxel-bench.
 #pragma once
 
 #include <string>
@@ -20,11 +20,11 @@ struct CommandLine {
   std::variant<IngestOptions, LatencyOptions, FairnessOptions, BesideOptions, OverloadOptions,
                IdleOptions, PaperOptions, FrameOptions, SinkOptions>
       command;
-  // Not empty: to be printed, and that is all.
+  // If not empty, the program prints it and exits.
   std::string print_and_exit;
 };
 
-// `arguments` without the program's name. InvalidArgument is a usage error.
+// `arguments` excludes the program's name. Errors: InvalidArgument for a usage error.
 absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arguments);
 
 }  // namespace voxeld::bench

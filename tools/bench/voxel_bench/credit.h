@@ -1,4 +1,4 @@
-// How much a stream may send: the client's side of the contract's credits.
+// How much a stream may send: the client's side of the credit protocol.
 #pragma once
 
 #include <algorithm>
@@ -8,14 +8,14 @@ namespace voxeld::bench {
 
 class Credit {
  public:
-  // What Opened or a later answer said, in all since the stream began. A server that never says
-  // anything but 0 does not pace.
+  // Sets the total credit since the stream began, as Opened or a later response reported it. A
+  // server that only ever reports 0 does not limit the stream.
   void Told(uint64_t credit_bytes) { credit_ = std::max(credit_, credit_bytes); }
   void Sent(uint64_t bytes) { sent_ += bytes; }
 
-  // Whether a message may go out: some credit is left, though the message may exceed it.
+  // Returns whether a message may be sent: some credit is left, though the message may exceed it.
   bool MaySend() const { return MaySendAfter(0); }
-  // Whether one may still go out when `bytes` more have been sent.
+  // Returns whether another message may be sent after `bytes` more bytes.
   bool MaySendAfter(uint64_t bytes) const { return credit_ == 0 || sent_ + bytes < credit_; }
 
   uint64_t sent() const { return sent_; }

@@ -1,4 +1,5 @@
-// Many clients at once, each as fast as its credit lets it: who gets how much.
+// Measures how throughput is divided between many clients that each send as fast as their credit
+// allows.
 #include <algorithm>
 #include <cstdint>
 #include <limits>
@@ -90,7 +91,8 @@ absl::StatusOr<nlohmann::json> RunFairness(const FairnessOptions& options,
     return absl::OkStatus();
   };
 
-  // All go on from round to round: what counts is what each gets while all want.
+  // All clients continue from round to round, so each measurement is taken while all of them
+  // compete.
   for (const auto& client : clients) client->sender.SetEndless(true);
   const auto duration = static_cast<sync::TimeNs>(options.seconds * sync::kSecond);
   if (absl::Status ran = loop.RunTo(Now() + duration / 4); !ran.ok()) return ran;
@@ -113,7 +115,7 @@ absl::StatusOr<nlohmann::json> RunFairness(const FairnessOptions& options,
     }
     const double mean = MeanOf(rates);
     const Spread spread = SpreadOf(rates);
-    // Of whole numbers: a mean of rates may round to less than each of them.
+    // Compares whole numbers, because rounding may make a mean of rates smaller than each rate.
     const uint64_t least_of_each = least * clients.size();
     slowest.push_back(
         together == 0 ? 0 : static_cast<double>(least_of_each) / static_cast<double>(together));

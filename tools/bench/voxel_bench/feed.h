@@ -1,4 +1,4 @@
-// The same bytes for a while, to the daemon or to the bare sink.
+// Sends the same bytes for some time, to the daemon or to the bare sink.
 //
 // Bound to its loop's thread.
 #pragma once
@@ -15,8 +15,8 @@
 
 namespace voxeld::bench {
 
-// What was taken in a round: from the first byte until the daemon has applied the last commit, or the sink
-// has counted the last byte.
+// The amount that was received in a round: from the first byte until the daemon has applied the
+// last commit, or the sink has counted the last byte.
 struct Fed {
   uint64_t frames = 0, bytes = 0;
   sync::TimeNs took_ns = 0;
@@ -24,23 +24,24 @@ struct Fed {
 
 using Frames = std::vector<std::vector<Message>>;
 
-// When what is written goes to the transport.
+// When written messages are passed to the transport.
 enum class Flush : uint8_t {
-  kEachFrame,  // with the commit, or once gRPC's buffers are full: all but the last say that more follows
-  kEachMessage,  // at once, as gRPC writes when it is not told otherwise
+  // with the commit, or when gRPC's buffers are full: all but the last say that more follows
+  kEachFrame,
+  kEachMessage,  // immediately, which is gRPC's default
 };
 
 class Feed {
  public:
   virtual ~Feed() = default;
-  // Whole frames, each with its commit, in turns.
+  // Sends whole frames, each with its commit, cyclically.
   virtual absl::StatusOr<Fed> Round(sync::TimeNs duration) = 0;
 };
 
-// One session for all rounds, so that after the first frame everything is replaced.
+// Uses one session for all rounds, so every frame after the first replaces everything.
 absl::StatusOr<std::unique_ptr<Feed>> FeedDaemon(Loop& loop, const Target& target, Frames frames,
                                                  Flush flush);
-// One call a round.
+// Makes one call per round.
 std::unique_ptr<Feed> FeedSink(Loop& loop, const std::string& target, Frames frames, Flush flush);
 
 }  // namespace voxeld::bench

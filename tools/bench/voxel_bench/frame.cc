@@ -1,4 +1,4 @@
-// Whole frames, as one of the benchmarks.
+// The benchmark of whole frames.
 #include <algorithm>
 #include <fstream>
 #include <string>
@@ -16,7 +16,8 @@ namespace {
 constexpr double kLatencySeconds = 5;
 constexpr int kMostLatencyRounds = 5;
 
-// The same scene by way of the daemon: from a commit's sending to the last byte in the transport, 200 times a second.
+// Measures the same scene through the daemon: from sending a commit to the last byte in the
+// transport, 200 times a second.
 absl::StatusOr<nlohmann::json> DaemonLatency(const FrameOptions& options,
                                              const Surroundings& with) {
   LatencyOptions latency;
@@ -51,7 +52,7 @@ absl::StatusOr<nlohmann::json> Measured(const FrameOptions& options, const Surro
   return report;
 }
 
-// Whether it has what the text and the figure take of a row that is read again.
+// Returns whether a row that is read from a file has everything that the text and the figure use.
 bool IsRow(const nlohmann::json& row) {
   const auto is_string = [&](const char* key) { return row.contains(key) && row[key].is_string(); };
   return row.is_object() && is_string("scene") && is_string("engine") && is_string("device") &&
@@ -62,7 +63,7 @@ bool IsRow(const nlohmann::json& row) {
          row["device_ms"]["median"] > 0;
 }
 
-// All rows of several reports.
+// Returns all rows of several reports.
 absl::StatusOr<nlohmann::json> Read(const std::vector<std::string>& files) {
   nlohmann::json report = ReportOf("frame", {{"from", files}});
   report["rows"] = nlohmann::json::array();

@@ -1,4 +1,4 @@
-// What streams cost that do nothing, and what a normal client notices of those that do not read.
+// Measures what idle streams cost, and how streams that do not read affect a normal client.
 #include <algorithm>
 #include <functional>
 #include <memory>
@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kLines = 100, kEntities = 10, kVariants = 16;
 constexpr double kVoxels = 20, kDisplayVoxels = 64;
-constexpr int kShared = 50;  // streams on one connection, where they share it
+constexpr int kShared = 50;  // streams per connection if they share connections
 constexpr sync::TimeNs kFastStats = 10 * sync::kMillisecond;
 constexpr sync::TimeNs kSlowRead = sync::kSecond;
 constexpr sync::TimeNs kOpenLimit = 30 * sync::kSecond;
@@ -29,8 +29,8 @@ v1::Open OpenAsked(const char* name) {
   return open;
 }
 
-// Commits and commits, heeding no credit, and reads nothing after Opened. Where the daemon ends it,
-// another follows.
+// Sends commits without respecting its credit, and reads nothing after Opened. If the daemon ends
+// its call, it starts another.
 class DeafClient {
  public:
   DeafClient(Loop& loop, const std::string& target) : loop_(loop), connection_(target) {}
@@ -53,7 +53,7 @@ class DeafClient {
   }
   void End() { call_.reset(); }
 
-  // To be called now and then.
+  // Restarts the call if it has ended. Call it periodically.
   absl::Status Renew() {
     if (call_ == nullptr || !call_->ended()) return absl::OkStatus();
     ++ends_;
@@ -92,7 +92,7 @@ class Idle {
                                               {"commits_per_s", options_.rate},
                                               {"lines", kLines},
                                               {"display", options_.display}});
-    // Where streams share connections nothing else is measured.
+    // With shared connections, only the memory is measured.
     absl::Status ran = WithDaemon([&](ServerProcess& daemon) {
       return MeasureMemory(daemon, kShared, "resident_per_stream.shared_connections", report,
                            [] { return absl::OkStatus(); });
@@ -113,7 +113,7 @@ class Idle {
     return measure(**daemon);
   }
 
-  // Opens the streams, and takes `then` while they are there.
+  // Opens the streams, measures the memory per stream, and runs `then` while they are open.
   absl::Status MeasureMemory(ServerProcess& daemon, int streams_a_connection,
                              const std::string& name, nlohmann::json& report,
                              const std::function<absl::Status()>& then) {
@@ -127,7 +127,7 @@ class Idle {
       }
       sessions.push_back(
           std::make_unique<Session>(loop_, *connections.back(), OpenAsked("voxel-bench idle")));
-      // Some at a time: a listener's queue is short.
+      // Opens a few at a time, because a listener's queue is short.
       if (i % kAtATime == kAtATime - 1) {
         if (absl::Status opened = WaitOpened(sessions); !opened.ok()) return opened;
       }
@@ -212,7 +212,7 @@ class Idle {
     return absl::OkStatus();
   }
 
-  // The normal client's p99, in pieces between which `meanwhile` may act.
+  // Measures the normal client's p99, in segments between which `meanwhile` may act.
   absl::Status Measure(PacedClient& normal, std::vector<double>& p99,
                        const std::function<absl::Status()>& meanwhile) {
     std::vector<double> latency;

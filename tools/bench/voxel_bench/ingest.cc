@@ -1,5 +1,6 @@
-// How much of what bare gRPC takes in the daemon takes in, and how much of what it takes in otherwise it takes in
-// over TLS and while it is recorded: the same bytes to both, in turns.
+// Measures which share of the throughput of bare gRPC the daemon reaches, and which share of its
+// own normal throughput it reaches over TLS and while it is being recorded. Both sides receive the
+// same bytes, alternately.
 #include <algorithm>
 #include <map>
 #include <utility>
@@ -20,7 +21,7 @@ namespace {
 
 constexpr int kEntities = 64;  // replaced in each frame
 constexpr uint32_t kLinesAnEntity = 4096;
-constexpr int kVariants = 2;  // of each frame, so that something changes
+constexpr int kVariants = 2;  // of each frame, so that every commit changes something
 
 enum class Shape : uint8_t { kBatch, kUpsert, kUpsertGathered, kMemory, kMemoryAgain };
 
@@ -42,7 +43,8 @@ constexpr Case kCases[] = {{"batch_unix", Shape::kBatch, false},
                            {"batch_tls", Shape::kBatch, true, With::kTls},
                            {"batch_unix_recorded", Shape::kBatch, false, With::kRecorder}};
 
-// What the last two are measured beside is a daemon without it; all others, the bare sink.
+// Returns whether the case is compared with a second daemon without TLS or recorder; all others are
+// compared with the bare sink.
 bool BesideAnotherDaemon(const Case& item) {
   return item.with == With::kTls || item.with == With::kRecorder;
 }
@@ -54,7 +56,7 @@ const char* UnitOfRatio(const Case& item) {
 
 bool IsUpsert(Shape shape) { return shape == Shape::kUpsert || shape == Shape::kUpsertGathered; }
 
-// All of a frame's entities, or some of them.
+// Returns a message with all of a frame's entities, or some of them.
 v1::StreamRequest Batch(int variant, int first, int count, LineForm form) {
   std::vector<Put> puts;
   for (int i = first; i < std::min(first + count, kEntities); ++i) {
@@ -78,7 +80,7 @@ Frames BatchFrames(int batch, LineForm form) {
   return frames;
 }
 
-// One line each.
+// Returns frames whose entities have one line each.
 Frames UpsertFrames(LineForm form) {
   Frames frames;
   for (int variant = 0; variant < kVariants; ++variant) {
@@ -93,7 +95,7 @@ Frames UpsertFrames(LineForm form) {
   return frames;
 }
 
-// Both ends' rates of one case, a second.
+// The rates per second of both sides in one case.
 struct Rates {
   std::vector<double> daemon, beside, daemon_cores;
   double bytes_an_item = 0;
@@ -147,7 +149,7 @@ class Ingest {
       recorder = *std::move(started);
     }
     const bool upserts = IsUpsert(item.shape);
-    // For memory the sink gets what the daemon would without it.
+    // In the cases with memory, the sink receives what the daemon would receive without it.
     const Frames frames = upserts ? UpsertFrames(form()) : BatchFrames(options_.batch, form());
     const size_t message = frames[0][0].bytes();
     with_.progress(absl::StrFormat("ingest %s: messages of %d bytes", item.name, message));
@@ -198,7 +200,7 @@ class Ingest {
     return FeedMemory(loop_, target.address, whole, use);
   }
 
-  // `other`: the daemon that it is measured beside; null: the bare sink.
+  // `other` is the daemon to compare with; null means the bare sink.
   absl::StatusOr<Rates> Alternate(const Case& item, ServerProcess& daemon,
                                   const ServerProcess* other, const Frames& frames) {
     const auto duration = static_cast<sync::TimeNs>(options_.seconds * sync::kSecond);

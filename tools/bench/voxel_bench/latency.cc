@@ -1,4 +1,5 @@
-// From a commit's sending to its last byte in the transport, of a client that commits steadily.
+// Measures the time from sending a commit to its last byte in the transport, for a client that
+// commits steadily.
 #include <algorithm>
 #include <utility>
 
@@ -12,7 +13,7 @@
 namespace voxeld::bench {
 namespace {
 
-constexpr double kDisplayVoxels = 64;  // of the displays in the options' defaults
+constexpr double kDisplayVoxels = 64;  // of the displays in the default options
 constexpr int kVariants = 16;
 constexpr double kWarmSeconds = 0.5;
 
@@ -74,7 +75,7 @@ absl::StatusOr<nlohmann::json> RunLatency(const LatencyOptions& options, const S
   AddFigure(report, "superseded", "of all outcomes", SpreadOf(superseded));
   AddFigure(report, "sent_late.p99", "ms", SpreadOf(late_p99));
   for (size_t stage = 0; stage < stages.size(); ++stage) {
-    if (stages[stage].empty()) continue;  // the daemon does not say
+    if (stages[stage].empty()) continue;  // the daemon does not report it
     AddFigure(report, absl::StrCat("stage.", StageTimes::kNames[stage], ".p50"), "ms",
               SpreadOf(stages[stage]));
   }

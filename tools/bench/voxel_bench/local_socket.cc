@@ -22,7 +22,7 @@ namespace {
 constexpr int kAnswerSeconds = 10;
 constexpr size_t kGreatestPacket = 4096;
 
-// A memfd that has the bytes and can be changed no more.
+// Returns a memfd that contains the bytes and is sealed against changes.
 absl::StatusOr<int> SealedMemory(std::string_view bytes) {
   const int fd = memfd_create("voxel-bench", MFD_CLOEXEC | MFD_ALLOW_SEALING);
   if (fd < 0) return absl::ErrnoToStatus(errno, "no memfd");
@@ -30,7 +30,8 @@ absl::StatusOr<int> SealedMemory(std::string_view bytes) {
   if (ftruncate(fd, static_cast<off_t>(bytes.size())) != 0) {
     return absl::ErrnoToStatus(errno, absl::StrCat("no memfd of ", bytes.size(), " bytes"));
   }
-  // Written, not mapped: pages that are written whole are neither cleared first nor faulted in one by one.
+  // The memory is written and not mapped: pages that are written completely are neither cleared
+  // first nor faulted in one by one.
   for (size_t done = 0; done < bytes.size();) {
     const ssize_t written =
         pwrite(fd, bytes.data() + done, bytes.size() - done, static_cast<off_t>(done));

@@ -1,5 +1,5 @@
-// The producer's end of the local socket (voxeld/v1/local.proto): sealed memory handed over in
-// place of bytes on the stream.
+// The producer's end of the local socket (voxeld/v1/local.proto): sealed memory is passed instead
+// of bytes on the stream.
 #pragma once
 
 #include <cstdint>
@@ -11,26 +11,28 @@
 
 namespace voxeld::bench {
 
-// Bound to one thread. Waits for each answer, for at most 10 s.
+// Bound to one thread. Waits up to 10 s for each answer.
 class LocalSocket {
  public:
-  // With Opened.local_socket and local_token.
+  // Connects with Opened.local_socket and local_token.
   static absl::StatusOr<std::unique_ptr<LocalSocket>> Connect(const std::string& path,
                                                               const std::string& token);
   ~LocalSocket();
   LocalSocket(const LocalSocket&) = delete;
   LocalSocket& operator=(const LocalSocket&) = delete;
 
-  // Puts `bytes` into new memory, seals it and hands it over. This process keeps nothing of it.
+  // Puts `bytes` into new memory, seals it and passes it to the daemon. This process keeps no
+  // reference to it.
   absl::Status Hold(uint64_t id, std::string_view bytes);
-  // Said at once; what the daemon answers is read by the next Hold, which fails if that is an error.
+  // Sends the release immediately. The next Hold reads the daemon's answer, and fails if that is an
+  // error.
   absl::Status Release(uint64_t id);
 
  private:
   explicit LocalSocket(int fd) : fd_(fd) {}
-  // Sends a LocalMessage, with a descriptor unless that is below 0.
+  // Sends a LocalMessage, with a descriptor unless `descriptor` is negative.
   absl::Status Say(const std::string& packet, int descriptor);
-  // Waits for the answers to all that was said; an error with what it said if one is Refused.
+  // Waits for the answers to everything sent. Returns an error with the message if one is Refused.
   absl::Status Answered();
 
   const int fd_;

@@ -1,4 +1,4 @@
-// voxel-bench: what the daemon reaches, measured from its clients' side.
+// voxel-bench: measures the daemon's performance from its clients' side.
 #include <csignal>
 #include <cstdio>
 #include <string>
@@ -20,7 +20,8 @@ namespace {
 
 constexpr int kUsageError = 2;
 
-std::atomic<bool> interrupted = false;  // by a signal: a benchmark's children and folders go too
+// by a signal; a benchmark's children and folders are cleaned up too
+std::atomic<bool> interrupted = false;
 
 int Fail(int code, const absl::Status& status) {
   std::fprintf(stderr, "voxel-bench: %s\n", std::string(status.message()).c_str());
@@ -60,7 +61,7 @@ int Main(int argc, char** argv) {
   for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
     std::signal(number, [](int) { interrupted.store(true); });
   }
-  daemon::TuneProcess();  // the sink's process too: what a ratio compares has the same settings
+  daemon::TuneProcess();  // also in the sink's process, so that a ratio compares equal settings
   daemon::RaiseDescriptorLimit();
   const GrpcCore core;
   if (const auto* sink = std::get_if<SinkOptions>(&line->command)) {

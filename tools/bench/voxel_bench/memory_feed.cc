@@ -10,7 +10,7 @@ namespace {
 constexpr sync::TimeNs kTakeLimit = 60 * sync::kSecond;
 constexpr size_t kRangeAlignment = 4;
 
-// The payload goes to the end of `memory`.
+// Moves the payload to the end of `memory`.
 void Move(std::string* payload, v1::MemoryRange* range, uint64_t id, std::string& memory) {
   memory.resize((memory.size() + kRangeAlignment - 1) / kRangeAlignment * kRangeAlignment);
   range->set_memory(id);
@@ -78,7 +78,7 @@ class MemoryFeed final : public Feed {
   absl::Status SendFrame() {
     const size_t index = session_.tally().sent % frames_.size();
     Frame& frame = frames_[index];
-    // The one that named this memory before has been answered: nothing reads it any more.
+    // The commit that named this memory before has been answered, so nothing reads the memory now.
     absl::Status waited =
         Await([this] { return session_.Ready() && Unanswered() < frames_.size(); });
     if (!waited.ok()) return waited;

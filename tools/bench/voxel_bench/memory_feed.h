@@ -1,4 +1,4 @@
-// The feed whose content goes through the local socket.
+// A feed whose content goes through the local socket.
 //
 // Bound to its loop's thread.
 #pragma once
@@ -15,20 +15,21 @@
 namespace voxeld::bench {
 
 enum class MemoryUse : uint8_t {
-  kFresh,  // each frame's content is put into new memory, which is sealed, handed over and released
-  kAgain,  // it is handed over once, and every frame names it
+  kFresh,  // each frame's content is put into new memory, which is sealed, passed and released
+  kAgain,  // the memory is passed once, and every frame names it
 };
 
-// A batch whose payloads have been put one after the other into `memory`, and named in their place.
+// A batch whose payloads were put into `memory` one after the other, and which refers to them
+// there.
 struct Named {
   v1::StreamRequest request;
   std::string memory;
 };
-// `batch`: of segments. `memory_id`: of the memory that is to hold them.
+// `batch` is a batch of segments; `memory_id` is the id of the memory that will hold them.
 Named InMemory(v1::StreamRequest batch, uint64_t memory_id);
 
-// Unimplemented if the daemon offers no local socket. `batches`: the content of the frames, in
-// turns.
+// `batches` is the content of the frames, sent cyclically. Errors: Unimplemented if the daemon
+// offers no local socket.
 absl::StatusOr<std::unique_ptr<Feed>> FeedMemory(Loop& loop, const std::string& target,
                                                  const std::vector<v1::StreamRequest>& batches,
                                                  MemoryUse use);

@@ -1,5 +1,5 @@
-// More frames than a display takes, from clients that let the newest win: what latency, memory and
-// outcomes do.
+// Measures latency, memory and outcomes when clients send more frames than a display can show, with
+// the flow policy that only the newest is kept.
 #include <algorithm>
 #include <fstream>
 #include <memory>
@@ -25,7 +25,7 @@ constexpr sync::TimeNs kSettleLimit = 30 * sync::kSecond;
 constexpr int kVariants = 31;
 constexpr double kLength = 0.6;  // 20 voxels of 64
 
-// Immediate mode: each replaces the layer whole.
+// Returns immediate-mode frames; each replaces the whole layer.
 Frames ImmediateFrames(int client, int lines) {
   const std::string layer = absl::StrCat("layer-", client);
   Frames frames;
@@ -177,7 +177,7 @@ class Overload {
       sum += client->session.tally();
       dropped += client->sender.dropped();
     }
-    // What the clients were told, and what the daemon says that it told.
+    // Compares what the clients received with the daemon's own counts.
     const absl::StatusOr<v1::Stats> stats = StatsOf(loop_, Connection(daemon_->unix_target()));
     if (!stats.ok()) return stats.status();
     OverloadSample last;

@@ -5,7 +5,7 @@ namespace voxeld::bench {
 uint64_t Pace::Take(sync::TimeNs now) {
   const uint64_t before = count_;
   if (now < due()) return 0;
-  // Close by division, exact by the same words as due().
+  // The division gives an approximate count; due() then makes it exact.
   const double elapsed = static_cast<double>(now - start_);
   count_ += static_cast<uint64_t>(elapsed / sync::kSecond * rate_) - count_;
   if (count_ < before) count_ = before;

@@ -1,4 +1,4 @@
-// When the next of a steady series is due.
+// Says when the next event of a steady series is due.
 #pragma once
 
 #include <cstdint>
@@ -7,16 +7,16 @@
 
 namespace voxeld::bench {
 
-// The n-th is due at start + n/rate, whatever became of those before: one that comes late moves
-// none of the others.
+// Event n is due at start + n/rate, independent of the events before it: a late event does not
+// delay the others.
 class Pace {
  public:
-  // `rate` a second, above 0.
+  // `rate` is per second and positive.
   Pace(sync::TimeNs start, double rate) : start_(start), rate_(rate) {}
 
-  // Of the one that comes next.
+  // Returns when the next event is due.
   sync::TimeNs due() const { return DueOf(count_); }
-  // How many have come due by `now` that were not counted before; they are counted now.
+  // Returns how many events became due by `now` that were not counted before, and counts them.
   uint64_t Take(sync::TimeNs now);
 
   uint64_t count() const { return count_; }

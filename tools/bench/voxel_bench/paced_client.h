@@ -1,4 +1,5 @@
-// A client that commits at a steady rate, and how long its commits take to get out to the display.
+// A client that commits at a steady rate, and measures how long its commits take to reach the
+// display.
 //
 // Bound to its loop's thread.
 #pragma once
@@ -16,15 +17,15 @@
 namespace voxeld::bench {
 
 struct PacedRun {
-  Tally tally;                     // of this run alone; settled
-  std::vector<double> latency_ms;  // of what was presented: first byte sent → last byte out
-  std::vector<double> late_ms;     // of each commit: when it was due → first byte sent
+  Tally tally;                     // of this run only, settled
+  std::vector<double> latency_ms;  // of presented commits: first byte sent → last byte out
+  std::vector<double> late_ms;     // of each commit: when due → first byte sent
   StageTimes stages;
 };
 
 class PacedClient {
  public:
-  // Whoever holds it keeps a session open. `frames`: what goes out, in turns.
+  // Opens a session, which stays open as long as the object exists. `frames` are sent cyclically.
   static absl::StatusOr<std::unique_ptr<PacedClient>> Open(Loop& loop, const std::string& target,
                                                            Frames frames);
 
@@ -42,8 +43,8 @@ class PacedClient {
   PacedRun run_;
 };
 
-// Frames of one batch each, with `entities` that together have `lines` lines of `voxels` voxels on
-// a display that is `size_voxels` wide; every line is another in each of them.
+// Returns frames of one batch each, whose `entities` together have `lines` lines of `voxels` voxels
+// on a display that is `size_voxels` wide; every line differs between the frames.
 Frames LineFrames(const std::string& layer, int lines, int entities, double voxels,
                   double size_voxels, int variants);
 

@@ -1,4 +1,4 @@
-// The paper's tables, as one of the benchmarks.
+// The benchmark of the paper's tables.
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -26,7 +26,7 @@ absl::StatusOr<nlohmann::json> Measured(const PaperOptions& options, const Surro
   return report;
 }
 
-// Whether it has what is shown of a row.
+// Returns whether a row has everything that is printed.
 bool IsRow(const nlohmann::json& row) {
   const auto is_number = [&](const char* key) { return row.contains(key) && row[key].is_number(); };
   return row.is_object() && row.contains("table") && row["table"].is_string() &&

@@ -1,4 +1,4 @@
-// voxelctl record beside a daemon that is measured.
+// Runs voxelctl record beside a daemon that is measured.
 #pragma once
 
 #include <memory>
@@ -11,13 +11,13 @@
 
 namespace voxeld::bench {
 
-// Records into a folder of its own until Stop, or until it is destroyed. Bound to one thread.
+// Records into its own folder until Stop() or destruction. Bound to one thread.
 class Recorder {
  public:
-  // Of the voxelctl beside this program; it records within the round that is not counted.
+  // Starts the voxelctl beside this program. It records throughout the round that is not counted.
   static absl::StatusOr<std::unique_ptr<Recorder>> Start(const std::string& address);
 
-  // What it says at its end: change sets, bytes and the like.
+  // Stops the recording. Returns its final report: change sets, bytes and the like.
   absl::StatusOr<nlohmann::json> Stop();
 
  private:

@@ -36,8 +36,8 @@ nlohmann::json MachineFacts() {
           {"load_before", load}};
 }
 
-// Of the tree in which this program lies: the commit, "-dirty" if it has been changed since; null
-// if git is not there or knows of none.
+// Returns the commit of the tree that contains this program, with "-dirty" if the tree has changed
+// since; null if git is missing or knows no commit.
 nlohmann::json Commit() {
   std::error_code error;
   const std::string folder =

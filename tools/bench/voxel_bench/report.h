@@ -1,4 +1,4 @@
-// What a run says: figures with their spread, and where and how they were measured.
+// The report of a run: figures with their spread, and where and how they were measured.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -9,24 +9,24 @@
 
 namespace voxeld::bench {
 
-// {benchmark, time, machine, build, options, figures: [], …}. What benchmarks add beside `figures`
-// is their own.
+// Returns {benchmark, time, machine, build, options, figures: [], …}. Benchmarks may add other keys
+// beside `figures`.
 nlohmann::json ReportOf(const std::string& benchmark, nlohmann::json options);
 
 // Appends {name, unit, median, min, max, values} to the report's figures.
 void AddFigure(nlohmann::json& report, const std::string& name, const std::string& unit,
                const Spread& spread);
-// One that was measured once.
+// Appends a figure that was measured once.
 void AddFigure(nlohmann::json& report, const std::string& name, const std::string& unit,
                double value);
 
-// Every count, the outcomes that are pending, and `exact`: that they add up.
+// Returns every count, the pending outcomes, and `exact`: whether the counts add up.
 nlohmann::json ToJson(const Tally& tally);
 
-// The figures as lines for people, below what the benchmark says itself (`text`).
+// Returns the figures as readable lines, below the benchmark's own text (`text`).
 std::string TextOf(const nlohmann::json& report);
 
-// "model name" of the text of /proc/cpuinfo; "unknown" if there is none.
+// Returns the "model name" in the text of /proc/cpuinfo, or "unknown".
 std::string CpuModelIn(const std::string& cpuinfo);
 
 }  // namespace voxeld::bench

@@ -128,7 +128,8 @@ absl::StatusOr<uint64_t> ServerProcess::ResidentBytes() const {
 }
 
 absl::StatusOr<int64_t> ServerProcess::ProcessorNs() const {
-  // "PID (NAME) S …": after the name, user and system time are the 12th and 13th.
+  // The text is "PID (NAME) S …": after the name, user and system time are the 12th and 13th
+  // fields.
   const std::string text = FileText(absl::StrCat("/proc/", process_->pid(), "/stat"));
   const std::vector<std::string> fields =
       absl::StrSplit(text.substr(std::min(text.size(), text.rfind(')') + 2)), ' ');

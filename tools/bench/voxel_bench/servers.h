@@ -1,4 +1,4 @@
-// The other end: a daemon of one's own, or the bare sink, each in a process and a folder of its own.
+// The other side: a separate daemon, or the bare sink, each in its own process and folder.
 #pragma once
 
 #include <cstdint>
@@ -14,30 +14,32 @@ namespace voxeld::bench {
 
 struct DaemonOptions {
   std::string program;                // empty: voxeld beside this program
-  std::vector<std::string> displays;  // as of --display; empty: none at all
-  std::string config;                 // more of the configuration file, from its first section on
-  bool tls = false;                   // on its port; by a certificate made for it (by openssl)
+  std::vector<std::string> displays;  // as for --display; empty: none
+  // more of the configuration file, starting at its first section
+  std::string config;
+  bool tls = false;  // on its port, with a certificate that openssl makes for it
 };
 
-// One that serves on a unix socket and on a port of the system's choice; it ends with this object.
-// Bound to one thread.
+// A server on a unix socket and on a port that the system chooses. It ends with this object. Bound
+// to one thread.
 class ServerProcess {
  public:
   static absl::StatusOr<std::unique_ptr<ServerProcess>> StartDaemon(const DaemonOptions& options);
-  // Runs this program again.
+  // Starts this program again as the sink.
   static absl::StatusOr<std::unique_ptr<ServerProcess>> StartSink();
 
   const std::string& unix_target() const { return unix_target_; }
-  const std::string& tcp_target() const { return tcp_target_; }  // not of one with TLS
+  const std::string& tcp_target() const { return tcp_target_; }  // not for a daemon with TLS
   const Target& tls_target() const { return tls_target_; }
 
-  // Of its memory that is resident; an error if it has ended.
+  // Returns the resident memory of the process; an error if it has ended.
   absl::StatusOr<uint64_t> ResidentBytes() const;
-  // Processor time that it has used.
+  // Returns the CPU time that it has used.
   absl::StatusOr<int64_t> ProcessorNs() const;
 
  private:
-  // Into its folder. The section of the configuration that names the files.
+  // Makes a certificate in the process's folder. Returns the section of the configuration that
+  // names the files.
   absl::StatusOr<std::string> MakeCertificate();
 
   explicit ServerProcess(child::TemporaryFolder folder) : folder_(std::move(folder)) {}
@@ -48,10 +50,12 @@ class ServerProcess {
   std::unique_ptr<child::ChildProcess> process_;
 };
 
-// Configuration that lets in so many clients, each on a connection of its own, and a few more.
+// Returns a configuration that admits `clients` clients, each on its own connection, and a few
+// more.
 std::string RoomFor(int clients);
 
-// The value of "NAME:   123 kB" in the text of /proc/PID/status, in bytes; 0 if it is not there.
+// Returns the value of "NAME:   123 kB" in the text of /proc/PID/status, in bytes; 0 if it is
+// missing.
 uint64_t StatusBytes(const std::string& text, const std::string& name);
 
 }  // namespace voxeld::bench

@@ -90,7 +90,7 @@ absl::Status Session::WaitSettled(sync::TimeNs limit) {
 }
 
 void Session::Send(const Message& message, bool more) {
-  // One that the credit would hold back must not leave this one unflushed.
+  // If the credit would hold back the next message, this one must be flushed.
   more = more && credit_.MaySendAfter(message.bytes());
   credit_.Sent(message.bytes());
   call_.Write(message, more);

@@ -1,5 +1,5 @@
-// A stream to the scene: opened, obeying its credit, keeping account of its commits; and what feeds
-// it with frames.
+// A stream to the scene: it opens the stream, respects its credit and counts its commits and
+// outcomes; and a sender that feeds it with frames.
 //
 // Bound to its loop's thread.
 #pragma once
@@ -23,28 +23,30 @@ class Session {
  public:
   Session(Loop& loop, const Connection& connection, const v1::Open& open);
 
-  // Called whenever something may be sent, and for each receipt. To be set before WaitOpened.
+  // Sets the callbacks that run whenever something may be sent, and for each receipt. Requires: set
+  // before WaitOpened.
   void OnReady(std::function<void()> ready) { ready_ = std::move(ready); }
   void OnReceipt(std::function<void(const v1::Receipt&)> receipt) { receipt_ = std::move(receipt); }
 
-  // FailedPrecondition if the daemon's clock is not this process's: then no time of its could be
-  // compared.
+  // Errors: FailedPrecondition if the daemon's clock is not this process's clock, because then the
+  // daemon's times could not be compared.
   absl::Status WaitOpened();
-  // Until every commit has its answer and its outcomes.
+  // Waits until every commit has its answer and its outcomes.
   absl::Status WaitSettled(sync::TimeNs limit);
 
   bool Ready() const { return opened_ && call_.writable() && credit_.MaySend(); }
-  // Must be ready. With `more`, another Send follows as soon as this one is written.
+  // Requires: the session is ready. With `more`, another Send follows as soon as this one is
+  // written.
   void Send(const Message& message, bool more = false);
-  // A commit; its number, from 1. Must be ready.
+  // Sends a commit. Returns: its number, from 1. Requires: the session is ready.
   uint64_t Commit(sync::TimeNs sent_ns, uint64_t client_drops = 0);
-  // The same bytes as any other of that number and time.
+  // Returns the bytes of a commit; they depend only on the arguments.
   static Message CommitMessage(uint64_t frame_id, sync::TimeNs sent_ns, uint64_t client_drops = 0);
 
   const v1::Opened& opened() const { return *opened_; }
   const Tally& tally() const { return tally_; }
   const Credit& credit() const { return credit_; }
-  // Why it ended, or the first that was refused; Ok while all is well.
+  // Returns why the session ended, or the first refusal; Ok as long as there is neither.
   const absl::Status& status() const { return status_; }
   Call& call() { return call_; }
 
@@ -65,28 +67,29 @@ class Session {
   Call call_;
 };
 
-// Sends frames: each is some messages and a commit.
+// Sends frames; each consists of some messages and a commit.
 class FrameSender {
  public:
   enum class WhenBehind : uint8_t {
     kWait,    // every frame is sent, in order
-    kLatest,  // of those that have not begun only the newest; the others are dropped and told
+    kLatest,  // only the newest that has not begun is sent; the others are dropped and reported
   };
 
-  // `frames`: what goes out, in turns; not empty. Feeds `session` whenever that is ready. Both live
-  // as long as events may come. `gather`: a frame's messages may go out with its commit.
+  // `frames` are sent cyclically and must not be empty. Feeds `session` whenever it is ready. Both
+  // must live as long as events may come. With `gather`, a frame's messages may be flushed together
+  // with its commit.
   FrameSender(Session& session, std::vector<std::vector<Message>> frames, WhenBehind when_behind,
               bool gather = true);
 
-  // A frame is due (or `count` of them).
+  // Declares that `count` frames are due.
   void Due(uint64_t count = 1);
-  // From now on one is due whenever the one before has gone out; or no longer.
+  // If `endless`, a frame is due from now on whenever the previous one has been sent.
   void SetEndless(bool endless);
 
   bool idle() const { return waiting_ == 0 && part_ == 0; }
   uint64_t dropped() const { return dropped_; }
   uint64_t begun() const { return begun_; }
-  // When the first byte of a frame was handed over.
+  // Returns when the first byte of a frame was passed on.
   sync::TimeNs SentAt(uint64_t frame_id) const { return sent_ns_[frame_id - 1]; }
 
  private:
@@ -98,7 +101,7 @@ class FrameSender {
   const bool gather_;
   bool endless_ = false;
   uint64_t waiting_ = 0;  // due, not begun
-  size_t part_ = 0;       // of the frame that has begun; 0: none has
+  size_t part_ = 0;       // of the frame that has begun; 0: none
   uint64_t begun_ = 0, dropped_ = 0, untold_ = 0;
   std::vector<sync::TimeNs> sent_ns_;  // by frame id - 1
 };

@@ -55,7 +55,7 @@ class SinkService final
   }
 };
 
-// The daemon's settings (daemon/services/server.cc).
+// Uses the same settings as the daemon (daemon/services/server.cc).
 void SetAsTheDaemon(grpc::ServerBuilder& builder) {
   builder.SetMaxReceiveMessageSize(16 << 20);
   builder.SetMaxSendMessageSize(-1);
@@ -95,7 +95,7 @@ absl::Status RunSink(const std::vector<std::string>& listen) {
   }
   std::printf("ready %s\n", absl::StrJoin(addresses, " ").c_str());
   std::fflush(stdout);
-  // Whoever started it holds the other end of its output.
+  // The process that started it holds the other end of its output.
   pollfd reader = {STDOUT_FILENO, 0, 0};
   while (poll(&reader, 1, -1) < 0) {
   }

@@ -1,5 +1,6 @@
-// The bare sink: a gRPC server that takes the same calls over the same settings as the daemon, counts what comes, and
-// throws it away. What it reaches is what gRPC leaves to a daemon.
+// The bare sink: a gRPC server that accepts the same calls with the same settings as the daemon,
+// counts the received bytes and discards them. Its throughput is the upper bound that gRPC leaves
+// to a daemon.
 #pragma once
 
 #include <string>
@@ -9,9 +10,10 @@
 
 namespace voxeld::bench {
 
-// Serves SceneService.Stream on `listen` until its standard output's reader is gone or a signal
-// ends it; says "ready ADDRESS…" with the ports that were chosen. A stream is answered when it is half-closed: by one StreamResponse whose
-// credit_bytes is the sum of the bytes of its messages, and OK.
+// Serves SceneService.Stream on `listen` until the reader of its standard output exits or a signal
+// arrives. It prints "ready ADDRESS…" with the chosen ports. When a stream is half-closed, it is
+// answered with OK and one StreamResponse whose credit_bytes is the sum of the bytes of its
+// messages.
 absl::Status RunSink(const std::vector<std::string>& listen);
 
 }  // namespace voxeld::bench

@@ -1,4 +1,4 @@
-// How long commits took from stage to stage.
+// How long commits took from one stage to the next.
 #pragma once
 
 #include <array>
@@ -9,17 +9,17 @@
 
 namespace voxeld::bench {
 
-// Of the stages in their order, each from the one before; what is not known is left out.
+// The stages are in order, and each is measured from the previous one; unknown stages are left out.
 class StageTimes {
  public:
   static constexpr std::array kNames = {"sending",    "decoding", "applying",     "waiting",
                                         "assembling", "slicing",  "transferring", "showing"};
 
-  // `sent_ns` by the sender's own clock, which must be the daemon's too, in place of the daemon's
-  // estimate.
+  // `sent_ns` is by the sender's own clock, which must also be the daemon's; it replaces the
+  // daemon's estimate.
   void Add(sync::TimeNs sent_ns, const v1::Stages& stages);
 
-  // In ms, in the order in which they were added.
+  // Returns the times of a stage in ms, in the order in which they were added.
   const std::vector<double>& of(size_t stage) const { return times_ms_[stage]; }
 
  private:

@@ -1,4 +1,4 @@
-// What several measurements of one thing say.
+// Statistics of several measurements of one quantity.
 #pragma once
 
 #include <cstdint>
@@ -7,25 +7,26 @@
 
 namespace voxeld::bench {
 
-// Of measurements in the order in which they were made. The median of an even number is the mean of
-// the middle two. Of none: all 0.
+// The spread of measurements in the order in which they were made. The median of an even number is
+// the mean of the middle two. Without measurements, everything is 0.
 struct Spread {
   double median = 0, least = 0, greatest = 0;
   std::vector<double> values;
 };
 Spread SpreadOf(std::vector<double> values);
 
-// Of pairs measured in turns: values[i] / baseline[i], as far as both go. A baseline of 0 is left
-// out.
+// Returns the spread of values[i] / baseline[i] for values that were measured alternately, up to
+// the shorter of the two. A baseline of 0 is left out.
 Spread RatiosOf(std::span<const double> values, std::span<const double> baseline);
 
-// Nearest rank: the least value that at least `share` of all are not above. 0 of none. `share` in
-// [0, 1].
+// Returns the quantile by nearest rank: the least value such that at least `share` of all values
+// are not above it; 0 without values. `share` is in [0, 1].
 double QuantileOf(std::vector<double> values, double share);
 
-// Jain's index of fairness, (Σx)² / (n·Σx²): 1 if all have the same, 1/n if one has all. 0 of none.
+// Returns Jain's index of fairness, (Σx)² / (n·Σx²): 1 if all are equal, 1/n if one has everything;
+// 0 without values.
 double JainIndexOf(std::span<const double> values);
 
-double MeanOf(std::span<const double> values);  // 0 of none
+double MeanOf(std::span<const double> values);  // 0 without values
 
 }  // namespace voxeld::bench

@@ -1,4 +1,4 @@
-// DisplayService.WatchStats, read as it comes or not at all.
+// Calls DisplayService.WatchStats and reads its responses as they come, or not at all.
 //
 // Bound to its loop's thread.
 #pragma once
@@ -15,7 +15,8 @@ namespace voxeld::bench {
 
 class StatsWatch {
  public:
-  // `stats` gets each one. Without `read_on` only the first is read, then one for each Read().
+  // `stats` is called with each response. If `read_on` is false, only the first is read, then one
+  // for each Read().
   StatsWatch(Loop& loop, const Connection& connection, sync::TimeNs interval,
              std::function<void(const v1::Stats&)> stats, bool read_on = true);
 
@@ -29,7 +30,7 @@ class StatsWatch {
   Call call_;
 };
 
-// One, now.
+// Returns the current statistics.
 absl::StatusOr<v1::Stats> StatsOf(Loop& loop, const Connection& connection);
 
 }  // namespace voxeld::bench

@@ -26,7 +26,7 @@ std::string Text(double x, double y, const char* anchor, const std::string& text
                          Escape(text));
 }
 
-// Where a value lies on an axis of `length` pixels.
+// Maps a value to its place on an axis of `length` pixels.
 struct Axis {
   double least = 0, greatest = 1, begin = 0, length = 1;
   double At(double value) const { return begin + (value - least) / (greatest - least) * length; }

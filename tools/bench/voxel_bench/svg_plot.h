@@ -17,13 +17,13 @@ struct Panel {
   std::vector<Series> series;
 };
 
-// One panel under the other, each with a y axis from 0 to a round number above its greatest value.
-// Self-contained; text is escaped.
+// Draws the panels one below the other, each with a y axis from 0 to a round number above its
+// greatest value. The SVG is self-contained and text is escaped.
 std::string SvgOf(const std::string& title, const std::string& x_label,
                   const std::vector<Panel>& panels);
 
-// The least of 1, 2, 5, 10, 20, … and 0.5, 0.2, 0.1, … that is not below `value`; 1 for what is not
-// above 0.
+// Returns the least of 1, 2, 5, 10, 20, … and 0.5, 0.2, 0.1, … that is not below `value`; 1 if
+// `value` is not positive.
 double RoundAbove(double value);
 
 }  // namespace voxeld::bench

@@ -22,7 +22,8 @@
 namespace voxeld::bench {
 namespace {
 
-constexpr sync::TimeNs kLookUpEvery = 100 * sync::kMillisecond;  // for an interruption
+// interval at which an interruption is checked
+constexpr sync::TimeNs kLookUpEvery = 100 * sync::kMillisecond;
 constexpr sync::TimeNs kEndLimit = 5 * sync::kSecond;
 
 gpr_timespec InGrpcTime(sync::TimeNs time) {
@@ -54,10 +55,11 @@ class Loop::Impl {
  public:
   grpc::CompletionQueue queue;
   const std::atomic<bool>* interrupted = nullptr;
-  size_t calls = 0;  // that have not come to their end
+  size_t calls = 0;  // that have not ended
 };
 
-// Every operation under way is an event to come; the last one deletes it, once nobody holds it.
+// Every operation in progress is an expected event. The last event deletes the object if nobody
+// holds it.
 class Call::Impl {
  public:
   struct Event {
@@ -75,7 +77,7 @@ class Call::Impl {
   }
 
   void LetGo() {
-    held_ = false;  // its events stay: one of them may be running
+    held_ = false;  // its events stay, because one of them may be running
     context_.TryCancel();
     if (started_ && !finished_) Finish();  // there may be no other operation that would end
     DeleteIfOver();
@@ -112,7 +114,7 @@ class Call::Impl {
     auto* event = static_cast<Event*>(tag);
     Impl* call = event->call;
     --call->under_way_;
-    ++call->under_way_;  // held while its handler runs, which may let go of the call
+    ++call->under_way_;  // held while its handler runs, because that may release the call
     (call->*event->handle)(ok);
     --call->under_way_;
     call->DeleteIfOver();
@@ -134,7 +136,7 @@ class Call::Impl {
 
   void OnWritten(bool ok) {
     writing_ = false;
-    if (!ok) {  // it has ended; its status comes after what has not been read
+    if (!ok) {  // the call has ended; its status comes after the unread messages
       broken_ = read_on_ = true;
       return Read();
     }

@@ -1,7 +1,7 @@
-// Raw gRPC with as little of the client's own as can be: one thread, one completion queue, messages
-// that are serialised once.
+// Raw gRPC with as little overhead in the client as possible: one thread, one completion queue, and
+// messages that are serialised once.
 //
-// Bound to one thread, all of it: events come from within Loop::RunUntil and RunTo.
+// Everything is bound to one thread: events are delivered from within Loop::RunUntil and RunTo.
 #pragma once
 
 #include <atomic>
@@ -26,8 +26,8 @@ class Channel;
 
 namespace voxeld::bench {
 
-// Keeps gRPC's core of this process up while it lives: to let it go and take it again between
-// measurements would be measured.
+// Keeps gRPC's core initialised in this process while it lives. Otherwise, shutting it down and
+// starting it again between measurements would be part of the measurement.
 class GrpcCore {
  public:
   GrpcCore();
@@ -38,7 +38,7 @@ class GrpcCore {
 
 sync::TimeNs Now();  // CLOCK_MONOTONIC, as the daemon's
 
-// Bytes on their way, shared by all copies; sending them again costs nothing but the sending.
+// The bytes of a message, shared by all copies; sending them again costs only the sending.
 class Message {
  public:
   Message() = default;
@@ -53,16 +53,16 @@ class Message {
 
 class Loop {
  public:
-  // RunUntil ends with Cancelled once `*interrupted` is set.
+  // RunUntil returns Cancelled once `*interrupted` is set.
   explicit Loop(const std::atomic<bool>* interrupted = nullptr);
-  ~Loop();  // every call has been let go of; waits for their ends
+  ~Loop();  // waits for the ends of all calls. Requires: every call is released
   Loop(const Loop&) = delete;
   Loop& operator=(const Loop&) = delete;
 
-  // Handles events until `done`, which is asked after each. DeadlineExceeded if it is not done in
-  // time.
+  // Handles events until `done`, which is called after each event. Errors: DeadlineExceeded if it
+  // is not done in time.
   absl::Status RunUntil(sync::TimeNs deadline, absl::FunctionRef<bool()> done);
-  // Handles events until `time`; it may be up to a millisecond later. Cancelled as above.
+  // Handles events until `time`, or up to a millisecond longer. Errors: Cancelled as above.
   absl::Status RunTo(sync::TimeNs time);
 
  private:
@@ -71,13 +71,14 @@ class Loop {
   std::unique_ptr<Impl> impl_;
 };
 
-// Where to, and over TLS, by what certificate: both ends', and the authority of both.
+// The address, and for TLS the certificate that both ends use, which is also the authority for
+// both.
 struct Target {
   std::string address;
   std::string certificate, key;  // PEM; empty: no TLS
 };
 
-// A connection of its own, for any number of calls.
+// A separate connection, for any number of calls.
 class Connection {
  public:
   explicit Connection(const Target& target);
@@ -93,29 +94,31 @@ class Connection {
 
 struct CallEvents {
   std::function<void()> writable;                  // after the start and after each write
-  std::function<void(std::string_view)> message;   // one has come
-  std::function<void(const absl::Status&)> ended;  // once, and last
+  std::function<void(std::string_view)> message;   // a message was received
+  std::function<void(const absl::Status&)> ended;  // called once, last
 };
 
-// One call of any shape, as a stream of bytes in both directions. When it is destroyed it is
-// cancelled, and no event comes any more.
+// One call of any kind, as a stream of bytes in both directions. Destroying it cancels the call,
+// and no event follows.
 class Call {
  public:
-  // `method`: "/package.Service/Method". With `read_on` each message is followed by the reading of
-  // the next; without, Read asks for one.
+  // `method` is "/package.Service/Method". With `read_on`, the next message is read after each one;
+  // otherwise Read() requests one.
   Call(Loop& loop, const Connection& connection, const std::string& method, CallEvents events,
        bool read_on = true);
   ~Call();
   Call(const Call&) = delete;
   Call& operator=(const Call&) = delete;
 
-  // Started, nothing being written, not half-closed, not ended.
+  // Returns whether the call has started, nothing is being written, and it is neither half-closed
+  // nor ended.
   bool writable() const;
-  // Must be writable. `more`: another Write follows at once, so this one need not be flushed.
+  // Requires: writable(). With `more`, another Write follows immediately, so this one need not be
+  // flushed.
   void Write(const Message& message, bool more = false);
   void WritesDone();  // must be writable
   void Read();
-  // From the next message on.
+  // Takes effect from the next message on.
   void set_read_on(bool read_on);
   bool ended() const;
 
