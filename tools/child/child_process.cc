@@ -31,7 +31,7 @@ int MillisecondsTo(steady_clock::time_point deadline) {
   return static_cast<int>(std::max<int64_t>(0, left.count()));
 }
 
-// True if one of `fds` became readable (or its other end closed) in time.
+// Returns true if one of `fds` became readable (or its other end was closed) in time.
 bool Readable(std::vector<pollfd>& fds, steady_clock::time_point deadline) {
   for (;;) {
     const int n = poll(fds.data(), fds.size(), MillisecondsTo(deadline));
@@ -168,7 +168,7 @@ std::optional<std::string> ChildProcess::ReadLineWith(const std::string& text) {
 
 std::optional<int> ChildProcess::Wait(std::optional<std::chrono::milliseconds> limit) {
   if (code_.has_value()) return code_;
-  // A full pipe must not hold it up.
+  // Keeps reading, because a full pipe would block the child.
   const auto deadline = steady_clock::now() + limit.value_or(options_.patience);
   while (ReadSome(deadline)) {
   }

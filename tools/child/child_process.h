@@ -19,21 +19,21 @@ namespace voxeld::child {
 enum class Errors : uint8_t {
   kWithOutput,  // into output()
   kApart,       // into errors(), read by Wait()
-  kInherited,   // where this process's goes
+  kInherited,   // to this process's standard error
 };
 
 struct ChildOptions {
-  std::map<std::string, std::string> environment;  // over this process's own
+  std::map<std::string, std::string> environment;  // on top of this process's own
   Errors errors = Errors::kWithOutput;
-  // For each line, and for the end.
+  // The time limit for each line, and for the exit.
   std::chrono::milliseconds patience{60'000};
 };
 
-// Bound to one thread. A child that still runs is killed on destruction. It starts with no signal
-// blocked and nothing on its standard input.
+// Bound to one thread. A child that is still running is killed on destruction. It starts with no
+// signal blocked and with empty standard input.
 class ChildProcess {
  public:
-  // `arguments[0]` is the program's path. Errors: what the system said.
+  // `arguments[0]` is the program's path. Errors: the system's error.
   static absl::StatusOr<std::unique_ptr<ChildProcess>> Start(
       const std::vector<std::string>& arguments, ChildOptions options = {});
   ~ChildProcess();
@@ -44,17 +44,17 @@ class ChildProcess {
 
   void Signal(int signal);
 
-  // The next line of its output, without the newline; nothing at the end, or when patience has run
-  // out.
+  // Returns the next line of its output, without the newline; nothing at the end of the output or
+  // when patience has run out.
   std::optional<std::string> ReadLine();
-  // The first further line that has `text` in it.
+  // Returns the next line that contains `text`.
   std::optional<std::string> ReadLineWith(const std::string& text);
 
-  // Reads to its end. The exit code, or −signal; nothing if it did not end in `limit` (without one:
-  // patience).
+  // Reads all remaining output. Returns: the exit code, or −signal; nothing if the child did not
+  // exit within `limit` (by default: patience).
   std::optional<int> Wait(std::optional<std::chrono::milliseconds> limit = {});
 
-  // All that it has said so far (after Wait: all).
+  // Return everything that it has printed so far (after Wait: everything).
   const std::string& output() const { return output_.text; }
   const std::string& errors() const { return errors_.text; }
 
@@ -67,7 +67,7 @@ class ChildProcess {
 
   explicit ChildProcess(ChildOptions options) : options_(std::move(options)) {}
   absl::Status Spawn(const std::vector<std::string>& arguments);
-  // Reads what comes next on either pipe; false at the end of both, or at the deadline.
+  // Reads from either pipe. Returns false at the end of both, or at the deadline.
   bool ReadSome(std::chrono::steady_clock::time_point deadline);
 
   const ChildOptions options_;
@@ -78,10 +78,10 @@ class ChildProcess {
   size_t read_ = 0;  // of output, by ReadLine
 };
 
-// A folder of its own, removed with all that is in it.
+// A temporary folder, removed with its contents on destruction.
 class TemporaryFolder {
  public:
-  // "NAME-XXXXXX" in the system's folder for such.
+  // Makes "NAME-XXXXXX" in the system's temporary folder.
   static absl::StatusOr<TemporaryFolder> Make(const std::string& name);
   ~TemporaryFolder();
   TemporaryFolder(TemporaryFolder&& other) noexcept;
@@ -94,7 +94,8 @@ class TemporaryFolder {
   std::string path_;  // empty: moved from
 };
 
-// For a program that must see nothing of the machine's own configuration, but `folder`.
+// Returns the environment for a program that must see only `folder` and nothing of the machine's
+// own configuration.
 std::map<std::string, std::string> CleanEnvironment(const std::string& folder);
 
 }  // namespace voxeld::child

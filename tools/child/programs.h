@@ -1,4 +1,4 @@
-// Where the project's programs find each other: beside themselves, also where they were copied to.
+// Finds the project's programs, which lie beside each other, also when they have been copied.
 #pragma once
 
 #include <filesystem>
@@ -6,7 +6,7 @@
 
 namespace voxeld::child {
 
-// `name` in the running program's folder, else in the one above.
+// Returns the path of `name` in the running program's folder, or in the folder above it.
 inline std::string ProgramBeside(const std::string& name) {
   const std::filesystem::path folder =
       std::filesystem::read_symlink("/proc/self/exe").parent_path();

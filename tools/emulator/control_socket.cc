@@ -18,7 +18,7 @@ namespace {
 
 constexpr size_t kMostLine = 4096;
 
-// The socket of somebody who is no more.
+// Returns whether the socket was left behind by a process that has exited.
 bool Stale(const sockaddr_un& address) {
   struct stat file {};
   if (lstat(address.sun_path, &file) != 0 || !S_ISSOCK(file.st_mode)) return false;
@@ -93,7 +93,8 @@ bool ControlSocket::ServeOne(Peer& peer,
     for (size_t end = 0; (end = peer.line.find('\n')) != std::string::npos;) {
       const std::string reply = answer(std::string_view(peer.line).substr(0, end)) + "\n";
       peer.line.erase(0, end + 1);
-      // An answer is far smaller than a socket's buffer: who does not read it is cut off.
+      // An answer is far smaller than a socket's buffer, so a peer that does not read it is
+      // disconnected.
       if (send(peer.fd, reply.data(), reply.size(), MSG_NOSIGNAL) !=
           static_cast<ssize_t>(reply.size())) {
         return false;

@@ -1,4 +1,4 @@
-// The socket through which a running emulator is told of faults and asked for what it saw.
+// The socket through which a running emulator receives faults and reports its status.
 #pragma once
 
 #include <list>
@@ -14,18 +14,19 @@ struct pollfd;
 
 namespace voxeld::emulator {
 
-// Single-threaded; nothing blocks.
+// Single-threaded and non-blocking.
 class ControlSocket {
  public:
-  // A unix socket at `path`, which is removed at the end. AlreadyExists if somebody listens there.
+  // Listens on a unix socket at `path`, which is removed on destruction. Errors: AlreadyExists if
+  // another process listens there.
   static absl::StatusOr<std::unique_ptr<ControlSocket>> Listen(const std::string& path);
   ~ControlSocket();
   ControlSocket(const ControlSocket&) = delete;
   ControlSocket& operator=(const ControlSocket&) = delete;
 
-  // What has to be polled, for reading.
+  // Adds the descriptors to poll for reading.
   void AddTo(std::vector<pollfd>& fds) const;
-  // Accepts, reads, and answers every whole line with `answer`'s.
+  // Accepts connections, reads, and answers every complete line with the result of `answer`.
   void Serve(absl::FunctionRef<std::string(std::string_view line)> answer);
 
  private:
@@ -34,7 +35,7 @@ class ControlSocket {
     std::string line;
   };
   ControlSocket(int fd, std::string path) : fd_(fd), path_(std::move(path)) {}
-  // False: it has gone.
+  // Returns false if the peer has disconnected.
   static bool ServeOne(Peer& peer, absl::FunctionRef<std::string(std::string_view line)> answer);
 
   const int fd_;

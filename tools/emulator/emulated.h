@@ -1,5 +1,5 @@
-// The devices that the emulator plays, each behind its fault plan, and what can be asked of one while
-// it runs.
+// The devices that the emulator plays, each behind its fault plan, and the commands that a running
+// one accepts.
 #pragma once
 
 #include <functional>
@@ -20,21 +20,23 @@ struct Emulated {
   std::unique_ptr<display::UsbDeviceModel> model;       // with its faults
   display::emulator::FaultInjector* faults = nullptr;   // within model
   display::emulator::HostileDevice* hostile = nullptr;  // within faults
-  // What it saw and shows, as one line of JSON.
+  // Returns what it received and shows, as one line of JSON.
   std::function<std::string()> status;
 };
 
-// "voxlink[,key=value…]" (the simulated driver's options; docs: display/drivers/simulated/README.md),
-// "fadecandy[,serial=TEXT,refresh=TIMES_A_SECOND,faults=PLAN]". InvalidArgument with what is wrong. `clock` outlives what comes back.
+// Makes a device from "voxlink[,key=value…]" (the simulated driver's options; docs:
+// display/drivers/simulated/README.md) or
+// "fadecandy[,serial=TEXT,refresh=TIMES_A_SECOND,faults=PLAN]". `clock` must outlive the result.
+// Errors: InvalidArgument with the reason.
 absl::StatusOr<Emulated> MakeEmulated(std::string_view spec, sync::Clock& clock);
 
-// One line of the control socket, and the answer to it, without its newline:
-//   fault WHAT[:AMOUNT]@WHEN[/in]   a fault more, counted from now      ok
-//   clear                           no fault and no lie any more        ok
-//   hostile SEED                    answers and reports are damaged     ok
-//   unplug, plug                    the cable                           ok
-//   status                                                              JSON
-// What is wrong is answered "error: …".
+// Executes one line of the control socket. Returns: the answer, without its newline:
+//    fault WHAT[:AMOUNT]@WHEN[/in]   adds a fault, counted from now      ok
+//    clear                           removes all faults and lies         ok
+//    hostile SEED                    damages answers and reports         ok
+//    unplug, plug                    the cable                           ok
+//    status                                                              JSON
+// Errors are answered with "error: …".
 std::string Control(Emulated& device, std::string_view line);
 
 }  // namespace voxeld::emulator

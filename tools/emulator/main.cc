@@ -1,5 +1,5 @@
-// voxeld-emulator: plays a display's USB device to this machine's kernel, to another machine's, or to
-// a virtual machine.
+// voxeld-emulator: plays a display's USB device to this machine's kernel, to another machine's, or
+// to a virtual machine.
 
 #include <malloc.h>
 #include <netinet/in.h>
@@ -49,15 +49,16 @@ absl::Status Errno(const std::string& what) {
   return absl::UnavailableError(absl::StrCat(what, ": ", std::generic_category().message(errno)));
 }
 
-// One connection at a time, over whichever carrier.
+// One connection at a time, over any of the carriers.
 class Session {
  public:
   virtual ~Session() = default;
   virtual display::emulator::ByteStream& stream() = 0;
   virtual absl::Status Receive() = 0;
-  // The model has done something.
+  // Continues after the model has done something.
   virtual void ReadOn() {}
-  // Tells that the device came or went. False: the connection is the cable, and has to end.
+  // Reports that the device was plugged or unplugged. Returns false if the connection itself is the
+  // cable and has to end.
   virtual bool Plugged(bool plugged) = 0;
 };
 
@@ -88,7 +89,8 @@ class UsbredirCarrier final : public Session {
 };
 
 constexpr int kHandshakeMs = 2000;
-// How long a device that was pulled stays away from the kernel at least: its port has to empty.
+// The minimum time for which an unplugged device stays away from the kernel: its port has to become
+// empty.
 constexpr sync::TimeNs kReattach = 50 * sync::kMillisecond;
 
 class Player {
@@ -113,7 +115,7 @@ class Player {
     return options_.usbip_port.has_value() ? ListenTcp() : ListenUnix();
   }
 
-  // Until a signal; `signals` is its descriptor.
+  // Runs until a signal; `signals` is its descriptor.
   absl::Status Run(int signals) {
     while (true) {
       device_.model->Tick();
@@ -153,7 +155,7 @@ class Player {
     return absl::OkStatus();
   }
 
-  // The cable may have been pulled and plugged in again since the last look.
+  // Follows the cable, which may have been unplugged and plugged in again since the last check.
   absl::Status FollowCable() {
     const bool plugged = device_.model->plugged();
     const uint32_t plugs = device_.model->plugs();
@@ -186,7 +188,7 @@ class Player {
     if (status.ok() && session_->stream().open()) return;
     std::fprintf(stderr, "connection ended: %s\n", std::string(status.message()).c_str());
     EndSession();
-    // The other side let go of the device: for the device that is the cable.
+    // The other side released the device. To the device this is an unplugged cable.
     if (device_.model->plugged()) {
       device_.model->SetPlugged(false);
       device_.model->SetPlugged(true);
@@ -221,7 +223,7 @@ class Player {
     listener_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (bind(listener_, reinterpret_cast<sockaddr*>(&address), sizeof(address)) != 0) {
       const absl::Status taken = Errno(options_.usbredir);
-      close(std::exchange(listener_, -1));  // the path is another's
+      close(std::exchange(listener_, -1));  // another process owns the path
       return taken;
     }
     if (listen(listener_, 4) != 0) return Errno(options_.usbredir);
@@ -253,13 +255,12 @@ class Player {
   std::unique_ptr<ControlSocket> control_;
   int listener_ = -1;
   std::unique_ptr<Session> session_;
-  uint32_t session_plugs_ =
-      0;  // of the device, when the other side was told of it; 0: it is not there
+  uint32_t session_plugs_ = 0;  // the device's count when the other side was notified; 0: unplugged
   sync::TimeNs attach_at_ = sync::kNever;
 };
 
-// Pictures and transfers come and go by the hundred kilobytes: their pages are kept, or each would be
-// faulted in anew, which is most of the time in a guest.
+// Slice images and transfers of hundreds of kilobytes are allocated and freed all the time. Their
+// pages are kept, because faulting them in each time would take most of the time in a guest.
 void KeepPages() {
   mallopt(M_MMAP_THRESHOLD, 1 << 30);
   mallopt(M_TRIM_THRESHOLD, 1 << 30);
