@@ -21,7 +21,7 @@ uint32_t Get(View in, size_t at, size_t bytes) {
   return value;
 }
 
-// `in`: no shorter.
+// Returns whether `in` begins with `with`; a shorter `in` does not.
 template <size_t n>
 bool Begins(View in, const std::array<uint8_t, n>& with) {
   return std::equal(with.begin(), with.end(), in.begin());
@@ -43,7 +43,8 @@ constexpr uint8_t kDdpVersion = 0xC0, kDdpTimecode = 0x10, kDdpStorage = 0x08, k
 constexpr uint8_t kDdpDefault = 1, kDdpAll = 255;  // destinations
 constexpr size_t kDdpTimecodeBytes = 4;
 
-// RGB of 8 bits an element, in the types' two spellings, and "as you are set".
+// Returns whether the type is RGB with 8 bits per channel, in either of its encodings, or "as
+// configured".
 bool IsRgb8(uint8_t type) { return type == 0 || type == 1 || type == ddp::kRgb8; }
 
 absl::StatusOr<Datagram> ReadDdp(View in) {
@@ -79,7 +80,8 @@ absl::StatusOr<Datagram> ReadDdp(View in) {
 
 constexpr uint8_t kPreview = 0x80;
 
-// The low 12 bits of a PDU's length, counted from where it stands; the high four are 7.
+// Returns whether the low 12 bits of a PDU's length, counted from its own position, are right; the
+// high four are 7.
 bool HasLength(View in, size_t at) { return Get(in, at, 2) == (0x7000 | (in.size() - at)); }
 
 absl::StatusOr<Datagram> ReadE131(View in) {
@@ -198,13 +200,13 @@ std::array<uint8_t, 239> ArtPollReply(std::array<uint8_t, 4> ip, uint16_t port, 
   put(26, "voxeld");
   put(44, "voxeld: lights of a volumetric display");
   put(108, "#0001 [0000] ready");
-  // Four ports at most, whose universes differ in their last four bits.
+  // A reply has four ports at most, whose universes differ in their last four bits.
   const int32_t ports = std::clamp<int32_t>(universes, 1, std::min(4, 16 - (first & 0x0F)));
   out[173] = static_cast<uint8_t>(ports);
   for (int32_t i = 0; i < ports; ++i) {
     const auto at = static_cast<size_t>(i);
     out[174 + at] = 0x80;  // an output, of DMX512
-    out[182 + at] = 0x80;  // data come
+    out[182 + at] = 0x80;  // data is being received
     out[190 + at] = static_cast<uint8_t>((first + i) & 0x0F);
   }
   out[212] = 0x08;  // addresses of 15 bits

@@ -6,9 +6,10 @@
 namespace voxeld::lights {
 namespace {
 
-// Most sources of a universe that are told apart.
+// Maximum number of sources per universe that are distinguished.
 constexpr size_t kMostSources = 16;
-// After so long without a sync packet pictures are shown without one (Art-Net 4, ArtSync; E1.31 §6.2.4.2's time-out).
+// After this time without a sync packet, pictures are shown without one (Art-Net 4, ArtSync; the
+// time-out of E1.31 §6.2.4.2).
 constexpr sync::TimeNs kSyncLife = 4 * sync::kSecond;
 
 }  // namespace
@@ -35,7 +36,7 @@ absl::StatusOr<Datagram> Intake::AddDatagram(std::span<const uint8_t> packet, sy
       AddLights(*read, now);
       break;
     case Datagram::Kind::kShow:
-      // Another synchronisation's is not this one's word.
+      // A packet of another synchronisation universe does not apply to these values.
       if (options_.protocol == Protocol::kE131 && read->universe != sync_universe_) {
         ++tally_.other;
         break;
@@ -81,18 +82,19 @@ void Intake::AddLights(const Datagram& packet, sync::TimeNs now) {
   } else {
     CountLost(packet.sequence, packet.universe, 255);
   }
-  // Where sync packets come, a picture waits for them; if they stop, for no longer than they may be apart.
+  // If sync packets are sent, a picture waits for one, but no longer than the maximum interval
+  // between them.
   const bool told = (synchronised_ || sync_universe_ != 0) && now - sync_heard_ns_ < kSyncLife;
   const size_t there = values_.size() - static_cast<size_t>(index) * channels;
   const size_t used = std::min(packet.values.size(), channels);
   const auto rest = packet.values.subspan(std::min(used, there));
-  // Senders fill universes up with zeros.
+  // Senders pad universes with zeros.
   if (std::any_of(rest.begin(), rest.end(), [](uint8_t value) { return value != 0; }))
     ++(there <= channels ? tally_.beyond : tally_.unused);
   const bool set = Set(packet.universe, static_cast<size_t>(index) * channels,
                        packet.values.first(used), told ? More::kTold : More::kPerhaps,
                        told ? sync_heard_ns_ + kSyncLife : now + options_.gather_ns);
-  ++(set ? tally_.set : tally_.outside);  // not set: a packet of no values
+  ++(set ? tally_.set : tally_.outside);  // not set: a packet without values
 }
 
 bool Intake::TakesFrom(const Datagram& packet, sync::TimeNs now) {
@@ -108,7 +110,7 @@ bool Intake::TakesFrom(const Datagram& packet, sync::TimeNs now) {
   source.priority = packet.priority;
   const std::optional<uint8_t> before = std::exchange(source.sequence, packet.sequence);
   if (before.has_value()) {
-    // §6.7.2: up to 20 numbers behind, it is late; farther behind, its sender has begun anew.
+    // §6.7.2: a packet up to 20 numbers behind is late; farther behind, its sender has restarted.
     const auto ahead = static_cast<int8_t>(*packet.sequence - *before);
     if (ahead <= 0 && ahead > -20) {
       source.sequence = before;
@@ -129,7 +131,8 @@ void Intake::CountLost(std::optional<uint8_t> sequence, int32_t of, int numbers)
   if (!sequence.has_value()) return;
   const auto [at, fresh] = sequences_.try_emplace(of, *sequence);
   if (!fresh) {
-    // Numbers run from 1 to `numbers`. One that comes out of turn is not told from one that starts anew.
+    // Numbers run from 1 to `numbers`. An out-of-order packet cannot be distinguished from a
+    // restarted sequence.
     const int ahead = (*sequence - at->second + numbers) % numbers;
     if (ahead > 1 && ahead <= numbers / 2) tally_.lost += static_cast<uint64_t>(ahead - 1);
     at->second = *sequence;
@@ -146,9 +149,9 @@ void Intake::AddMessage(const OpcReader::Message& message, sync::TimeNs now) {
   const size_t lights = options_.a_channel == 0 ? options_.lights : options_.a_channel;
   const size_t first = message.channel == 0 ? 0 : (message.channel - size_t{1}) * lights;
   std::span<const uint8_t> values = message.data;
-  // What is more than a channel has is nobody's.
+  // Values beyond the end of a channel are ignored.
   if (message.channel != 0) values = values.first(std::min(values.size(), lights * 3));
-  // A message for all is a picture; of those for channels, each is a part.
+  // A message for all channels is a whole picture; a message for one channel is part of one.
   const bool all = message.channel == 0 || options_.a_channel == 0;
   const bool set = Set(message.channel, first * 3, values, all ? More::kNo : More::kPerhaps,
                        now + options_.gather_ns);
@@ -169,7 +172,7 @@ void Intake::CountUnused(size_t first_byte, size_t count, size_t most) {
 bool Intake::Set(int64_t part, size_t first_byte, std::span<const uint8_t> values, More more,
                  sync::TimeNs until) {
   if (values.empty() || first_byte >= values_.size()) return false;
-  if (more != More::kTold && parts_.contains(part)) Show();  // it begins the next
+  if (more != More::kTold && parts_.contains(part)) Show();  // this part begins the next picture
   const size_t count = std::min(values.size(), values_.size() - first_byte);
   std::copy_n(values.begin(), count, values_.begin() + static_cast<std::ptrdiff_t>(first_byte));
   if (more == More::kNo) {

@@ -33,7 +33,7 @@ void OpcReader::Add(std::span<const uint8_t> bytes,
     each(MessageOf(held_));
     held_.clear();
   }
-  // Messages that lie whole in what came are not copied.
+  // Messages that are complete in the received bytes are not copied.
   while (bytes.size() >= kHeader) {
     const size_t length = LengthOf(bytes);
     if (bytes.size() < length) break;

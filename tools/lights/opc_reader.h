@@ -1,4 +1,4 @@
-// Open Pixel Control as it comes in: a stream of bytes, cut into messages.
+// Splits a received stream of Open Pixel Control into messages.
 #pragma once
 
 #include <cstddef>
@@ -9,19 +9,20 @@
 
 namespace voxeld::lights {
 
-// Of one connection. Every sequence of bytes is a sequence of messages, the last one perhaps not whole, so nothing
-// can be wrong with it. It holds 65,539 bytes at most. Bound to one thread.
+// The reader of one connection. Every sequence of bytes is a sequence of messages, with the last
+// one perhaps incomplete, so there are no errors. It holds at most 65,539 bytes. Bound to one
+// thread.
 class OpcReader {
  public:
   struct Message {
     uint8_t channel = 0, command = 0;
-    std::span<const uint8_t> data;  // until the next call
+    std::span<const uint8_t> data;  // valid until the next call
   };
 
-  // Calls `each` for every message that `bytes` complete.
+  // Calls `each` for every message that `bytes` completes.
   void Add(std::span<const uint8_t> bytes, const std::function<void(const Message&)>& each);
 
-  // Whether a message has begun that is not whole.
+  // Returns whether an incomplete message has begun.
   bool amid() const { return !held_.empty(); }
 
  private:

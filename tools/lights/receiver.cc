@@ -26,10 +26,10 @@ using asio::ip::udp;
 using boost::system::error_code;
 
 constexpr size_t kReadBytes = size_t{64} << 10;
-constexpr int kReceiveBuffer = 4 << 20;  // of datagrams that wait in the kernel
+constexpr int kReceiveBuffer = 4 << 20;  // for datagrams that wait in the kernel
 constexpr int kDatagramsATurn = 256;
 constexpr int kHandlersATurn =
-    64;  // whoever sends without end must not keep pictures from being shown
+    64;  // a limit, so that a continuous sender does not keep pictures from being shown
 constexpr auto kAcceptRetry = std::chrono::milliseconds(100);
 constexpr int32_t kMostGroups = 256;
 
@@ -117,7 +117,7 @@ class Receiver::Impl {
   void Accept() {
     acceptor_.async_accept([this](const error_code& error, tcp::socket socket) {
       if (error == asio::error::operation_aborted) return;
-      if (error) {  // no descriptors, no memory: they may come back
+      if (error) {  // no descriptors or no memory: this may be temporary
         retry_.expires_after(kAcceptRetry);
         retry_.async_wait([this](const error_code& stopped) {
           if (!stopped) Accept();
@@ -157,7 +157,8 @@ class Receiver::Impl {
   absl::Status Bind(const udp::endpoint& at) {
     error_code error;
     socket_.open(at.protocol(), error);
-    // Groups are heard by all who join them on this machine, and answers to polls go to one port.
+    // Several processes on this machine may join the same groups, and answers to polls go to one
+    // port.
     if (!error && (options_.multicast || at.address().is_multicast())) {
       socket_.set_option(udp::socket::reuse_address(true), error);
     }
@@ -211,7 +212,7 @@ class Receiver::Impl {
     const auto reply =
         ArtPollReply(ip, local_.port(), lights_.first_universe, UniversesOf(lights_));
     error_code error;
-    socket_.send_to(asio::buffer(reply), to, 0, error);  // who asked will ask again
+    socket_.send_to(asio::buffer(reply), to, 0, error);  // the peer will ask again
   }
 
   template <typename Endpoint>

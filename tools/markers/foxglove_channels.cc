@@ -43,7 +43,7 @@ absl::StatusOr<std::string> FoxgloveChannels::Told(std::string_view text) {
       channels_.erase(static_cast<uint32_t>(id.get<uint64_t>()));
     }
   }
-  if (what != "advertise") return "";  // serverInfo, status and what later versions say
+  if (what != "advertise") return "";  // serverInfo, status and messages of later versions
   const auto channels = json.find("channels");
   if (channels == json.end() || !channels->is_array()) {
     return absl::InvalidArgumentError("the server advertises no list of channels");
@@ -71,7 +71,7 @@ absl::StatusOr<std::string> FoxgloveChannels::Told(std::string_view text) {
       }
       continue;
     }
-    // A subscription goes by its channel's own number.
+    // The channel's own number is used as the subscription's number.
     channels_[static_cast<uint32_t>(*id)] = {
         topic, encoding == "json" ? Encoding::kJson : Encoding::kProtobuf};
     wanted.push_back({{"id", *id}, {"channelId", *id}});
@@ -83,7 +83,7 @@ absl::StatusOr<std::string> FoxgloveChannels::Told(std::string_view text) {
 absl::StatusOr<std::optional<FoxgloveMessage>> FoxgloveChannels::Data(
     std::string_view bytes) const {
   if (bytes.empty() || static_cast<uint8_t>(bytes[0]) != kMessageData) {
-    return std::nullopt;  // times, answers
+    return std::nullopt;  // times, responses
   }
   if (bytes.size() < kHeaderBytes) {
     return absl::InvalidArgumentError(
@@ -91,7 +91,8 @@ absl::StatusOr<std::optional<FoxgloveMessage>> FoxgloveChannels::Data(
   }
   const auto channel = channels_.find(
       boost::endian::load_little_u32(reinterpret_cast<const unsigned char*>(bytes.data() + 1)));
-  if (channel == channels_.end()) return std::nullopt;  // on its way while it was unsubscribed
+  // sent before the server saw the unsubscription
+  if (channel == channels_.end()) return std::nullopt;
   return FoxgloveMessage{channel->second.topic, std::string(bytes.substr(kHeaderBytes)),
                          channel->second.encoding};
 }

@@ -1,4 +1,4 @@
-// What a Foxglove server says of its channels, and which message is of which. Knows no socket.
+// Tracks the channels of a Foxglove server, and which message belongs to which. It uses no socket.
 #pragma once
 
 #include <cstdint>
@@ -23,15 +23,17 @@ class FoxgloveChannels {
  public:
   static constexpr size_t kMostPassedOver = 100, kMostChannels = 10'000;
 
-  // `topics` empty: all.
+  // If `topics` is empty, all topics are used.
   explicit FoxgloveChannels(std::vector<std::string> topics) : topics_(std::move(topics)) {}
 
-  // A message of text. What is to be answered; empty: nothing. InvalidArgument for what is not of the protocol.
+  // Processes a text message. Returns: the answer to send; empty if none. Errors: InvalidArgument
+  // if the message violates the protocol.
   absl::StatusOr<std::string> Told(std::string_view text);
-  // A binary one. Nothing: it is of no concern. InvalidArgument as above.
+  // Processes a binary message. Returns: nothing if it is not relevant. Errors: InvalidArgument as
+  // above.
   absl::StatusOr<std::optional<FoxgloveMessage>> Data(std::string_view bytes) const;
 
-  // As FoxgloveClient has them.
+  // As in FoxgloveClient.
   const std::vector<std::string>& passed_over() const { return passed_over_; }
   size_t subscribed() const { return channels_.size(); }
 
@@ -42,7 +44,7 @@ class FoxgloveChannels {
   };
 
   const std::vector<std::string> topics_;
-  std::map<uint32_t, Channel> channels_;  // by subscription
+  std::map<uint32_t, Channel> channels_;  // by subscription number
   std::vector<std::string> passed_over_;
 };
 

@@ -22,7 +22,7 @@ namespace asio = boost::asio;
 namespace beast = boost::beast;
 using Stream = beast::websocket::stream<asio::ip::tcp::socket>;
 
-// The same protocol by the name that it had, and by the one that newer servers want.
+// The protocol's earlier name, and the one that newer servers require.
 constexpr char kProtocol[] = "foxglove.websocket.v1", kNewProtocol[] = "foxglove.sdk.v1";
 constexpr std::chrono::seconds kOpenTime(10);
 
@@ -127,14 +127,14 @@ class FoxgloveClient::Impl {
     }
   }
 
-  // Only the socket: the stream is the reading thread's.
+  // Shuts down only the socket: the stream belongs to the reading thread.
   void Interrupt() { ::shutdown(stream_.next_layer().native_handle(), SHUT_RDWR); }
 
   const std::vector<std::string>& passed_over() const { return channels_.passed_over(); }
   size_t subscribed() const { return channels_.subscribed(); }
 
  private:
-  // What was begun, or what became of it in time.
+  // Finishes the operation that was begun, or fails if it takes too long.
   void Finish(beast::error_code* error) {
     io_.restart();
     io_.run_for(kOpenTime);

@@ -1,5 +1,6 @@
-// A client of a Foxglove WebSocket server, as viewers are (the protocol foxglove.websocket.v1, or foxglove.sdk.v1, by its specification): takes in
-// every channel of SceneUpdate.
+// A client of a Foxglove WebSocket server, as viewers are (the protocol foxglove.websocket.v1 or
+// foxglove.sdk.v1, implemented from its specification). It subscribes to every channel of
+// SceneUpdate.
 #pragma once
 
 #include <cstdint>
@@ -16,33 +17,38 @@ namespace voxeld::markers {
 struct FoxgloveUrl {
   std::string host, port, path;
 };
-// "ws://HOST:PORT/PATH"; without a port 8765. InvalidArgument for all else.
+// Parses "ws://HOST:PORT/PATH"; the default port is 8765. Errors: InvalidArgument for everything
+// else.
 absl::StatusOr<FoxgloveUrl> ParseFoxgloveUrl(std::string_view url);
 
 struct FoxgloveOptions {
   FoxgloveUrl url;
   std::vector<std::string> topics;          // empty: all
-  uint64_t most_message_bytes = 64u << 20;  // a longer one ends the connection
+  uint64_t most_message_bytes = 64u << 20;  // a longer message ends the connection
 };
 
-// For one thread, but for Interrupt.
+// Bound to one thread, except Interrupt.
 class FoxgloveClient {
  public:
-  // Connects, within ten seconds. Unavailable says why not; FailedPrecondition if the other end speaks something else.
+  // Connects within ten seconds. Errors: Unavailable with the reason; FailedPrecondition if the
+  // other end speaks another protocol.
   static absl::StatusOr<std::unique_ptr<FoxgloveClient>> Open(const FoxgloveOptions& options);
   ~FoxgloveClient();
   FoxgloveClient(const FoxgloveClient&) = delete;
   FoxgloveClient& operator=(const FoxgloveClient&) = delete;
 
-  // Blocks until there is one. Channels are subscribed to as the server tells of them. Unavailable at the connection's end, and
-  // after Interrupt; ResourceExhausted when a message was too large; InvalidArgument for what is not of the protocol: the next call goes on.
+  // Blocks until there is a message. Subscribes to channels as the server advertises them. Errors:
+  // Unavailable when the connection ends and after Interrupt; ResourceExhausted if a message was
+  // too large; InvalidArgument if a message violates the protocol, in which case the next call
+  // continues.
   absl::StatusOr<FoxgloveMessage> Next();
 
-  // What the server has that is no SceneUpdate here, or in an encoding that is not read: "/tf (foxglove.FrameTransform)".
+  // Returns the server's channels that are not of SceneUpdate or use an unsupported encoding: "/tf
+  // (foxglove.FrameTransform)".
   const std::vector<std::string>& passed_over() const;
   size_t subscribed() const;
 
-  // Thread-safe: Next ends.
+  // Makes Next return. Thread-safe.
   void Interrupt();
 
  private:

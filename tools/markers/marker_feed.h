@@ -1,4 +1,4 @@
-// Where updates of robots' scenes come from: a server of Foxglove's, a ROS master and its publishers.
+// Sources of updates of robots' scenes: a Foxglove server, or a ROS master and its publishers.
 #pragma once
 
 #include <cstdint>
@@ -13,31 +13,32 @@
 namespace voxeld::markers {
 
 struct FeedUpdate {
-  std::string topic;  // empty: there is no update, only what stands below
+  std::string topic;  // empty: there is no update, only the fields below
   foxglove::SceneUpdate update;
-  uint64_t malformed = 0;          // what came with it and could not be read
-  std::string malformed_last;      // and why
-  std::set<std::string> left_out;  // what of it is not drawn
-  std::vector<std::string> news;   // of the source, each a line for people
+  uint64_t malformed = 0;          // parts of the message that could not be read
+  std::string malformed_last;      // the reason for the last of them
+  std::set<std::string> left_out;  // parts that are not drawn
+  std::vector<std::string> news;   // about the source, each a line for people
 };
 
-// For one thread, but for Interrupt.
+// Bound to one thread, except Interrupt.
 class MarkerFeed {
  public:
   virtual ~MarkerFeed() = default;
 
-  // Blocks until there is something. InvalidArgument is a message that could not be read: the next call goes on. Any other
-  // status is the feed's end, that after Interrupt among them.
+  // Blocks until there is something. Errors: InvalidArgument means that a message could not be
+  // read, and the next call continues. Any other status, including that after Interrupt, is the end
+  // of the feed.
   virtual absl::StatusOr<FeedUpdate> Next() = 0;
 
-  // Channels or topics that are followed, and what is there but is not.
+  // Return how many channels or topics are followed, and which exist but are not followed.
   virtual size_t subscribed() const = 0;
   virtual std::vector<std::string> passed_over() const = 0;
 
-  // What else is counted, by name.
+  // Returns further counters, by name.
   virtual std::vector<std::pair<std::string, uint64_t>> counts() const { return {}; }
 
-  // Thread-safe: Next ends.
+  // Makes Next return. Thread-safe.
   virtual void Interrupt() = 0;
 };
 

@@ -1,4 +1,5 @@
-// What is up of the entities that updates tell of. Pure: it says what to put and what to remove.
+// Tracks which entities of the received updates are in the scene. It performs no I/O: it returns
+// what to put and what to remove.
 #pragma once
 
 #include <cstdint>
@@ -16,22 +17,23 @@ namespace voxeld::markers {
 
 struct MarkerTally {
   uint64_t updates = 0, entities = 0, deletions = 0;
-  uint64_t malformed = 0;          // messages that are no updates
-  std::string malformed_last;      // and why
+  uint64_t malformed = 0;          // messages that are not updates
+  std::string malformed_last;      // the reason for the last of them
   std::set<std::string> left_out;  // what is not drawn, each once
 };
 
 class MarkerScene {
  public:
   struct Changes {
-    std::vector<std::string> remove;  // ids within the layer, before
+    std::vector<std::string> remove;  // ids within the layer, removed first
     std::vector<std::pair<std::string, Piece>> put;
   };
-  // Entities that are up at once; further ones are left out, and told.
+  // Maximum number of entities in the scene; further ones are left out and reported.
   static constexpr size_t kMostEntities = 100'000;
 
-  // Entities of different topics are different ones, whatever their ids. A deletion is of what was before it in its topic. What
-  // has had its time by `now` is forgotten: the server takes it away.
+  // Applies an update. Entities of different topics are different, whatever their ids. A deletion
+  // affects the entities that were received before it in its topic. Entities that have expired by
+  // `now` are forgotten: the server removes them.
   Changes Apply(const std::string& topic, const foxglove::SceneUpdate& update, sync::TimeNs now);
 
   size_t size() const { return up_.size(); }
@@ -49,7 +51,7 @@ class MarkerScene {
   void Forget(sync::TimeNs now);
 
   std::map<Key, Up> up_;
-  sync::TimeNs next_end_ = sync::kNever;  // the first of `until`, or before it
+  sync::TimeNs next_end_ = sync::kNever;  // the first of `until`, or earlier
   MarkerTally tally_;
 };
 

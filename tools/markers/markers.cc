@@ -37,7 +37,7 @@ Affine PoseOf(const foxglove::Pose& pose) {
   if (length > 0) {
     x /= length, y /= length, z /= length, w /= length;
   } else {
-    w = 1;  // it was not said
+    w = 1;  // it was not given
   }
   const foxglove::Vector3& p = pose.position();
   return {{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), p.x(),
@@ -54,7 +54,7 @@ std::vector<float> PositionsOf(const google::protobuf::RepeatedPtrField<foxglove
   return out;
 }
 
-// One colour each, or none of them: then one is for all.
+// Returns one colour per point, or none: then one colour is used for all.
 std::vector<uint8_t> ColorsOf(const google::protobuf::RepeatedPtrField<foxglove::Color>& colors,
                               int points) {
   std::vector<uint8_t> out;
@@ -66,7 +66,7 @@ std::vector<uint8_t> ColorsOf(const google::protobuf::RepeatedPtrField<foxglove:
   return out;
 }
 
-// Whether there are colours that are not one of each point, which is a fault of the sender's.
+// Returns whether there are colours but not one per point, which is an error of the sender.
 bool HasOddColors(const auto& primitive) {
   return !primitive.colors().empty() && primitive.colors_size() != primitive.points_size();
 }
@@ -152,7 +152,7 @@ class Maker {
         in.type() == foxglove::LinePrimitive::LINE_LOOP   ? client::Segments::Topology::kLoop
         : in.type() == foxglove::LinePrimitive::LINE_LIST ? client::Segments::Topology::kList
                                                           : client::Segments::Topology::kStrip;
-    // Of pixels: a viewer's, so as thin as can be here.
+    // The thickness is in a viewer's pixels, so the line is as thin as possible here.
     if (!in.scale_invariant()) {
       segments.thickness = {static_cast<float>(in.thickness()), client::Thickness::Unit::kUnits};
     }
@@ -168,7 +168,7 @@ class Maker {
     if (in.text().empty()) return;
     client::Text text{.text = in.text(), .alignment = client::Text::Alignment::kCenter};
     if (!in.scale_invariant() && in.font_size() > 0) text.height = in.font_size();
-    // What turns to the viewer stands upright: there are viewers all around.
+    // A billboard is drawn upright, because there are viewers on all sides.
     if (in.billboard()) {
       const foxglove::Vector3& at = in.pose().position();
       text.facing = {0, -1, 0};
@@ -185,7 +185,8 @@ class Maker {
 
 using Json = nlohmann::json;
 
-// Times are objects of seconds and nanoseconds there, and texts in what protobuf reads.
+// Such JSON encodes times as objects of seconds and nanoseconds; they become texts that protobuf
+// can read.
 void MendTimes(Json& value) {
   if (value.is_array()) {
     for (Json& one : value) MendTimes(one);

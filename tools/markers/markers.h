@@ -1,7 +1,7 @@
-// foxglove.SceneUpdate as shapes: what robots' programs send to their viewers.
+// Converts foxglove.SceneUpdate, which robots' programs send to their viewers, to shapes.
 //
-// Lengths are the scene's units, quaternions need not be of length 1. What a colour lets through (alpha) it is darker
-// by: light covers nothing.
+// Lengths are in the scene's units, and quaternions need not have length 1. Transparency (alpha)
+// makes a colour darker, because light cannot occlude.
 #pragma once
 
 #include <cstdint>
@@ -22,20 +22,23 @@ struct Piece {
 
 struct Pieces {
   std::vector<Piece> pieces;
-  // What of the entity is not drawn, and why, for people: "models". Empty: all is.
+  // The parts of the entity that are not drawn, and why, for people: "models". Empty if all is
+  // drawn.
   std::string left_out;
 };
 
-// Entities and pieces of one update, InvalidArgument of ParseSceneUpdate beyond, as JSON is that is deeper than kMaxJsonDepth.
+// Maximum number of entities and pieces in one update. ParseSceneUpdate returns InvalidArgument
+// beyond it, and for JSON that is deeper than kMaxJsonDepth.
 inline constexpr int kMostPieces = 100'000;
 
-// The entity and what it is made of, as kMostPieces counts.
+// Returns how much the entity counts towards kMostPieces: itself and its pieces.
 int64_t CountPieces(const foxglove::SceneEntity& entity);
 
-// In the order of the message's fields. A piece that has nothing in it (no points, no text) is left out without a word.
+// Returns the pieces in the order of the message's fields. A piece without content (no points, no
+// text) is left out silently.
 Pieces PiecesOf(const foxglove::SceneEntity& entity);
 
-// The two ways in which such messages are written. InvalidArgument says what is wrong.
+// The two encodings of such messages. Errors: InvalidArgument with the reason.
 enum class Encoding : uint8_t { kProtobuf, kJson };
 absl::StatusOr<foxglove::SceneUpdate> ParseSceneUpdate(std::string_view bytes, Encoding encoding);
 
