@@ -1,8 +1,8 @@
 // Measures what it costs to run an engine in its own process: whole frames, from a change to the
 // end of its frame, in this process and through a worker.
 //
-//    voxel-boundary-bench [--engines cpu,cpu_worker] [--lines 1000,1000000] [--repetitions 15]
-//                         [--size 128] [--threads 0] [--json]
+//   voxel-boundary-bench [--engines cpu,cpu_worker] [--lines 1000,1000000] [--repetitions 15]
+//                        [--size 128] [--threads 0] [--json]
 //
 // Engines: cpu, cpu_worker; cuda (in this process, if the build has CUDA), cuda_worker. A worker's
 // times are compared with those of the same engine in this process, if both are measured. Engines

@@ -1,7 +1,7 @@
 // Measures what a display's driver and its transport cost and which rate they reach, with
 // pre-rendered volumes of which one always waits in the mailbox.
 //
-//    voxel-link-bench [DEVICE] [--usb] [--plain] [--seconds 10] [--share 1] [--json]
+//   voxel-link-bench [DEVICE] [--usb] [--plain] [--seconds 10] [--share 1] [--json]
 //
 // DEVICE is "key=value,…", the options of the simulated driver. The default is a display of 192
 // one-bit frames of 912x1140 pixels per volume at 15 volumes a second, at the end of a cable of 400

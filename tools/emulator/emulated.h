@@ -31,11 +31,11 @@ struct Emulated {
 absl::StatusOr<Emulated> MakeEmulated(std::string_view spec, sync::Clock& clock);
 
 // Executes one line of the control socket. Returns: the answer, without its newline:
-//    fault WHAT[:AMOUNT]@WHEN[/in]   adds a fault, counted from now      ok
-//    clear                           removes all faults and lies         ok
-//    hostile SEED                    damages answers and reports         ok
-//    unplug, plug                    the cable                           ok
-//    status                                                              JSON
+//   fault WHAT[:AMOUNT]@WHEN[/in]   adds a fault, counted from now      ok
+//   clear                           removes all faults and lies         ok
+//   hostile SEED                    damages answers and reports         ok
+//   unplug, plug                    the cable                           ok
+//   status                                                              JSON
 // Errors are answered with "error: …".
 std::string Control(Emulated& device, std::string_view line);
 

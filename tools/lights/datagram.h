@@ -24,9 +24,9 @@ struct Datagram {
     kOther,   // none of these
   };
   Kind kind = Kind::kOther;
-  int32_t universe = 0;   // E1.31, Art-Net. For kShow of E1.31: the synchronisation's
+  int32_t universe = 0;  // E1.31, Art-Net. For kShow of E1.31: the synchronisation's
+  // DDP: show the values received up to this packet; otherwise others may follow.
   size_t first_byte = 0;  // DDP
-  // DDP: show the values received up to this packet; otherwise others may follow
   bool push = false;
   std::optional<uint8_t> sequence;  // if the sender counts
   uint8_t priority = 100;           // E1.31: 0 to 200

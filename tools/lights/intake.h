@@ -125,8 +125,8 @@ class Intake {
   bool waiting_ = false;
   std::map<int32_t, std::map<SourceKey, Source>> sources_;  // per universe, E1.31
   std::map<int32_t, uint8_t> sequences_;                    // per universe; DDP: under 0
-  uint16_t sync_universe_ = 0;                              // E1.31: the one that pictures wait for
-  // Art-Net: sync packets are being received
+  // Art-Net: sync packets are being received.
+  uint16_t sync_universe_ = 0;  // E1.31: the one that pictures wait for
   bool synchronised_ = false;
   sync::TimeNs sync_heard_ns_ = 0;
   IntakeTally tally_;

@@ -91,7 +91,7 @@ absl::StatusOr<std::optional<FoxgloveMessage>> FoxgloveChannels::Data(
   }
   const auto channel = channels_.find(
       boost::endian::load_little_u32(reinterpret_cast<const unsigned char*>(bytes.data() + 1)));
-  // sent before the server saw the unsubscription
+  // Sent before the server saw the unsubscription.
   if (channel == channels_.end()) return std::nullopt;
   return FoxgloveMessage{channel->second.topic, std::string(bytes.substr(kHeaderBytes)),
                          channel->second.encoding};

@@ -26,8 +26,8 @@ struct Content {
 
 // The traffic that the frame's time is also compared with.
 enum class Traffic {
+  // A copy that reads and writes as many bytes as the volume and the slice images together.
   kPictures,  // a copy of the frame's bytes
-  // a copy that reads and writes as many bytes as the volume and the slice images together
   kVolumeAndPictures,
 };
 

@@ -11,9 +11,9 @@
 namespace voxeld::bench {
 
 // The number of bytes per line on the wire. Each line has two ends of 12 bytes (F32), and
-//    24: nothing else
-//    28: two U16 indices
-//    30: a colour (RGB8) at each end
+//   24: nothing else
+//   28: two U16 indices
+//   30: a colour (RGB8) at each end
 enum class LineForm : uint8_t { k24Bytes = 24, k28Bytes = 28, k30Bytes = 30 };
 
 struct Lines {

@@ -26,7 +26,7 @@ using Frames = std::vector<std::vector<Message>>;
 
 // When written messages are passed to the transport.
 enum class Flush : uint8_t {
-  // with the commit, or when gRPC's buffers are full: all but the last say that more follows
+  // With the commit, or when gRPC's buffers are full: all but the last say that more follows.
   kEachFrame,
   kEachMessage,  // immediately, which is gRPC's default
 };

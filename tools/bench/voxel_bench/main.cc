@@ -20,7 +20,7 @@ namespace {
 
 constexpr int kUsageError = 2;
 
-// by a signal; a benchmark's children and folders are cleaned up too
+// By a signal; a benchmark's children and folders are cleaned up too.
 std::atomic<bool> interrupted = false;
 
 int Fail(int code, const absl::Status& status) {

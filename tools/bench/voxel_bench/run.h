@@ -16,8 +16,8 @@ namespace voxeld::bench {
 
 struct Surroundings {
   const std::atomic<bool>* interrupted = nullptr;
+  // Path of the program; empty: voxeld beside this one.
   std::function<void(const std::string&)> progress;  // receives a line for people
-  // path of the program; empty: voxeld beside this one
   std::string daemon;
 };
 

@@ -13,9 +13,9 @@
 namespace voxeld::bench {
 
 struct DaemonOptions {
-  std::string program;                // empty: voxeld beside this program
+  std::string program;  // empty: voxeld beside this program
+  // More of the configuration file, starting at its first section.
   std::vector<std::string> displays;  // as for --display; empty: none
-  // more of the configuration file, starting at its first section
   std::string config;
   bool tls = false;  // on its port, with a certificate that openssl makes for it
 };

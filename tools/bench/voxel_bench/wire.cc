@@ -22,7 +22,7 @@
 namespace voxeld::bench {
 namespace {
 
-// interval at which an interruption is checked
+// Interval at which an interruption is checked.
 constexpr sync::TimeNs kLookUpEvery = 100 * sync::kMillisecond;
 constexpr sync::TimeNs kEndLimit = 5 * sync::kSecond;
 
