@@ -18,10 +18,10 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr double kTicks = 25;           // a second, where a file does not say
-constexpr unsigned kMostShapes = 4096;  // of a mesh
+constexpr double kTicks = 25;           // ticks per second if a file gives no rate
+constexpr unsigned kMostShapes = 4096;  // per mesh
 
-// The two keys around `time`, and how far it is from the first to the second.
+// The two keys around `time`, and the position between the first and the second.
 template <typename Key>
 struct Between {
   const Key* from;
@@ -79,7 +79,7 @@ Pose PoseAt(const aiScene& scene, const aiAnimation& animation, double time) {
     const aiNodeAnim& channel = *animation.mChannels[c];
     const aiNode* node = scene.mRootNode->FindNode(channel.mNodeName);
     if (node == nullptr) continue;
-    // What has no keys stays as the node has it.
+    // A channel without keys keeps the node's own value.
     aiVector3D scale(1, 1, 1), move;
     aiQuaternion turn;
     node->mTransformation.Decompose(scale, turn, move);
@@ -135,7 +135,8 @@ class AnimationFrames final : public FrameSource {
     }
     animation_ = scene_->mAnimations[number - 1];
     const double ticks = animation_->mTicksPerSecond > 0 ? animation_->mTicksPerSecond : kTicks;
-    // In BVH every frame lasts a tick, the last one too; the library's duration ends where that one begins.
+    // In BVH every frame lasts one tick, including the last; the library's duration ends where the
+    // last frame begins.
     const bool has_last = file_.extension == "bvh" && animation_->mDuration > 0;
     const double seconds = (animation_->mDuration + (has_last ? 1 : 0)) / ticks;
     if (!(seconds >= 0) || !(seconds * fps <= static_cast<double>(kMaxFrames))) {

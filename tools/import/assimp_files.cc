@@ -22,7 +22,7 @@ const std::string* AssimpFiles::Find(const std::string& path) const {
   if (path == file_.path) return &file_.bytes;
   const auto [at, is_new] = others_.try_emplace(path);
   if (is_new) {
-    // Assimp puts the folder before the names that it finds.
+    // Assimp prefixes the names that it finds with the folder.
     const std::string folder = std::filesystem::path(file_.path).parent_path().string() + "/";
     std::string name = path;
     if (folder != "/" && name.starts_with(folder)) name.erase(0, folder.size());

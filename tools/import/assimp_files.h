@@ -10,8 +10,8 @@
 
 namespace voxeld::voxelctl {
 
-// Gives assimp the bytes of `file` that were checked, and the files that ReadOtherFile allows. Assimp finds no other files and
-// cannot write. Not thread-safe. `file` outlives it.
+// Gives assimp the checked bytes of `file`, and the files that ReadOtherFile allows. Assimp finds
+// no other files and cannot write. Not thread-safe. `file` must outlive it.
 class AssimpFiles final : public Assimp::IOSystem {
  public:
   explicit AssimpFiles(const SourceFile& file) : file_(file) {}
@@ -25,7 +25,7 @@ class AssimpFiles final : public Assimp::IOSystem {
   const std::string* Find(const std::string& path) const;
 
   const SourceFile& file_;
-  // By path; null: it may not be read.
+  // By path; null if the file may not be read.
   mutable std::map<std::string, std::unique_ptr<std::string>> others_;
 };
 

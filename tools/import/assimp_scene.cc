@@ -33,10 +33,10 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// Sharper edges stay edges when a file has no normals of its own.
+// Sharper edges stay edges if a file has no normals of its own.
 constexpr float kSmoothingDegrees = 50;
 constexpr double kCreaseDegrees = 25;
-constexpr double kBoneThickness = 0.004;  // of all bones' lengths together
+constexpr double kBoneThickness = 0.004;  // as a share of the total length of all bones
 
 NodeMatrix FromAssimp(const aiMatrix4x4& m) {
   return {m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2, m.c3, m.c4};
@@ -52,7 +52,8 @@ Rgb ToRgb(const aiColor4D& c) {
   return {ColorByte(c.r, false), ColorByte(c.g, false), ColorByte(c.b, false)};
 }
 
-// Whether the library made the material up for meshes without one. Such a material has its name, and a colour and nothing else, or its grey.
+// Returns whether the library made up the material for meshes without one. Such a material has the
+// library's name for it, and either one colour and nothing else, or its grey.
 bool IsMadeUp(const aiMaterial& material) {
   aiString name;
   aiColor4D color;
@@ -63,7 +64,7 @@ bool IsMadeUp(const aiMaterial& material) {
          absl::string_view(name.C_Str()) == AI_DEFAULT_MATERIAL_NAME;
 }
 
-// The texture that gives a material its colours.
+// Returns the type of the texture that gives a material its colours.
 std::optional<aiTextureType> ColorTextureOf(const aiMaterial& material) {
   for (const aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
     if (material.GetTextureCount(type) > 0) return type;
@@ -71,7 +72,7 @@ std::optional<aiTextureType> ColorTextureOf(const aiMaterial& material) {
   return std::nullopt;
 }
 
-// What a material has beside its colour that is not shown.
+// Counts properties of a material, other than its colour, that are not shown.
 void CountMaterial(const aiMaterial& material, bool has_picture, Model* model) {
   static constexpr std::pair<aiTextureType, const char*> kMaps[] = {
       {aiTextureType_NORMALS, "normal maps"},
@@ -105,7 +106,7 @@ void CountMaterial(const aiMaterial& material, bool has_picture, Model* model) {
 struct Context {
   const SourceFile& file;
   const aiScene& scene;
-  bool has_materials;             // of its own; some readers make one up
+  bool has_materials;             // of the file itself; some readers make one up
   bool has_diffuse;               // the file has diffuse colours at all
   const ThreeMfColors* three_mf;  // null for other formats
   const Pose* pose;
@@ -113,19 +114,19 @@ struct Context {
   uint64_t vertices = 0, indices = 0;
   Model* model;
   std::unordered_map<std::string, NodeMatrix> globals =
-      {};  // where each node is, by its name; only with a pose
+      {};  // map of each node, by its name; only with a pose
   std::unordered_map<std::string, uint32_t> pictures = {};  // by their name
-  std::set<unsigned> materials = {};                        // that were counted
+  std::set<unsigned> materials = {};                        // already counted
   double rounding = 0;  // how far single precision may have moved a vertex
 };
 
-// The colour that the file gives to a material; none if it gives none.
+// Returns the colour that the file gives to a material; nothing if it gives none.
 std::optional<aiColor4D> BaseColor(const aiMaterial& material, bool has_picture,
                                    const Context& context) {
-  // In FBX, COLLADA and Blender a texture stands in place of the colour.
+  // In FBX, COLLADA and Blender a texture replaces the colour.
   if (has_picture) return aiColor4D(1, 1, 1, 1);
   if (IsMadeUp(material) || !context.has_diffuse) return std::nullopt;
-  // COLLADA has one or the other, and the library a grey.
+  // COLLADA has either a texture or a colour; the library adds a grey.
   if (ColorTextureOf(material) && context.file.extension == "dae") return std::nullopt;
   aiColor4D color;
   if (material.Get(AI_MATKEY_BASE_COLOR, color) != aiReturn_SUCCESS &&
@@ -135,7 +136,8 @@ std::optional<aiColor4D> BaseColor(const aiMaterial& material, bool has_picture,
   return color;
 }
 
-// For each vertex the sum of its bones' maps by their weights; empty if the mesh has no bones, or they do nothing.
+// Returns for each vertex the sum of its bones' maps, weighted; empty if the mesh has no bones or
+// they have no effect.
 std::vector<NodeMatrix> SkinOf(const aiMesh& mesh, const Context& context) {
   if (context.pose == nullptr || mesh.mNumBones == 0) return {};
   const auto has_place = [&context](const aiBone* bone) {
@@ -156,7 +158,7 @@ std::vector<NodeMatrix> SkinOf(const aiMesh& mesh, const Context& context) {
       weights[weight.mVertexId] += weight.mWeight;
     }
   }
-  // What hangs on no bone stays where the first one puts the mesh.
+  // Vertices without a bone stay where the first bone puts the mesh.
   const auto root = context.globals.find(mesh.mBones[0]->mName.C_Str());
   for (unsigned v = 0; v < mesh.mNumVertices; ++v) {
     if (weights[v] > 0) {
@@ -192,7 +194,8 @@ absl::Status CheckMesh(const SourceFile& file, const aiMesh& mesh) {
   return absl::OkStatus();
 }
 
-// Where a vertex is, or a normal, before the mesh is put anywhere: between the shapes that the mesh can take.
+// Computes where a vertex or normal is before its mesh is placed, by blending the shapes that the
+// mesh can take.
 class Shaped {
  public:
   Shaped(const aiMesh& mesh, const std::string& node, const Context& context) : mesh_(mesh) {
@@ -223,16 +226,16 @@ class Shaped {
   const std::vector<double>* weights_ = nullptr;
 };
 
-// The bytes of a picture that the file contains or names; empty if there are none.
+// Returns the bytes of a picture that the file contains or names; empty if there are none.
 std::string PictureBytes(const Context& context, const std::string& name) {
   if (const aiTexture* const own = context.scene.GetEmbeddedTexture(name.c_str())) {
-    // Texels, if it has a height.
+    // A texture with a height consists of raw texels.
     if (own->mHeight != 0) return "texels";
     return {reinterpret_cast<const char*>(own->pcData), own->mWidth};
   }
   std::string slashes = absl::StrReplaceAll(name, {{"\\", "/"}});
   if (absl::StartsWith(slashes, "file://")) slashes.erase(0, 7);
-  // Also as the name of a file that was elsewhere on the computer that wrote this one.
+  // The name may also be a path on the computer that wrote the file.
   for (const std::string& one :
        {name, slashes, PercentDecode(slashes),
         std::filesystem::path(PercentDecode(slashes)).filename().string()}) {
@@ -284,7 +287,7 @@ void AddPicture(const aiMaterial& material, const aiMesh& mesh, Part* part, Cont
   part->texture_coordinates.reserve(mesh.mNumVertices);
   for (unsigned v = 0; v < mesh.mNumVertices; ++v) {
     const float u = uv[v].x * transform.mScaling.x + transform.mTranslation.x;
-    // v goes up in the library, and down in a model.
+    // v points up in the library, and down in a model.
     const float down = 1 - (uv[v].y * transform.mScaling.y + transform.mTranslation.y);
     part->texture_coordinates.push_back({std::isfinite(u) ? u : 0, std::isfinite(down) ? down : 0});
   }
@@ -292,7 +295,7 @@ void AddPicture(const aiMaterial& material, const aiMesh& mesh, Part* part, Cont
              ApplyWrap(WrapOfMode(modes[0]), WrapOfMode(modes[1]), part), context->model);
 }
 
-// The library has 24 bits for each coordinate, of the mesh and of where its node is.
+// The library has 24 bits for each coordinate, both of the mesh and of its node's position.
 void NoteRounding(const aiMesh& mesh, const NodeMatrix& map, Context* context) {
   double largest = 0, factor = 0, move = 0;
   for (unsigned v = 0; v < mesh.mNumVertices; ++v) {
@@ -307,7 +310,7 @@ void NoteRounding(const aiMesh& mesh, const NodeMatrix& map, Context* context) {
   context->rounding = std::max(context->rounding, std::ldexp(largest * factor + move, -24));
 }
 
-// Parts by kind: after sorting a mesh has faces of one kind, or of points only.
+// Adds parts by kind: after sorting, a mesh has faces of one kind only, or only points.
 absl::Status AddMesh(const aiMesh& mesh, const std::string& node, const NodeMatrix& to_model,
                      Context* context) {
   const Shaped shaped(mesh, node, *context);
@@ -350,7 +353,7 @@ absl::Status AddMesh(const aiMesh& mesh, const std::string& node, const NodeMatr
   }
   if (context->three_mf != nullptr && corners == 3) {
     NoteRounding(mesh, to_model, context);
-    // A mirror turns the winding round.
+    // A mirror reverses the winding.
     for (size_t i = 0; IsMirror(to_model) && i < part.indices.size(); i += 3)
       std::swap(part.indices[i + 1], part.indices[i + 2]);
     for (Part& painted :
@@ -397,7 +400,7 @@ NodeMatrix LocalOf(const aiNode& node, const Pose* pose) {
   return FromAssimp(node.mTransformation);
 }
 
-// Calls `visit(node, its map, its parent's map or null)` for each.
+// Calls `visit(node, its map, its parent's map or null)` for each node.
 template <typename Visit>
 absl::Status ForEachNode(const aiNode& root, const Pose* pose, Visit visit) {
   struct Step {
@@ -455,7 +458,7 @@ Part Bones(const aiNode& root, const Pose* pose) {
   return part;
 }
 
-// How long the bones are together, whatever their pose.
+// Returns the total length of the bones, which does not depend on the pose.
 double LengthOf(const Part& bones) {
   double length = 0;
   for (size_t i = 0; i + 1 < bones.positions.size(); i += 2) {
@@ -497,15 +500,16 @@ absl::StatusOr<const aiScene*> Load(const SourceFile& file, Assimp::Importer* im
   importer->SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, aiComponent_TANGENTS_AND_BITANGENTS);
   importer->SetPropertyFloat(AI_CONFIG_PP_GSN_MAX_SMOOTHING_ANGLE, kSmoothingDegrees);
   importer->SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
-  // It looks at what a file holds, whatever its name says, and these readers of it are known to crash.
+  // The library detects the format from the contents, whatever the file's name is, and these of its
+  // readers are known to crash.
   for (const char* const extension : {"obj", "ply", "stl", "gltf", "glb"}) {
     while (Assimp::BaseImporter* const reader = importer->GetImporter(extension)) {
       if (importer->UnregisterLoader(reader) != aiReturn_SUCCESS) break;
       delete reader;
     }
   }
-  importer->SetIOHandler(new AssimpFiles(file));  // which it deletes
-  // Steps after reading trust the indices; so they come after a check of our own.
+  importer->SetIOHandler(new AssimpFiles(file));  // the importer deletes it
+  // Post-processing trusts the indices, so it runs after our own check.
   const aiScene* scene = importer->ReadFile(file.path, 0);
   if (scene == nullptr) return Failed(file, importer->GetErrorString());
   for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
@@ -515,9 +519,9 @@ absl::StatusOr<const aiScene*> Load(const SourceFile& file, Assimp::Importer* im
   if (scene->mRootNode == nullptr || (scene->mNumMeshes == 0 && scene->mNumAnimations == 0)) {
     return FileError(file, "holds no mesh", "at least one is expected");
   }
-  // A cloud has no faces to work on, and some steps refuse such meshes.
+  // A cloud has no faces to process, and some steps refuse such meshes.
   const auto has_faces = [](const aiMesh* mesh) { return mesh->mNumFaces > 0; };
-  // Colours of 3MF go by the file's order.
+  // Colours of 3MF are assigned by the file's order of triangles.
   if (scene->mNumMeshes > 0 && file.extension != "3mf" &&
       std::all_of(scene->mMeshes, scene->mMeshes + scene->mNumMeshes, has_faces)) {
     scene = importer->ApplyPostProcessing(aiProcess_RemoveComponent | aiProcess_Triangulate |
@@ -528,14 +532,14 @@ absl::StatusOr<const aiScene*> Load(const SourceFile& file, Assimp::Importer* im
   return scene;
 }
 
-// Some formats say it themselves: 0 is x, 1 y, 2 z.
+// Some formats give the axis themselves: 0 is x, 1 y, 2 z.
 Up UpOf(const aiScene& scene, Up otherwise) {
   int32_t axis = -1;
   if (scene.mMetaData == nullptr || !scene.mMetaData->Get("UpAxis", axis)) return otherwise;
   return axis == 0 ? Up::kX : axis == 1 ? Up::kY : axis == 2 ? Up::kZ : otherwise;
 }
 
-// FBX may say that its up axis points down: then half a turn about another axis comes first.
+// FBX may say that its up axis points down: then it is first turned by 180° about another axis.
 void TurnUpsideDown(const aiScene& scene, Model* model) {
   int32_t sign = 1;
   if (scene.mMetaData == nullptr || !scene.mMetaData->Get("UpAxisSign", sign) || sign != -1) return;
@@ -549,7 +553,7 @@ void TurnUpsideDown(const aiScene& scene, Model* model) {
   }
 }
 
-// What the library passes over without a word, by how the file names it.
+// Counts what the library ignores silently, by the names that the file uses.
 void CountUnread(const SourceFile& file, Model* model) {
   static constexpr std::array<std::string_view, 3> kUnread[] = {
       {"dae", "<spline", "splines"},
@@ -569,7 +573,7 @@ void CountUnread(const SourceFile& file, Model* model) {
     AddLeftOut(kind, count, model);
   }
   if (file.extension != "bvh") return;
-  // A line for each frame follows the announced number of them.
+  // The announced number of frames is followed by a line for each frame.
   absl::string_view text = file.bytes;
   const auto take_after = [&text](absl::string_view mark) {
     const size_t at = text.find(mark);
@@ -585,7 +589,7 @@ void CountUnread(const SourceFile& file, Model* model) {
              model);
 }
 
-// The library shows what there is of a truncated file. Adds a note if the end is missing.
+// The library shows the available part of a truncated file. Adds a note if the end is missing.
 void NoteMissingEnd(const SourceFile& file, Model* model) {
   static constexpr std::pair<absl::string_view, absl::string_view> kEnds[] = {
       {"ifc", "END-ISO-10303-21"}, {"dxf", "EOF"}};
@@ -599,7 +603,7 @@ void NoteMissingEnd(const SourceFile& file, Model* model) {
   }
 }
 
-// Adds a note if rounding is over half a voxel where the model fills 256.
+// Adds a note if rounding exceeds half a voxel when the model fills 256 voxels.
 void NoteSinglePrecision(double rounding, Model* model) {
   Point3 least = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, most = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
   for (const Part& part : model->parts) {
@@ -649,7 +653,7 @@ absl::StatusOr<Model> ModelOf(const SourceFile& file, const aiScene& scene, cons
     Part bones = Bones(*scene.mRootNode, pose);
     if (bones.positions.empty())
       return FileError(file, "holds no mesh and no bone", "one is expected");
-    // Of the bones as they stand in the file, so that it is the same in every pose.
+    // The thickness is computed from the bones at rest, so that it is the same in every pose.
     bones.thickness = kBoneThickness * LengthOf(Bones(*scene.mRootNode, nullptr));
     model.parts.push_back(std::move(bones));
     TurnUpsideDown(scene, &model);
@@ -663,7 +667,7 @@ absl::StatusOr<Model> ModelOf(const SourceFile& file, const aiScene& scene, cons
       .file = file,
       .scene = scene,
       .has_materials = !bare && !three_mf,
-      // The library gives a grey to COLLADA's materials that have none.
+      // The library gives a grey to COLLADA's materials without a colour.
       .has_diffuse = file.extension != "dae" || absl::StrContains(file.bytes, "<diffuse"),
       .three_mf = three_mf ? &*three_mf : nullptr,
       .pose = pose == nullptr ? &kRest : pose,

@@ -27,14 +27,14 @@ constexpr uint32_t kPixels = 0x7FE00010;
 constexpr uint32_t kModalityTables = 0x00283000, kDisplayTables = 0x00283010;  // sequences
 constexpr absl::string_view kDeflated = "1.2.840.10008.1.2.1.99",
                             kBigEndian = "1.2.840.10008.1.2.2", kRunLengths = "1.2.840.10008.1.2.5";
-// Two letters whose elements have lengths of 32 bits.
+// Value representations (two letters) whose elements have 32-bit lengths.
 constexpr absl::string_view kLong = "OB OD OF OL OV OW SQ SV UC UN UR UT UV";
 
 class Walker {
  public:
   explicit Walker(const SourceFile& file) : file_(file), bytes_(file.bytes) {}
 
-  // Where what is deflated begins; 0 if nothing is.
+  // Returns where the deflated part begins; 0 if nothing is deflated.
   absl::StatusOr<size_t> DeflatedFrom() {
     size_t at = kPreamble + 4;
     if (absl::Status status = Head(&at); !status.ok()) return status;
@@ -55,7 +55,7 @@ class Walker {
   }
 
  private:
-  // The second group says how the rest is written, and is itself always explicit.
+  // The second group says how the rest is encoded; it is itself always explicit.
   absl::Status Head(size_t* at) {
     explicit_ = true;
     while (*at + 8 <= bytes_.size() && U16(*at) == 2) {
@@ -64,7 +64,7 @@ class Walker {
     return absl::OkStatus();
   }
 
-  // Whether two letters stand where the kind of the element at this place would.
+  // Returns whether two letters are at the place where an element's value representation would be.
   bool SaysItsKind(size_t at) const {
     return at + 8 <= bytes_.size() &&
            absl::ascii_isupper(static_cast<unsigned char>(bytes_[at + 4])) &&
@@ -130,7 +130,8 @@ class Walker {
     return absl::OkStatus();
   }
 
-  // Whether a value that does not say its kind is a sequence: it is as if it were, and the item fits.
+  // Returns whether a value without an explicit representation is a sequence: it begins like one,
+  // and the item fits.
   bool BeginsWithItem(size_t at, uint64_t length) const {
     if (length < 8 || (uint32_t{U16(at)} << 16 | U16(at + 2)) != kItem) return false;
     const uint32_t item = U32(at + 4);
@@ -193,7 +194,7 @@ class Walker {
   }
 
   void Take(uint32_t tag, absl::string_view value, bool top) {
-    // Of images of many frames these stand in sequences, the frame's own or one for all.
+    // In multi-frame images these are in sequences, either of each frame or shared by all.
     std::string* const anywhere = tag == 0x00200037   ? &facts_.orientation
                                   : tag == 0x00280030 ? &facts_.spacing
                                   : tag == 0x00180050 ? &facts_.slice_thickness
@@ -334,12 +335,12 @@ class Walker {
           colors || palette ? "8 or 16 are read" : "8, 16, 32 or, uncompressed, 1 are read");
     }
     const bool run_lengths = facts_.transfer_syntax == kRunLengths;
-    // The library that decodes them mixes the colours up.
+    // The library that decodes these mixes up the colours.
     if (colors && bits == 16 && run_lengths) {
       return FileError(file_, "has colours of 16 bits, compressed by run lengths",
                        "8 bits, or another compression, are read");
     }
-    // It also reads beyond these, whose channels are of different sizes.
+    // The library also reads beyond the end of these, whose channels have different sizes.
     if (photometric == "YBR_FULL_422" && run_lengths) {
       return FileError(file_, "has colours in YBR_FULL_422, compressed by run lengths",
                        "RGB or YBR_FULL is expected");
@@ -365,7 +366,7 @@ class Walker {
                                     " of the ", bits, " for each pixel"),
                        "bits from bit 0 on are expected");
     }
-    // Of YBR_FULL_422 two pixels share their colours.
+    // In YBR_FULL_422 two pixels share their colours.
     const uint64_t halves = !colors ? 2 : photometric == "YBR_FULL_422" ? 4 : 6;
     if (photometric == "YBR_FULL_422" && !facts_.compressed &&
         (facts_.columns % 2 == 1 || bits != 8)) {
@@ -400,8 +401,8 @@ class Walker {
     return absl::OkStatus();
   }
 
-  // The head of a frame compressed by run lengths (DICOM PS3.5, G.5): the number of its segments, one for each byte of a pixel, and where
-  // each begins.
+  // Checks the header of a frame compressed by run lengths (DICOM PS3.5, G.5): the number of its
+  // segments, one per byte of a pixel, and the offset of each.
   absl::Status CheckRunLengths(absl::string_view frame, uint64_t segments) const {
     constexpr size_t kHead = 64, kMostSegments = 15;
     const auto number = [frame](size_t i) {
@@ -468,7 +469,8 @@ class Walker {
     return value;
   }
 
-  // How large a picture says that it is, before a decoder believes it. What does not begin as one goes on from another.
+  // Checks the size that a picture declares before a decoder relies on it. Data without a picture's
+  // beginning continue another picture.
   absl::Status CheckPicture(absl::string_view picture) const {
     uint64_t wide = facts_.columns, high = facts_.rows;
     if (absl::StartsWith(picture, "\xff\x4f\xff\x51")) {
@@ -510,7 +512,8 @@ bool IsGrey(const DicomFacts& facts) { return absl::StartsWith(facts.photometric
 bool LacksPreamble(const SourceFile& file) {
   const absl::string_view bytes = file.bytes;
   if (LooksLikeDicom(file) || bytes.size() < 12) return false;
-  // The length of the second group, or an identifier of the first: "UI", or eight bytes that fit without it.
+  // The file begins with the length of the second group, or with an identifier of the first: "UI",
+  // or eight bytes that are plausible without it.
   if (absl::StartsWith(bytes, absl::string_view("\2\0\0\0UL\4\0", 8))) return true;
   if (bytes.substr(0, 2) != absl::string_view("\x08\0", 2) || bytes[3] != 0) return false;
   static constexpr absl::string_view kKinds[] = {"UI", "CS", "UL", "DA", "TM", "LO"};

@@ -1,4 +1,4 @@
-// DICOM's pixels, what is compressed through gdcm.
+// Decodes DICOM's pixels; gdcm decodes compressed ones.
 
 #include <gdcmImageReader.h>
 #include <gdcmTrace.h>
@@ -22,21 +22,20 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// How three numbers a pixel lie.
+// The layout of three values per pixel.
 struct ColorLayout {
   bool planar = false;
   bool ybr = false;
-  bool halved =
-      false;  // of two pixels beside each other: two brightnesses, then their one blue and red
+  bool halved = false;  // two neighbouring pixels: two brightnesses, then their shared blue and red
   bool big_endian = false;
 };
 
-// Three bytes a pixel, r g b. `bytes` holds all of them.
+// Returns three bytes per pixel, r g b. `bytes` holds all values.
 std::string ToRgb(absl::string_view bytes, const DicomFacts& facts, const ColorLayout& layout) {
   const uint64_t frame = facts.rows * facts.columns;
   const size_t each = facts.bits_allocated / 8;
   const int spare = std::max(0, facts.bits_stored - 8);
-  // The number at a place among all, of which the highest 8 bits are taken.
+  // Returns the highest 8 bits of the value at index `at`.
   const auto number = [&](uint64_t at) {
     const auto byte = [&](size_t i) { return static_cast<uint8_t>(bytes[at * each + i]); };
     if (each == 1) return uint32_t{byte(0)};
@@ -54,7 +53,7 @@ std::string ToRgb(absl::string_view bytes, const DicomFacts& facts, const ColorL
       c[k] = number(at);
     }
     if (layout.ybr) {
-      // ITU-R BT.601, all of 0 to 255 (PS3.3, C.7.6.3.1.2).
+      // ITU-R BT.601, full range from 0 to 255 (PS3.3, C.7.6.3.1.2).
       const double y = c[0], b = c[1] - 128.0, r = c[2] - 128.0;
       const auto channel = [](double v) {
         return static_cast<uint32_t>(std::lround(std::clamp(v, 0.0, 255.0)));
@@ -87,7 +86,7 @@ void PutNumber(std::string* out, uint64_t value, size_t bytes) {
   for (size_t i = 0; i < bytes; ++i) *out += static_cast<char>(value >> 8 * i);
 }
 
-// An element as every reader takes it.
+// Appends an element in the encoding that every reader accepts.
 void PutElement(std::string* out, uint32_t tag, absl::string_view kind, std::string value) {
   if (value.size() % 2 == 1) value += kind == "UI" ? '\0' : ' ';
   PutNumber(out, tag >> 16, 2);
@@ -103,8 +102,8 @@ void PutShort(std::string* out, uint32_t tag, uint64_t value) {
   PutElement(out, tag, "US", std::move(bytes));
 }
 
-// The library ends the program (by its assertions) at elements that are not as they should be. So it gets a file of our own
-// making with nothing in it but what the pixels need, and the compressed fragments.
+// The library terminates the program (by its assertions) at malformed elements. So it gets a file
+// that we build ourselves, which contains only what the pixels need, and the compressed fragments.
 std::string Rewritten(const SourceFile& file, const DicomFacts& facts) {
   std::string meta;
   PutElement(&meta, 0x00020002, "UI", "1.2.840.10008.5.1.4.1.1.7");
@@ -131,7 +130,7 @@ std::string Rewritten(const SourceFile& file, const DicomFacts& facts) {
   PutShort(&out, 0x00280103, facts.is_signed ? 1 : 0);
   out += std::string("\xe0\x7f\x10\x00OB\0\0\xff\xff\xff\xff", 12);
   for (size_t i = 0; i < facts.pixels.size(); ++i) {
-    // The table of offsets is left empty: nothing here needs it.
+    // The table of offsets is left empty because nothing here needs it.
     const auto [at, length] = i == 0 ? std::pair<size_t, size_t>(0, 0) : facts.pixels[i];
     out += std::string("\xfe\xff\x00\xe0", 4);
     PutNumber(&out, length + length % 2, 4);
@@ -157,7 +156,7 @@ absl::StatusOr<std::string> Decompress(const SourceFile& file, const DicomFacts&
   std::string pixels(wanted, '\0');
   if (!image.GetBuffer(pixels.data())) return Undecoded(file, "its pixels are not whole");
   if (facts.samples_per_pixel == 1) return pixels;
-  // What the decoder did not put into order.
+  // The remaining conversion, which the decoder did not do.
   return ToRgb(
       pixels, facts,
       {.planar = image.GetPlanarConfiguration() == 1,
@@ -196,7 +195,7 @@ std::string FromPalette(const SourceFile& file, const DicomFacts& facts,
     const uint64_t count = descriptor[0] == 0 ? 65536 : descriptor[0];
     const bool wide = entries.second >= count * 2;
     for (uint64_t i = 0; i < count; ++i) {
-      // Of 16 bits the upper 8; of 8 in room for 16 the lower ones.
+      // 16-bit entries use the upper 8 bits; 8-bit entries in 16 bits of space use the lower ones.
       const size_t high = facts.big_endian ? 0 : 1;
       const size_t at = !wide ? i : i * 2 + (descriptor[2] == 16 ? high : 1 - high);
       tables[k].push_back(static_cast<uint8_t>(file.bytes[entries.first + at]));
@@ -215,14 +214,14 @@ std::string FromPalette(const SourceFile& file, const DicomFacts& facts,
   return out;
 }
 
-// From the lowest bit of the first byte on.
+// Decodes bits, starting with the lowest bit of the first byte.
 void DecodeBits(absl::string_view bytes, uint64_t count, std::vector<float>* out) {
   out->reserve(out->size() + count);
   for (uint64_t i = 0; i < count; ++i)
     out->push_back(static_cast<float>(static_cast<uint8_t>(bytes[i / 8]) >> i % 8 & 1));
 }
 
-// A frame's own text, or that of all.
+// Returns a frame's own text, or the shared one.
 const std::string& OfFrame(const DicomFacts& facts, size_t frame,
                            const std::vector<std::string>& each, const std::string& all) {
   return each.size() == facts.frames ? each[frame] : all;

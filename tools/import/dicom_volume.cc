@@ -1,4 +1,4 @@
-// DICOM: which slices there are, and where they lie.
+// Reads DICOM: finds the slices and where they are.
 
 #include <algorithm>
 #include <array>
@@ -20,9 +20,11 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr size_t kMostFiles = 20'000;
-constexpr double kEven = 0.1;    // by how much of their distance slices may be out of place, unsaid
-constexpr double kAlike = 1e-3;  // of the mean distance: slices that are as near are at one place
-constexpr double kSameDirection = 0.999;  // the least cosine between them
+// How far, as a share of their distance, slices may be displaced without a note.
+constexpr double kEven = 0.1;
+// Share of the mean distance: slices closer than this are at the same place.
+constexpr double kAlike = 1e-3;
+constexpr double kSameDirection = 0.999;  // the least cosine between two directions
 
 Point3 Cross(const Point3& a, const Point3& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
@@ -37,14 +39,14 @@ std::optional<Point3> PlaceOf(const std::string& text) {
   return Point3{p[0], p[1], p[2]};
 }
 
-// Where a file's pixels lie.
+// Where a file's pixels are in space.
 struct Slice {
   std::array<uint64_t, 3> size = {1, 1, 1};
   uint64_t channels = 1;
   std::array<double, 2> spacing = {1, 1};
   double between = 1;  // frames
   Point3 right = {1, 0, 0}, down = {0, 1, 0};
-  std::vector<Point3> places;  // of the frames; empty if they are not known
+  std::vector<Point3> places;  // of the frames; empty if unknown
 
   Point3 Normal() const { return Cross(right, down); }
 };
@@ -62,14 +64,15 @@ Slice Locate(const DicomFacts& facts) {
                             thickness = DicomNumbers(facts.slice_thickness),
                             apart = DicomNumbers(facts.slices_apart),
                             offsets = DicomNumbers(facts.frame_offsets);
-  // Of rows first, which is from one row down to the next.
+  // The spacing of rows comes first: the distance from one row down to the next.
   if (spacing.size() == 2) slice.spacing = {spacing[1], spacing[0]};
   if (!thickness.empty()) slice.between = thickness[0];
   if (!apart.empty()) slice.between = apart[0];
   if (offsets.size() > 1)
     slice.between = (offsets.back() - offsets[0]) / static_cast<double>(offsets.size() - 1);
   if (o.size() == 6) slice.right = {o[0], o[1], o[2]}, slice.down = {o[3], o[4], o[5]};
-  // Those of the frames are the last ones in the file; some programs write one of all before them.
+  // The positions of the frames are the last ones in the file; some programs write a common one
+  // before them.
   const size_t before = facts.frames > 1 && facts.positions.size() > facts.frames
                             ? facts.positions.size() - facts.frames
                             : 0;
@@ -83,17 +86,17 @@ Slice Locate(const DicomFacts& facts) {
   return slice;
 }
 
-// A place along the normal; 0 if it is too far away for a number.
+// Returns a place along the normal; 0 if it is too far away to be represented.
 double Along(const Slice& slice, const Point3& place) {
   const double along = Inner(slice.Normal(), place);
   return std::isfinite(along) ? along : 0;
 }
 
-// One layer of a volume: a frame, or the slice of a file.
+// One layer of a volume: a frame, or a file's slice.
 struct Layer {
   size_t number = 0;  // of the frame or file
   Point3 place;
-  double along = 0;  // its place along the normal
+  double along = 0;  // position along the normal
   std::vector<double> time;
 };
 
@@ -130,7 +133,8 @@ size_t SortLayers(std::vector<Layer>* layers) {
   return most_times - 1;
 }
 
-// Returns: the step from one layer to the next, which a tilted gantry shears. Sets `note` if they are not evenly apart.
+// Returns: the step from one layer to the next, which a tilted gantry shears. Sets `note` if the
+// layers are not evenly spaced.
 Point3 StepOf(const std::vector<Layer>& layers, const Slice& first, std::string* note) {
   const double count = static_cast<double>(layers.size() - 1);
   if (layers.size() > 1) {
@@ -190,7 +194,7 @@ absl::StatusOr<Model> Finish(const SourceFile& file, const DicomFacts& facts, co
   return model;
 }
 
-// The frames that `layers` names, in their order.
+// Keeps the frames that `layers` names, in their order.
 void PickFrames(const std::vector<Layer>& layers, size_t frame, SampledVolume* volume) {
   const auto pick = [&](auto* values) {
     std::remove_reference_t<decltype(*values)> picked;
@@ -206,7 +210,7 @@ void PickFrames(const std::vector<Layer>& layers, size_t frame, SampledVolume* v
   pick(&volume->colors);
 }
 
-// The file with its preamble, and without compression of the whole.
+// Returns the file with its preamble, and without compression of the whole file.
 absl::StatusOr<SourceFile> ReadPlain(const std::string& path) {
   absl::StatusOr<SourceFile> file = ReadSourceFile(path);
   if (!file.ok()) return file;
@@ -215,7 +219,7 @@ absl::StatusOr<SourceFile> ReadPlain(const std::string& path) {
   return *plain ? **std::move(plain) : file;
 }
 
-// The slices of one series that are alike in size and direction, or one file of several frames.
+// The slices of one series that have the same size and direction, or one file of several frames.
 struct Stack {
   std::string series;
   Slice first;
@@ -244,7 +248,7 @@ void AddSlice(const std::string& path, const DicomFacts& facts, std::vector<Stac
     const std::vector<double> number = DicomNumbers(text);
     layer.time.push_back(number.empty() ? 0 : number[0]);
   }
-  // Without places the numbers of the instances order them, or else their names.
+  // Without positions, slices are sorted by instance numbers or otherwise by name.
   layer.along = static_cast<double>(layer.number);
   if (slice.places.empty()) {
     layer.place = Times(stack->first.Normal(), layer.along * slice.between);
@@ -256,7 +260,7 @@ void AddSlice(const std::string& path, const DicomFacts& facts, std::vector<Stac
   stack->layers.push_back(std::move(layer));
 }
 
-// Numbers of instances order slices that have no places.
+// Instance numbers order slices without positions.
 void OrderByInstance(Stack* stack) {
   if (!stack->first.places.empty()) return;
   std::stable_sort(stack->layers.begin(), stack->layers.end(),
@@ -289,7 +293,7 @@ absl::StatusOr<Model> ReadStack(const SourceFile& folder, Stack* stack) {
     if (!file.ok()) return file.status();
     const absl::StatusOr<DicomFacts> facts = CheckDicom(*file);
     if (!facts.ok()) return facts.status();
-    // It was read before; someone may have changed it since.
+    // The file was read before, and may have changed since.
     if (!stack->Takes(facts->series, Locate(*facts)))
       return FileError(*file, "has changed since it was read first", "read it again");
     if (&layer == &layers[0]) first_facts = *facts;

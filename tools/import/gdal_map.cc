@@ -35,13 +35,14 @@ namespace {
 constexpr char kProjFolder[] = "/usr/share/proj";
 constexpr char kFolder[] = "/vsimem/map/";
 constexpr int kDeepest = 100;
-// LIBKML makes fields of what is not data, too. They get this prefix, so that data may have any name.
+// LIBKML also makes fields of elements that are not data. They get this prefix, so that data may
+// have any name.
 constexpr char kKmlElement[] = "voxeld:";
 constexpr const char* kKmlElements[] = {"NAME",       "DESCRIPTION",  "TIMESTAMP",  "BEGIN",
                                         "END",        "ALTITUDEMODE", "TESSELLATE", "EXTRUDE",
                                         "VISIBILITY", "DRAWORDER",    "ICON",       "SNIPPET"};
 
-// Environment variables are GDAL's and PROJ's configuration, too.
+// Environment variables also configure GDAL and PROJ.
 void ForgetEnvironment() {
   std::vector<std::string> names;
   for (char** one = environ; one != nullptr && *one != nullptr; ++one) {
@@ -54,7 +55,7 @@ void ForgetEnvironment() {
   for (const std::string& name : names) ::unsetenv(name.c_str());
 }
 
-// Once in a process.
+// Runs once per process.
 void PrepareGdal() {
   static const bool kDone = [] {
     ForgetEnvironment();
@@ -91,7 +92,7 @@ class QuietErrors {
   QuietErrors& operator=(const QuietErrors&) = delete;
 };
 
-// What GDAL said last, without its names of files in memory.
+// Returns GDAL's last message, without its names of files in memory.
 std::string LastError() {
   std::string text = CPLGetLastErrorMsg();
   for (size_t at; (at = text.find(kFolder)) != std::string::npos;)
@@ -100,7 +101,7 @@ std::string LastError() {
   return EscapeForTerminal(text.substr(0, 200));
 }
 
-// Files in GDAL's memory, which lie there without a copy.
+// Files in GDAL's memory, which refer to the bytes without a copy.
 class FilesInMemory {
  public:
   FilesInMemory() = default;
@@ -111,7 +112,7 @@ class FilesInMemory {
   // `bytes` must outlive this.
   std::string Add(const std::string& extension, const std::string& bytes) {
     std::string name = absl::StrCat(kFolder, "map.", extension);
-    // GDAL opens it for reading only.
+    // GDAL opens the file for reading only.
     auto* const data = reinterpret_cast<GByte*>(const_cast<char*>(bytes.data()));
     VSILFILE* const opened = VSIFileFromMemBuffer(name.c_str(), data, bytes.size(), FALSE);
     if (opened != nullptr) VSIFCloseL(opened);
@@ -131,8 +132,8 @@ uint64_t CountElements(absl::string_view text, absl::string_view name) {
   return count;
 }
 
-// Old files begin with a folder, document or placemark, which LIBKML expects within <kml>. Returns: the text in which it is; empty if
-// `text` begins otherwise.
+// Old files begin with a folder, document or placemark, which LIBKML expects within <kml>. Returns:
+// the text wrapped in that element; empty if `text` begins otherwise.
 std::string WithRoot(absl::string_view text) {
   size_t at = 0;
   for (;;) {
@@ -156,13 +157,14 @@ std::string WithRoot(absl::string_view text) {
   return "";
 }
 
-// GDAL takes a place that is no number for 0. InvalidArgument with the line of the first.
+// Checks places, because GDAL reads one that is not a number as 0. Errors: InvalidArgument with the
+// line of the first such place.
 absl::Status CheckPlacesOfGpx(const SourceFile& file) {
   const std::unique_ptr<xmlTextReader, decltype(&xmlFreeTextReader)> reader(
       xmlReaderForMemory(file.bytes.data(), static_cast<int>(file.bytes.size()), nullptr, nullptr,
                          XML_PARSE_NONET | XML_PARSE_NOERROR | XML_PARSE_NOWARNING),
       &xmlFreeTextReader);
-  if (reader == nullptr) return absl::OkStatus();  // GDAL says what is wrong with it
+  if (reader == nullptr) return absl::OkStatus();  // GDAL reports the error
   while (xmlTextReaderRead(reader.get()) == 1) {
     if (xmlTextReaderNodeType(reader.get()) != XML_READER_TYPE_ELEMENT) continue;
     const absl::string_view element =
@@ -222,7 +224,7 @@ bool IsHidden(const OGRFeature& feature) {
   return field >= 0 && feature.IsFieldSetAndNotNull(field) && feature.GetFieldAsInteger(field) == 0;
 }
 
-// A picture on the ground, of which LIBKML has the outline.
+// Returns whether the feature is a picture on the ground, of which LIBKML provides the outline.
 bool IsOverlay(const OGRFeature& feature) {
   const int field = feature.GetFieldIndex("voxeld:ICON");
   return field >= 0 && feature.IsFieldSetAndNotNull(field) &&
@@ -264,7 +266,7 @@ MapFeature GdalMapReader::StyleOf(const OGRFeature& feature) {
   return style;
 }
 
-// KML's data have no type unless a schema gives one, so that texts which are numbers count as well.
+// KML's data have no type unless a schema gives one, so texts that are numbers count too.
 void GdalMapReader::AddNumbers(const OGRFeature& feature, MapFeature* style) const {
   const bool is_kml = file_.extension == "kml";
   for (int i = 0; i < feature.GetFieldCount(); ++i) {
@@ -292,7 +294,7 @@ absl::Status GdalMapReader::DrawLine(const OGRSimpleCurve& line, bool closed) {
   return lines_.AddLine(corners, closed);
 }
 
-// Its depth is that of the file's elements, which is bounded.
+// The recursion is as deep as the file's elements, and that depth is limited.
 absl::Status GdalMapReader::Draw(const OGRGeometry& geometry) {
   if (geometry.IsEmpty()) {
     lines_.LeaveOut("geometries without coordinates");
@@ -330,7 +332,7 @@ absl::Status GdalMapReader::Draw(const OGRGeometry& geometry) {
 }
 
 absl::Status GdalMapReader::ReadFeature(const OGRFeature& feature) {
-  if (IsOverlay(feature)) return absl::OkStatus();  // CountElementsOfKml has counted it
+  if (IsOverlay(feature)) return absl::OkStatus();  // already counted by CountElementsOfKml
   if (IsHidden(feature)) {
     lines_.LeaveOut("hidden features");
     return absl::OkStatus();
@@ -372,7 +374,7 @@ absl::Status GdalMapReader::PrepareTransformation(OGRLayer* layer) {
 }
 
 absl::Status GdalMapReader::ReadLayer(OGRLayer* layer) {
-  // GPX: points of routes and tracks stand in layers of their own besides.
+  // GPX: points of routes and tracks are also in layers of their own, which are skipped.
   const absl::string_view name = layer->GetName();
   if (file_.extension == "gpx" && (name == "route_points" || name == "track_points"))
     return absl::OkStatus();
@@ -470,7 +472,7 @@ absl::StatusOr<Model> ReadGdalMap(const SourceFile& file, bool globe, bool attri
   try {
     return GdalMapReader(file, globe, attributes).Read();
   } catch (const std::bad_alloc&) {
-    throw;  // the process that reads answers for its memory
+    throw;  // the reading process is responsible for its memory
   } catch (const std::exception& error) {
     return FileError(file,
                      absl::StrCat("GDAL cannot read it (", EscapeForTerminal(error.what()), ")"),

@@ -1,10 +1,12 @@
-// Maps by GDAL: Shapefile, GPX and KML.
+// Reads maps with GDAL: Shapefile, GPX and KML.
 //
-// GDAL was chosen because geographic information systems read these formats with it. Only its three drivers for them are registered
-// (LIBKML, not KML, which has neither styles nor numbers); it gets files in memory, has no plug-ins and no network, and neither
-// environment variables nor configuration files change what it does. GeoJSON and TopoJSON, which every build reads, have readers of our
-// own. GDAL loses the visibility of KML's folders and styles in other files; where points of a GPX track have no elevation it is 0, and
-// times and other numbers of a track's points are not read.
+// GDAL was chosen because geographic information systems read these formats with it. Only its three
+// drivers for them are registered (LIBKML, not KML, which has neither styles nor numbers). It gets
+// files in memory and has neither plug-ins nor network, and neither environment variables nor
+// configuration files change what it does. GeoJSON and TopoJSON, which every build reads, have
+// readers of our own. GDAL loses the visibility of KML's folders and styles in other files. If
+// points of a GPX track have no elevation it is 0, and times and other numbers of a track's points
+// are not read.
 #pragma once
 
 #include <string>
@@ -17,10 +19,10 @@
 
 namespace voxeld::voxelctl {
 
-// Whether ReadGdalMap reads files of this extension (in lower case, without the dot).
+// Returns whether ReadGdalMap reads files of this extension (in lower case, without the dot).
 bool IsGdalMap(absl::string_view extension);
 
-// The folders that GDAL needs besides the file: PROJ's database of coordinate systems.
+// Returns the folders that GDAL needs besides the file: PROJ's database of coordinate systems.
 std::vector<std::string> MapDataFolders();
 
 // Reads points, lines and the outlines of areas with the colours of KML's styles and all numeric fields; of a Shapefile also the files

@@ -57,10 +57,11 @@ const ChemicalElement& ElementOf(gemmi::Element element) {
 
 double AttributeOf(double value) { return std::isfinite(value) ? value : kNoValue; }
 
-// Collects atoms with their attributes, of each residue those of one alternate location, and finds them by address.
+// Collects atoms with their attributes, one alternate location for each residue, and finds them by
+// address.
 class Builder {
  public:
-  // The numbers of an atom by which it can be coloured.
+  // The numbers of an atom that can determine its colour.
   struct Values {
     double b_factor = kNoValue, occupancy = kNoValue, charge = kNoValue, chain = kNoValue,
            residue = kNoValue;
@@ -115,7 +116,7 @@ class Builder {
   uint64_t other_locations_ = 0;
 };
 
-// Where an atom is by names: chain, residue, atom. Null characters separate them.
+// Returns an atom's address: chain, residue and atom name, separated by null characters.
 std::string Address(string_view chain, string_view residue, string_view insertion,
                     string_view atom) {
   return absl::StrCat(absl::StripAsciiWhitespace(chain), string_view("\0", 1),
@@ -127,7 +128,8 @@ using Addresses = std::unordered_map<std::string, uint32_t>;
 
 // --- PDB ---
 
-// The columns as the format counts them, from 1, the last of which may be beyond the line's end.
+// Returns the columns [first, last], counted from 1 as the format does; the last may be beyond the
+// line's end.
 string_view ColumnsOf(string_view line, size_t first, size_t last) {
   if (line.size() < first) return "";
   return line.substr(first - 1, last - first + 1);
@@ -170,7 +172,7 @@ class PdbReader {
   string_view text_;
   uint64_t line_ = 0, further_models_ = 0, symmetric_ = 0, unclear_ = 0;
   std::vector<string_view> atoms_;  // lines
-  std::string others_;              // lines that say what is not drawn
+  std::string others_;              // lines that describe things that are not drawn
 };
 
 template <typename Use>
@@ -230,8 +232,9 @@ absl::Status PdbReader::Scan(Builder* builder) {
   });
 }
 
-// Serial numbers become the atoms' indices, which tells them apart however the file counts (hybrid-36, hexadecimal, stars). Atoms of a
-// chain stand together, for gemmi searches all chains whenever the chain changes.
+// Replaces serial numbers by the atoms' indices, which identifies atoms however the file counts
+// (hybrid-36, hexadecimal, stars). Atoms of a chain are kept together, because gemmi searches all
+// chains whenever the chain changes.
 std::string PdbReader::TextForGemmi() {
   std::vector<std::pair<std::string, uint32_t>> order;
   order.reserve(atoms_.size());
@@ -257,7 +260,7 @@ std::string PdbReader::TextForGemmi() {
         serial[digit] = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"[rest % 36];
     }
     line.replace(6, 5, serial);
-    // Old files have other things in the columns of the element and of the charge.
+    // Old files use the columns of the element and of the charge for other things.
     if (!HasElement(line)) line.replace(76, 2, "  ");
     if (!HasCharge(line)) line.replace(78, 2, "  ");
     absl::StrAppend(&text, line, "\n");
@@ -265,8 +268,9 @@ std::string PdbReader::TextForGemmi() {
   return text;
 }
 
-// gemmi reads names in the columns where the format has them, so that " CA " is carbon and "CA  " calcium. Programs for polymers put all
-// names to the left: in their records (ATOM) the first letter counts, unless the residue is an ion.
+// gemmi reads names by the columns of the format, so " CA " is carbon and "CA  " calcium. Programs
+// for polymers align all names to the left: in their records (ATOM) the first letter counts, unless
+// the residue is an ion.
 gemmi::Element ElementOfName(const gemmi::Atom& atom, const gemmi::Residue& residue,
                              string_view line) {
   const bool is_polymer = absl::StartsWith(line, "ATOM") && atom.name != residue.name;
@@ -333,7 +337,8 @@ absl::Status PdbReader::Read(Builder* builder, Model* model) {
   return absl::OkStatus();
 }
 
-// `columns`: of each of two atoms chain, residue number, and (0 if the record has none) name; then the symmetry operators.
+// `columns` holds, for each of two atoms, the columns of chain, residue number and (0 if the record
+// has none) name; then those of the symmetry operators.
 void PdbReader::AddLink(string_view line, const std::array<size_t, 8>& columns,
                         const Addresses& addresses, Builder* builder) {
   if (Stripped(line, columns[6], columns[6] + 5) != Stripped(line, columns[7], columns[7] + 5)) {
@@ -347,7 +352,7 @@ void PdbReader::AddLink(string_view line, const std::array<size_t, 8>& columns,
                                               ColumnsOf(line, number, number + 3),
                                               ColumnsOf(line, number + 4, number + 4),
                                               name == 0 ? "SG" : ColumnsOf(line, name, name + 3)));
-    if (found == addresses.end()) return;  // an atom of another location
+    if (found == addresses.end()) return;  // an atom of another alternate location
     ends[i] = found->second;
   }
   builder->AddBond(ends[0], ends[1]);
@@ -378,7 +383,7 @@ void PdbReader::AddNamedBonds(Builder* builder, Model* model) {
       };
       const std::optional<uint32_t> from = find(7);
       for (size_t column = 12; from && column <= 27; column += 5) {
-        // Atoms that were left out may be named, so unknown ones are not an error.
+        // Atoms that were left out may be named, so an unknown atom is not an error.
         const std::optional<uint32_t> to = find(column);
         if (!to) continue;
         if (*from == kTwice || *to == kTwice) {
@@ -401,7 +406,7 @@ void PdbReader::AddNamedBonds(Builder* builder, Model* model) {
 
 // --- CIF ---
 
-// The syntax of CIF 1.1: values stay as they are written, with their quotation marks.
+// Tokenises the syntax of CIF 1.1. Values stay as they are written, with their quotation marks.
 class CifTokens {
  public:
   enum class Type : uint8_t { kEnd, kValue, kTag, kData, kLoop, kSave, kOther };
@@ -452,7 +457,7 @@ void CifTokens::SkipBlanks() {
   }
 }
 
-// A text between lines that begin with a semicolon.
+// Reads a text between lines that begin with a semicolon.
 absl::Status CifTokens::TakeText() {
   const size_t end = text_.find("\n;", at_);
   if (end == string_view::npos)
@@ -503,7 +508,7 @@ absl::Status CifTokens::Next() {
   return absl::OkStatus();
 }
 
-// The tables of a block that are drawn, or that say what is not.
+// Returns whether a table of a block is drawn, or describes something that is not drawn.
 bool IsKept(string_view tag) {
   static constexpr string_view kKept[] = {"_atom_site.cartn_",
                                           "_atom_site.type_symbol",
@@ -543,7 +548,8 @@ bool IsPlace(string_view tag) {
          absl::EqualsIgnoreCase(tag, "_chem_comp_atom.pdbx_model_Cartn_x_ideal");
 }
 
-// Columns of _atom_site, in the order in which CifReader::Read asks for them: of mmCIF, and below of small molecules.
+// Columns of _atom_site, in the order in which CifReader::Read requests them: those of mmCIF, and
+// below them those of small molecules.
 enum : size_t {
   kX,
   kY,
@@ -567,7 +573,7 @@ enum : size_t {
 enum : size_t { kFractX, kFractY, kFractZ, kLabel, kType, kUIso, kBIso, kSiteOccupancy, kGroup };
 constexpr size_t kMostPairs = 10000, kMostLoops = 1000;
 
-// The value that is written so; empty if it is unknown (?) or does not apply (.).
+// Returns the value that is written so; empty if it is unknown (?) or does not apply (.).
 std::string ValueOf(string_view written) {
   if (written == "." || written == "?") return "";
   if (written.size() > 1 && (written[0] == '\'' || written[0] == '"'))
@@ -582,10 +588,10 @@ double NumberOf(const std::string& value) {
 
 struct CifTable {
   std::vector<std::string> tags;    // in lower case
-  std::vector<std::string> values;  // of one row after another
+  std::vector<std::string> values;  // row after row
 };
 
-// Some columns of a table; those that are missing have empty values.
+// Some columns of a table; missing columns have empty values.
 class CifColumns {
  public:
   CifColumns() = default;
@@ -614,10 +620,11 @@ class CifColumns {
 };
 
 struct CifBlock {
-  CifTable pairs;  // of one row
+  CifTable pairs;  // one row
   std::vector<CifTable> loops;
 
-  // Returns: the columns `names` after `prefix` of the table that has the first of them. No rows if there is none.
+  // Returns: the columns `names` after `prefix` of the table that has the first of them; no rows if
+  // there is no such table.
   CifColumns Find(string_view prefix, const std::vector<string_view>& names) const {
     const auto place = [&](const CifTable& table, string_view name) {
       const auto at = std::find(table.tags.begin(), table.tags.end(),
@@ -666,7 +673,7 @@ class CifReader {
   const SourceFile& file_;
   const string_view text_;
   CifTokens tokens_;
-  CifBlock block_;  // the first with atoms, when all are read
+  CifBlock block_;  // the first block with atoms, once everything is read
   std::optional<CifBlock> first_;
   bool has_atoms_ = false, in_frame_ = false;
   uint64_t further_blocks_ = 0;
@@ -856,7 +863,7 @@ absl::Status CifReader::ReadAtoms(const CifColumns& table, Builder* builder, Mod
   return absl::OkStatus();
 }
 
-// A component may have coordinates of several kinds: the first is shown.
+// A component may have several kinds of coordinates; the first kind is shown.
 void CifReader::ReadComponent(Builder* builder, Model* model) {
   model->format = "CIF chemical component";
   using Names = std::vector<string_view>;
@@ -885,7 +892,7 @@ void CifReader::ReadComponent(Builder* builder, Model* model) {
   AddLeftOut(kNoPlace, nowhere, model);
 }
 
-// The atoms of the asymmetric unit of a crystal, of a disordered one those of its first group.
+// Reads the atoms of a crystal's asymmetric unit; of a disordered one, those of its first group.
 absl::Status CifReader::ReadCrystal(const CifColumns& sites, Builder* builder, Model* model) {
   model->format = "CIF crystal";
   gemmi::UnitCell cell;
@@ -980,14 +987,15 @@ void CifReader::AddConnections(Builder* builder, Model* model) {
 
 void CifReader::AddComponentBonds(Builder* builder) {
   const CifColumns table = block_.Find("_chem_comp_bond.", {"atom_id_1", "atom_id_2", "comp_id"});
-  absl::flat_hash_map<string_view, std::vector<size_t>> bonds;  // rows by component
+  absl::flat_hash_map<string_view, std::vector<size_t>> bonds;  // row numbers by component
   for (size_t row = 0; row < table.rows(); ++row) bonds[table.Text(row, 2)].push_back(row);
   absl::flat_hash_map<string_view, uint32_t> atoms;
   for (const ResidueAtoms& residue : residues_) {
     // A component's own table of atoms does not repeat its name.
     const auto named = residue.component.empty() ? bonds.begin() : bonds.find(residue.component);
     if (named == bonds.end()) continue;
-    // A component with many more bonds than a residue has atoms would take long for each residue.
+    // If a component has many more bonds than a residue has atoms, checking them for each residue
+    // would take too long.
     if (residues_.size() > 1 && named->second.size() > 1000) continue;
     atoms.clear();
     for (const auto& [name, index] : residue.atoms) atoms.emplace(name, index);
@@ -998,7 +1006,7 @@ void CifReader::AddComponentBonds(Builder* builder) {
   }
 }
 
-// What the file describes and no ball or rod shows.
+// Counts what the file describes and the drawing does not show.
 void CifReader::CountTheRest(Model* model) {
   const CifColumns parts = block_.Find("_struct_conf.", {"conf_type_id"});
   for (size_t row = 0; row < parts.rows(); ++row) {
@@ -1057,7 +1065,7 @@ absl::StatusOr<Model> ReadMolecule(const SourceFile& file, MoleculeStyle style, 
                         absl::EndsWithIgnoreCase(file.path, ".ent.gz");
     return ReadText(file, is_pdb ? "pdb" : "cif", *text, style, attributes);
   } catch (const std::bad_alloc&) {
-    throw;  // the process that reads answers for its memory
+    throw;  // the reading process is responsible for its memory
   } catch (const std::exception& error) {
     return FileError(file,
                      absl::StrCat("gemmi cannot read it (", EscapeForTerminal(error.what()), ")"),

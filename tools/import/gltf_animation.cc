@@ -1,4 +1,4 @@
-// glTF's animations: every property of every node by its own keys.
+// glTF's animations: every property of every node has its own keys.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -22,7 +22,7 @@ void Normalize(std::vector<double>* turn) {
   for (double& v : *turn) v /= std::sqrt(length);
 }
 
-// Along the shorter arc between two rotations.
+// Interpolates along the shorter arc between two rotations.
 std::vector<double> Slerp(const double* from, const double* to, double share) {
   double dot = 0;
   for (size_t i = 0; i < 4; ++i) dot += from[i] * to[i];
@@ -39,7 +39,7 @@ std::vector<double> Slerp(const double* from, const double* to, double share) {
 std::vector<double> ValueAt(const GltfChannel& channel, double time) {
   const size_t width = channel.width;
   const bool cubic = channel.interpolation == GltfInterpolation::kCubicSpline;
-  // Part 0 is the tangent in, 1 the value, 2 the tangent out.
+  // Part 0 is the in-tangent, 1 the value, 2 the out-tangent.
   const auto at = [&](size_t key, size_t part) {
     return channel.values.data() + (cubic ? key * 3 + part : key) * width;
   };
@@ -141,7 +141,7 @@ class GltfFrames final : public FrameSource {
   const SourceFile file_;
   std::unique_ptr<GltfScene> scene_;
   std::vector<GltfChannel> channels_;
-  Model left_out_;  // of the animation
+  Model left_out_;  // parts of the animation
   double fps_ = 1;
   int64_t count_ = 1;
 };

@@ -24,9 +24,9 @@ using nlohmann::json;
 
 constexpr uint32_t kGlbHeader = 20;          // of the file and of its first chunk
 constexpr uint32_t kChunkJson = 0x4e4f534a;  // "JSON"
-constexpr uint64_t kMostStride = 252;        // the format's
+constexpr uint64_t kMostStride = 252;        // the format's limit
 
-// Thrown and caught within this file: a check that fails deep in a document.
+// Thrown and caught within this file when a check fails deep inside a document.
 struct Failure {
   std::string found, expected;
 };
@@ -37,7 +37,7 @@ uint32_t ReadU32(absl::string_view bytes, size_t at) {
   return value;
 }
 
-// A member that must be an unsigned integer, or `otherwise` if it is not there.
+// Returns a member that must be an unsigned integer, or `otherwise` if it is missing.
 uint64_t Unsigned(const json& object, const char* key, absl::string_view where,
                   std::optional<uint64_t> otherwise) {
   const auto it = object.find(key);
@@ -53,7 +53,7 @@ uint64_t Unsigned(const json& object, const char* key, absl::string_view where,
   return it->get<uint64_t>();
 }
 
-// An array of objects, or an empty one if it is not there.
+// Returns an array of objects, or an empty one if it is missing.
 const json& Array(const json& document, const char* key) {
   static const json kEmpty = json::array();
   const auto it = document.find(key);
@@ -74,7 +74,7 @@ void CheckIndex(uint64_t index, size_t size, absl::string_view where) {
   }
 }
 
-// The bytes of a buffer that is not the binary chunk.
+// Returns the bytes of a buffer that is not the binary chunk.
 std::string LoadBuffer(const SourceFile& file, const std::string& uri, absl::string_view where) {
   absl::StatusOr<std::string> bytes = LoadGltfUri(file, uri);
   if (bytes.ok()) return *std::move(bytes);
@@ -146,7 +146,7 @@ class Document {
   uint64_t buffer_bytes_ = 0;
   std::vector<absl::string_view>& views_;
   std::vector<GltfAccessor>& accessors_;
-  std::vector<std::optional<uint64_t>> greatest_;  // of the accessors that are indices
+  std::vector<std::optional<uint64_t>> greatest_;  // of the accessors that are used as indices
 };
 
 void Document::LoadBuffers() {
@@ -187,7 +187,7 @@ void Document::CheckViews() {
   }
 }
 
-// The bytes from the view that a member "bufferView" names, after "byteOffset".
+// Returns the bytes of the view that a member "bufferView" names, starting at "byteOffset".
 absl::string_view Document::ViewOf(const json& object, absl::string_view where) const {
   const uint64_t view = Unsigned(object, "bufferView", where, std::nullopt);
   CheckIndex(view, views_.size(), absl::StrCat(where, ".bufferView"));
@@ -273,7 +273,8 @@ void Document::CheckAccessors() {
       }
       accessor.bytes = views_[view].substr(offset);
     }
-    // Zeros take memory that the file does not have. As a shape of a mesh they are as many as its positions, which are in a buffer.
+    // An accessor without a view consists of zeros, which take memory that is not in the file. A
+    // mesh's morph target has as many elements as its positions, which are in a buffer.
     if (accessor.bytes.empty() && accessor.count > buffer_bytes_) {
       throw Failure{absl::StrCat(where, " announces ", accessor.count, " elements without a view"),
                     absl::StrCat("the buffers have ", buffer_bytes_, " bytes")};
@@ -367,7 +368,7 @@ struct Member {
   Shape shape;
 };
 
-// The library passes over members of a wrong type.
+// The library ignores members of a wrong type.
 void CheckMembers(const json& object, std::initializer_list<Member> members,
                   const std::string& where) {
   static constexpr const char* kExpected[] = {"a number", "a whole number from 0", "numbers",
@@ -419,7 +420,8 @@ void CheckShapes(const json& document) {
   }
 }
 
-// Every node has at most one parent, and none is its own ancestor: then a walk visits each once.
+// Checks that every node has at most one parent and none is its own ancestor, so a walk visits each
+// node once.
 void CheckNodes(const json& document) {
   const json& nodes = Array(document, "nodes");
   std::vector<int64_t> parents(nodes.size(), -1);
@@ -453,7 +455,8 @@ void CheckNodes(const json& document) {
 }
 
 void CheckExtensions(const json& document) {
-  // Without a clear coat and the like a surface is still in its place and colour; these are counted as left out.
+  // Without these extensions, such as a clear coat, a surface still has its place and colour; they
+  // are counted as left out.
   static constexpr absl::string_view kReadable[] = {"KHR_materials_unlit",
                                                     "KHR_materials_pbrSpecularGlossiness",
                                                     "KHR_materials_emissive_strength",
@@ -581,7 +584,7 @@ absl::StatusOr<std::unique_ptr<GltfDocument>> LoadGltfDocument(const SourceFile&
   result->json = *std::move(document);
   try {
     Document(file, *result, binary_chunk).Check();
-    result->json.erase("buffers");  // data in base64 takes memory
+    result->json.erase("buffers");  // base64 data takes memory
   } catch (const Failure& failure) {
     return FileError(file, failure.found, failure.expected);
   } catch (const json::exception& error) {

@@ -1,4 +1,4 @@
-// The structure of a glTF file, checked before a library reads it.
+// Checks the structure of a glTF file before a library reads it.
 #pragma once
 
 #include <cstdint>
@@ -14,16 +14,16 @@
 
 namespace voxeld::voxelctl {
 
-// Numbers in a buffer. All that they refer to is there.
+// Numbers in a buffer. Everything that they refer to exists.
 struct GltfAccessor {
   uint64_t count = 0, stride = 0;
-  uint64_t components = 0;  // of an element: 1 to 16
+  uint64_t components = 0;  // per element: 1 to 16
   uint64_t component_size = 0;
-  int component_type = 0;  // as glTF numbers them
+  int component_type = 0;  // glTF's number for it
   bool normalized = false;
-  absl::string_view bytes;  // empty: all elements are zero, but those that are sparse
+  absl::string_view bytes;  // empty: all elements are zero, except sparse ones
 
-  // Elements that replace others, by their number.
+  // Elements that replace others, by index.
   uint64_t sparse_count = 0, sparse_index_size = 0;
   absl::string_view sparse_indices, sparse_values;
 };
@@ -32,16 +32,17 @@ struct GltfDocument {
   nlohmann::json json;
   std::vector<GltfAccessor> accessors;
   std::vector<absl::string_view> views;
-  std::deque<std::string> loaded;  // buffers that are not in the file
+  std::deque<std::string> loaded;  // buffers outside the file
 };
 
-// Reads the JSON and the buffers of glTF text or GLB, and checks them: well-formed, nested less than 64 deep; nodes form a forest;
-// accessors lie within their views, views within their buffers; extensions that it requires are ones that can be read. The result
-// refers to `file`.
+// Reads the JSON and the buffers of glTF text or GLB, and checks that the document is well-formed
+// and nested less than 64 deep, that nodes form a forest, that accessors lie within their views and
+// views within their buffers, and that all required extensions are supported. The result refers to
+// `file`.
 absl::StatusOr<std::unique_ptr<GltfDocument>> LoadGltfDocument(const SourceFile& file);
 
-// The bytes of a "data:" URI, or of a file that `file` names. Errors as those of ReadOtherFile, or InvalidArgument for bad base64; the message
-// is a clause for FileError.
+// Returns the bytes of a "data:" URI, or of a file that `file` names. Errors: those of
+// ReadOtherFile, or InvalidArgument for bad base64; the message is a clause for FileError.
 absl::StatusOr<std::string> LoadGltfUri(const SourceFile& file, const std::string& uri);
 
 }  // namespace voxeld::voxelctl

@@ -1,12 +1,12 @@
 #include "tools/import/gltf_model.h"
 
-// Neither pictures nor files: this reader loads both.
+// The library loads neither pictures nor files: this reader loads both.
 #define TINYGLTF_IMPLEMENTATION
 #define TINYGLTF_NO_STB_IMAGE
 #define TINYGLTF_NO_STB_IMAGE_WRITE
 #define TINYGLTF_NO_EXTERNAL_IMAGE
 #define TINYGLTF_NO_FS
-#include <fstream>  // the header writes files, too, which nothing here calls
+#include <fstream>  // the header also writes files, which nothing here calls
 //
 #include <tiny_gltf.h>
 
@@ -34,25 +34,26 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr uint32_t kNone = UINT32_MAX;
-constexpr double kBoneThickness = 0.004;                // of all bones' lengths together
-constexpr uint64_t kMostMorphWork = uint64_t{1} << 31;  // shapes times vertices
-constexpr uint64_t kMostVisited = uint64_t{1} << 30;    // vertices, for all primitives
+// As a share of the total length of all bones.
+constexpr double kBoneThickness = 0.004;
+constexpr uint64_t kMostMorphWork = uint64_t{1} << 31;  // morph targets times vertices
+constexpr uint64_t kMostVisited = uint64_t{1} << 30;    // vertices, over all primitives
 constexpr uint64_t kMostAnimationValues = uint64_t{1} << 26;
 constexpr size_t kMostKinds = 40;  // of extensions that are counted by name
 
-// Thrown and caught within this file: a check that fails deep in a scene.
+// Thrown and caught within this file when a check fails deep inside a scene.
 struct Failure {
   std::string found, expected;
 };
 
-// A reference to one of `size` things; -1 is none.
+// Checks a reference to one of `size` items; -1 means none.
 void CheckReference(int index, size_t size, absl::string_view where) {
   if (index == -1 || (index >= 0 && static_cast<size_t>(index) < size)) return;
   throw Failure{absl::StrCat(where, " is ", index),
                 absl::StrCat("there are ", size, ", counted from 0")};
 }
 
-// The same for what must be there.
+// Checks the same for a required reference.
 void Require(int index, size_t size, absl::string_view where) {
   if (index == -1) throw Failure{absl::StrCat(where, " is -1"), "a number from 0 is expected"};
   CheckReference(index, size, where);
@@ -92,7 +93,8 @@ void VisitElements(const GltfAccessor& accessor, Visit& visit) {
   }
 }
 
-// Calls visit(number, components) for each element; again for one that a sparse element replaces.
+// Calls visit(number, components) for each element, and again for an element that a sparse one
+// replaces.
 template <typename Visit>
 void ForEachElement(const GltfAccessor& accessor, Visit visit) {
   switch (accessor.component_type) {
@@ -111,13 +113,14 @@ void ForEachElement(const GltfAccessor& accessor, Visit visit) {
   }
 }
 
-// The same numbers, as they are.
+// Returns the accessor without normalisation.
 GltfAccessor Plain(GltfAccessor accessor) {
   accessor.normalized = false;
   return accessor;
 }
 
-// Whole numbers as parts of their greatest, for attributes of which the format has no others.
+// Returns the accessor with integers as fractions of their maximum, for attributes whose integers
+// the format always normalises.
 GltfAccessor Normalized(GltfAccessor accessor) {
   accessor.normalized = true;
   return accessor;
@@ -157,7 +160,7 @@ std::array<double, kCount> NumbersOf(const tinygltf::Value& object, const char* 
 
 // ------------------------------------------------------------------------------------------ surfaces
 
-// Which texture a material uses, and how.
+// The texture that a material uses, and how it is applied.
 struct TextureUse {
   int index = -1, set = 0;
   const tinygltf::Value* transform = nullptr;
@@ -184,13 +187,13 @@ struct Surface {
   std::array<double, 3> emission = {0, 0, 0};
   uint32_t picture = kNoPicture;
   int set = 0;  // of texture coordinates
-  // From texture coordinates to those on the picture, row-major 2×3.
+  // Maps texture coordinates to coordinates on the picture; row-major 2×3.
   std::array<double, 6> transform = {1, 0, 0, 0, 1, 0};
   Wrap wrap_u = Wrap::kRepeat, wrap_v = Wrap::kRepeat;
   bool lit = true, visible = true;
 };
 
-// Turns counter-clockwise as a picture is seen, whose v goes down.
+// Rotates counter-clockwise as the picture is viewed; its v points down.
 void ApplyTransform(const TextureUse& use, Surface* surface) {
   surface->set = use.set;
   if (use.transform == nullptr) return;
@@ -213,7 +216,8 @@ bool IsLit(const std::array<double, 3>& emission) {
   return emission[0] > 0 || emission[1] > 0 || emission[2] > 0;
 }
 
-// Extensions that this reader shows, that change nothing that is seen, or that it counts in another way.
+// Returns whether this reader shows the extension, counts it in another way, or can ignore it
+// because it changes nothing visible.
 bool IsHandled(absl::string_view extension) {
   static constexpr absl::string_view kHandled[] = {"KHR_materials_unlit",
                                                    "KHR_materials_pbrSpecularGlossiness",
@@ -235,7 +239,7 @@ bool IsHandled(absl::string_view extension) {
   return std::find(std::begin(kHandled), std::end(kHandled), extension) != std::end(kHandled);
 }
 
-// How often each extension that is not handled is used.
+// Returns how often each extension that is not handled is used.
 std::map<std::string, uint64_t> CountExtensions(const nlohmann::json& document) {
   std::map<std::string, uint64_t> counts;
   std::vector<const nlohmann::json*> stack = {&document};
@@ -300,13 +304,13 @@ NodeMatrix LocalOf(const tinygltf::Node& node, int number, const GltfPose* pose)
 
 // --------------------------------------------------------------------------------------------- scene
 
-// What a primitive's vertices are, and how they make its elements.
+// The kind of a primitive's elements, and which vertices they use.
 struct Elements {
   Kind kind = Kind::kTriangles;
-  std::vector<uint32_t> indices;  // of the kept vertices
+  std::vector<uint32_t> indices;  // into the kept vertices
   std::vector<uint32_t>
       kept;  // by the file's number: kNone, or the number of the kept vertex; empty: all are kept
-  size_t vertices = 0;  // that are kept
+  size_t vertices = 0;  // the number of kept vertices
 };
 
 class Scene final : public GltfScene {
@@ -338,7 +342,7 @@ class Scene final : public GltfScene {
   }
 
  private:
-  // What is known while one model is built.
+  // The state while one model is built.
   struct Building {
     const GltfPose* pose;
     bool attributes;
@@ -396,11 +400,11 @@ class Scene final : public GltfScene {
   std::vector<int> parents_;
   std::vector<int> roots_;               // of the scene that is shown
   std::vector<int> shown_;               // nodes of that scene, parents first
-  uint64_t hidden_ = 0;                  // nodes of it that are not visible
-  std::vector<uint64_t> lost_channels_;  // of each animation, those that the library drops
+  uint64_t hidden_ = 0;                  // nodes of the scene that are invisible
+  std::vector<uint64_t> lost_channels_;  // per animation, channels that the library drops
   std::map<std::string, uint64_t> extensions_;
   uint64_t variants_ = 0;
-  double rest_length_ = 0;  // of all bones
+  double rest_length_ = 0;  // total length of all bones
 };
 
 absl::Status Scene::Open() {
@@ -516,7 +520,7 @@ void Scene::CheckSkins() const {
   }
 }
 
-// The check of the document has made sure that nodes form a forest.
+// The check of the document has verified that nodes form a forest.
 void Scene::FindRoots() {
   parents_.assign(gltf_.nodes.size(), -1);
   for (size_t n = 0; n < gltf_.nodes.size(); ++n) {
@@ -561,7 +565,7 @@ void Scene::FindRoots() {
   }
 }
 
-// Of all nodes: joints need not be in the scene.
+// Includes all nodes, because joints need not be in the scene.
 std::vector<NodeMatrix> Scene::GlobalsOf(const GltfPose* pose) const {
   std::vector<NodeMatrix> globals(gltf_.nodes.size(), kIdentity);
   std::vector<int> stack;
@@ -723,7 +727,7 @@ const Surface& Scene::SurfaceOf(int number, Building* building) {
   AddLeftOut("normal maps", material.normalTexture.index >= 0 ? 1 : 0, model);
   AddLeftOut("occlusion maps", material.occlusionTexture.index >= 0 ? 1 : 0, model);
 
-  // One that can never be seen is not drawn. Another is drawn opaque.
+  // A material that is always invisible is not drawn. Others are drawn opaque.
   const double alpha = surface.base[3];
   if (material.alphaMode == "BLEND" || material.alphaMode == "MASK") {
     const bool masked = material.alphaMode == "MASK" && alpha < material.alphaCutoff;
@@ -744,7 +748,7 @@ const Surface& Scene::SurfaceOf(int number, Building* building) {
   if (!IsLit(emission)) return surface;
   const bool is_black = surface.base[0] <= 0 && surface.base[1] <= 0 && surface.base[2] <= 0;
   if (material.emissiveTexture.index >= 0) {
-    // The picture can be the light's where nothing else has a colour.
+    // If the surface has no other colour, the picture of the emitted light is used.
     if (is_black) {
       surface.base = {emission[0], emission[1], emission[2], surface.base[3]};
       UsePicture(UseOf(material.emissiveTexture), &surface, building);
@@ -779,7 +783,7 @@ const std::vector<NodeMatrix>& Scene::JointsOf(int number, Building* building) c
   return joints;
 }
 
-// By the extension EXT_mesh_gpu_instancing, or one.
+// Returns the instances of the extension EXT_mesh_gpu_instancing, or one.
 std::vector<NodeMatrix> Scene::InstancesOf(const tinygltf::Node& node,
                                            const NodeMatrix& map) const {
   const tinygltf::Value* extension = FindExtension(node.extensions, "EXT_mesh_gpu_instancing");
@@ -839,7 +843,7 @@ std::vector<double> Scene::WeightsOf(int node, const GltfPose* pose) const {
 }
 
 Elements Scene::ElementsOf(const tinygltf::Primitive& primitive, uint64_t vertices) const {
-  std::vector<uint32_t> order;  // of vertices, as they are drawn
+  std::vector<uint32_t> order;  // vertices in the order in which they are drawn
   if (primitive.indices >= 0) {
     const GltfAccessor& indices = document_->accessors[static_cast<size_t>(primitive.indices)];
     order.resize(indices.count);
@@ -881,7 +885,7 @@ Elements Scene::ElementsOf(const tinygltf::Primitive& primitive, uint64_t vertic
       out = std::move(order);
       out.resize(count / 3 * 3);
   }
-  // Vertices that nothing refers to would take part in the model's size.
+  // Vertices that nothing refers to are dropped, because they would affect the model's size.
   std::vector<uint32_t> kept(vertices, kNone);
   for (const uint32_t index : out) kept[index] = 0;
   uint32_t next = 0;
@@ -901,7 +905,7 @@ uint32_t KeptOf(const Elements& elements, uint64_t vertex) {
   return elements.kept.empty() ? static_cast<uint32_t>(vertex) : elements.kept[vertex];
 }
 
-// The attribute and its morph targets by their weights.
+// Adds the attribute and its weighted morph targets.
 void Scene::AddVectors(const tinygltf::Primitive& primitive, const char* name,
                        const std::vector<double>& weights, const Elements& elements,
                        std::vector<Point3>* out, Building* building) const {
@@ -921,7 +925,7 @@ void Scene::AddVectors(const tinygltf::Primitive& primitive, const char* name,
       throw Failure{absl::StrCat("morphs ", building->morph_work, " vertices"),
                     absl::StrCat("at most ", kMostMorphWork, " are morphed")};
     }
-    // A sparse element replaces what is there, so that it cannot be added at once.
+    // A sparse element replaces an earlier value, so the values cannot be added immediately.
     std::vector<Point3> shape(target->sparse_count > 0 ? elements.vertices : 0);
     ForEachElement(*target, [&](uint64_t i, const double* v) {
       const uint32_t to = KeptOf(elements, i);
@@ -986,7 +990,7 @@ bool Scene::AddCoordinates(const tinygltf::Primitive& primitive, const Surface& 
   return true;
 }
 
-// For each vertex the sum of its joints' maps by their weights; empty if it has no joints.
+// Returns for each vertex the sum of its joints' maps, weighted; empty if it has no joints.
 std::vector<NodeMatrix> Scene::SkinOf(const tinygltf::Primitive& primitive, int skin,
                                       const Elements& elements, Building* building) const {
   if (skin < 0 || !primitive.attributes.contains("JOINTS_0")) return {};
@@ -1030,7 +1034,7 @@ std::vector<NodeMatrix> Scene::SkinOf(const tinygltf::Primitive& primitive, int 
       }
     }
   }
-  // What hangs on no joint goes with the first one.
+  // Vertices without joints follow the first joint.
   for (size_t v = 0; v < maps.size(); ++v) {
     if (!(sums[v] > 0)) {
       maps[v] = joints[0];
@@ -1069,7 +1073,7 @@ void Place(std::span<const NodeMatrix> maps, Part* part) {
         part->normals[v] = Direction(MapPoint(normal_matrix, part->normals[v]));
     }
   }
-  // A mirror turns the winding round.
+  // A mirror reverses the winding.
   for (size_t m = 0; m < maps.size() && part->kind == Kind::kTriangles; ++m) {
     if (!IsMirror(maps[m])) continue;
     for (size_t i = m * indices; i < (m + 1) * indices; i += 3)
@@ -1173,7 +1177,7 @@ void Scene::AddMesh(int number, Building* building) {
     AddPrimitive(primitive, number, maps, building);
 }
 
-// A line from each node of the scene to its parent.
+// Returns a line from each node of the scene to its parent.
 Part Scene::Bones(const std::vector<NodeMatrix>& globals) const {
   Part part{.kind = Kind::kSegments};
   for (const int n : shown_) {

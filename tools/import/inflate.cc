@@ -10,7 +10,8 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// zlib's words for: the largest window; a header of gzip, of gzip or zlib, or none.
+// zlib's window bits, which also select the header: of gzip, of gzip or zlib, or none; each with
+// the largest window.
 constexpr int kGzipAlone = 15 + 16, kGzipOrZlib = 15 + 32, kNoHeader = -15;
 constexpr uint64_t kStep = 1 << 20;
 
@@ -32,7 +33,7 @@ absl::Status InflatePieces(const SourceFile& file, absl::string_view packed, uin
   while (written < most) {
     const size_t given = std::min<size_t>(packed.size() - read, uint64_t{1} << 30);
     const size_t room = std::min(kStep, most - written);
-    // zlib does not write there.
+    // zlib does not write to the input.
     stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data() + read));
     stream.avail_in = static_cast<uInt>(given);
     stream.next_out = reinterpret_cast<Bytef*>(piece.get());
@@ -65,7 +66,8 @@ absl::StatusOr<std::string> Inflate(const SourceFile& file, absl::string_view pa
                                     Deflated kind) {
   std::string out;
   const absl::Status status = InflatePieces(file, packed, most, kind, [&](absl::string_view piece) {
-    // Grows with what comes, so that a short file that promises much takes little.
+    // The output grows with the data, so a short file that declares a large size takes little
+    // memory.
     const uint64_t size = out.size() + piece.size();
     if (out.capacity() < size) out.reserve(std::max(size, std::min<uint64_t>(most, 2 * size)));
     out.append(piece.data(), piece.size());

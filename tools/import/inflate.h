@@ -1,4 +1,4 @@
-// gzip, as far as is asked for.
+// Decompression of gzip and related formats, up to a requested size.
 #pragma once
 
 #include <cstdint>
@@ -12,16 +12,16 @@
 
 namespace voxeld::voxelctl {
 
-// kEither: gzip's header or zlib's; kRaw: without a header, and one stream
+// kEither accepts gzip's header or zlib's; kRaw is one stream without a header.
 enum class Deflated : uint8_t { kGzip, kEither, kRaw };
 
-// The first `most` bytes of what `packed`, a part of `file`, decompresses to, or all if it is fewer. However much more there
-// would be, no more memory than for these is taken. InvalidArgument if it is damaged before that.
-// Calls `take` with piece after piece of the same, each of at most 1 MiB.
+// Decompresses `packed`, a part of `file`, up to its first `most` bytes. It never needs memory for
+// more than these, however long the data are. Calls `take` with successive pieces of at most 1 MiB
+// each. Errors: InvalidArgument if the data are damaged before that point.
 absl::Status InflatePieces(const SourceFile& file, absl::string_view packed, uint64_t most,
                            Deflated kind, const std::function<void(absl::string_view)>& take);
 
-// The first `most` bytes in one.
+// Returns the first `most` bytes in one string.
 absl::StatusOr<std::string> Inflate(const SourceFile& file, absl::string_view packed, uint64_t most,
                                     Deflated kind = Deflated::kGzip);
 

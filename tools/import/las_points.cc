@@ -21,12 +21,13 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "values are read in place");
 
-// Of the public header block, where its fields begin.
+// Offsets of the fields of the public header block.
 constexpr size_t kMinor = 25, kHeaderSize = 94, kOffsetToPoints = 96, kRecords = 100, kFormat = 104,
                  kRecordLength = 105, kOldCount = 107, kScales = 131, kOffsets = 155,
                  kHeaderBytes = 227, kCount14 = 247, kHeaderBytes14 = 375;
 
-// A point record format's least length, and where its colours, time and waveform are (0: it has none).
+// A point record format: its minimum length, and the offsets of its colours, time and waveform (0:
+// it has none).
 struct PointFormat {
   size_t bytes, color, time, waveform;
 };
@@ -43,7 +44,7 @@ T Take(absl::string_view bytes, size_t at) {
   return value;
 }
 
-// Types of numbers, as the specification numbers those of extra bytes.
+// Types of numbers, numbered as in the specification of extra bytes.
 enum NumberType : uint8_t { kU8 = 1, kI8, kU16, kI16, kU32, kI32, kU64, kI64, kF32, kF64 };
 constexpr size_t kNumberBytes[] = {0, 1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
 
@@ -73,12 +74,12 @@ double NumberAt(absl::string_view bytes, size_t at, NumberType type) {
   return 0;
 }
 
-// A number of each point, beside its place and colour.
+// A value of each point besides its position and colour.
 struct Dimension {
   std::string name;
   NumberType type = kU8;
   size_t at = 0;  // in the record
-  // Bits of a byte of which it has some; 0: all of its bytes.
+  // The position and number of its bits if it is part of a byte; 0 bits: all of its bytes.
   int shift = 0, bits = 0;
   double scale = 1, offset = 0;
   std::optional<double> no_data = std::nullopt;
@@ -88,7 +89,7 @@ struct Dimension {
     const double number = NumberAt(points, point + at, type);
     return no_data == number ? std::nan("") : number * scale + offset;
   }
-  // Whether any point has another number than 0, given the bitwise OR of all records.
+  // Returns whether any point has a value other than 0, given the bitwise OR of all records.
   bool IsUsed(absl::string_view all) const {
     if (bits > 0) return ValueAt(all, 0) != 0;
     return all.substr(at, kNumberBytes[type]).find_first_not_of('\0') != absl::string_view::npos;
@@ -135,11 +136,12 @@ struct LasHeader {
   uint64_t count = 0;
   double scale[3] = {}, offset[3] = {};
   std::vector<Dimension> dimensions;
-  size_t unnamed_at = 0;  // in the record: extra bytes that nothing describes begin here
+  size_t unnamed_at = 0;  // in the record: extra bytes without a description begin here
   uint8_t withheld_flags = 15, withheld_bit = 0x80;
 };
 
-// Adds the extra bytes that the file describes (LAS 1.4, table 24). Those of a type that is not known end the list.
+// Adds the extra bytes that the file describes (LAS 1.4, table 24). A descriptor with an unknown
+// type ends the list.
 void AddExtraBytes(absl::string_view descriptors, LasHeader* header) {
   constexpr size_t kDescriptor = 192, kType = 2, kOptions = 3, kName = 4, kNameBytes = 32,
                    kNoData = 40, kScale = 112, kOffset = 136;
@@ -149,11 +151,11 @@ void AddExtraBytes(absl::string_view descriptors, LasHeader* header) {
     const auto options = Take<uint8_t>(descriptors, kOptions);
     const absl::string_view padded = descriptors.substr(kName, kNameBytes);
     const absl::string_view name = padded.substr(0, padded.find('\0'));
-    if (code == 0) {  // so many bytes without a type
+    if (code == 0) {  // that many bytes without a type
       header->unnamed_at = std::min(header->unnamed_at + options, header->record);
       continue;
     }
-    // Types from 11 on are pairs, and from 21 on triples.
+    // Types from 11 on are pairs, and those from 21 on triples.
     const size_t several = (code - 1u) / 10 + 1;
     const auto type = static_cast<NumberType>((code - 1u) % 10 + 1);
     if (several > 3 || header->unnamed_at + several * kNumberBytes[type] > header->record) return;
@@ -163,7 +165,7 @@ void AddExtraBytes(absl::string_view descriptors, LasHeader* header) {
       if ((options & kHasScale) != 0) one.scale = Take<double>(descriptors, kScale + 8 * i);
       if ((options & kHasOffset) != 0) one.offset = Take<double>(descriptors, kOffset + 8 * i);
       if ((options & kHasNoData) != 0) {
-        // It is as wide as can be: an integer of eight bytes, or a double.
+        // The value is stored in the widest type: an integer of eight bytes, or a double.
         const NumberType wide = type >= kF32 ? kF64 : type % 2 == 1 ? kU64 : kI64;
         one.no_data = NumberAt(descriptors, kNoData + 8 * i, wide);
       }
@@ -173,7 +175,7 @@ void AddExtraBytes(absl::string_view descriptors, LasHeader* header) {
   }
 }
 
-// Goes through the variable length records for the one that describes extra bytes.
+// Searches the variable length records for the one that describes extra bytes.
 void ReadExtraBytes(absl::string_view bytes, LasHeader* header) {
   constexpr size_t kRecordHeader = 54, kUser = 2, kUserBytes = 16, kId = 18, kLength = 20;
   constexpr uint16_t kExtraBytes = 4;
@@ -238,9 +240,9 @@ absl::StatusOr<LasHeader> ReadLasHeader(const SourceFile& file) {
   return out;
 }
 
-// The bitwise OR of all records.
+// Returns the bitwise OR of all records.
 std::string AnyOf(absl::string_view points, const LasHeader& header) {
-  // By words, because the records of a survey are many.
+  // Works on 64-bit words, because a survey has many records.
   std::vector<uint64_t> words(header.record / sizeof(uint64_t));
   std::string rest(header.record % sizeof(uint64_t), '\0');
   const char* record = points.data();
@@ -272,7 +274,7 @@ absl::StatusOr<Model> ReadLasPoints(const SourceFile& file, bool attributes) {
     }
   }
   std::array<bool, kPointColumns> has = {true, true, true};
-  const bool colored = brightest > 0;  // some have the room for colours and none in it
+  const bool colored = brightest > 0;  // some have space for colours but none in it
   for (const PointColumn c : {PointColumn::kRed, PointColumn::kGreen, PointColumn::kBlue}) {
     has[static_cast<size_t>(c)] = colored;
   }
@@ -294,7 +296,7 @@ absl::StatusOr<Model> ReadLasPoints(const SourceFile& file, bool attributes) {
       ++withheld;
       continue;
     }
-    // The number of its descriptor; 0: this point has none.
+    // The byte is the number of its descriptor; 0 means that this point has none.
     if (header->format.waveform != 0)
       waveforms += Take<uint8_t>(points, at + header->format.waveform) != 0 ? 1 : 0;
     PointRow row = {};

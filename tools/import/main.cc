@@ -1,5 +1,6 @@
-// voxeld-import: reads one file, or the frames of a sequence or animation, for the process that started it, which is voxelctl
-// (tools/voxelctl/import/import_program.h). It confines itself before it looks at what a file holds.
+// voxeld-import: reads one file, or the frames of a sequence or animation, for the process that
+// started it, which is voxelctl (tools/voxelctl/import/import_program.h). It confines itself before
+// it reads a file's contents.
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -35,7 +36,7 @@ struct Wanted {
   double fps = 20;
 };
 
-// Files that are read when they are asked for.
+// Files that are read when they are requested.
 class SequenceFrames final : public FrameSource {
  public:
   explicit SequenceFrames(Wanted wanted) : wanted_(std::move(wanted)) {}
@@ -88,7 +89,7 @@ absl::Status Parse(int argc, char** argv, Wanted* wanted) {
   return absl::OkStatus();
 }
 
-// Files and folders to read, besides the folder of the first file. Loads what drawings need.
+// Returns the files and folders to read besides the first file's folder. Loads what drawings need.
 std::vector<std::string> ReadablesOf(const Wanted& wanted) {
   std::vector<std::string> folders;
   if (std::any_of(wanted.files.begin(), wanted.files.end(),
@@ -143,7 +144,7 @@ std::vector<std::string> ReadablesOf(const Wanted& wanted) {
     if (!file.ok()) return file.status();
     if (unread) return ReadFolder(path);
     absl::StatusOr<Model> model = ReadAny(*file, wanted.options);
-    // Memory for the answer's time, which the model alone needs.
+    // Frees the file's bytes, because only the model is needed while it is sent.
     file->bytes = std::string();
     return model;
   });

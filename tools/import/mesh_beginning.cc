@@ -22,12 +22,12 @@ constexpr size_t kHead = 4096;
 
 struct Beginning {
   absl::string_view extension;
-  std::vector<absl::string_view> at_front;  // one of these stands there; or
-  absl::string_view within;                 // this within the first 4096 bytes
+  std::vector<absl::string_view> at_front;  // one of these must be at the beginning, or
+  absl::string_view within;                 // this must be within the first 4096 bytes
   absl::string_view expected;
 };
 
-// Libraries recurse on what is nested. People and programs nest some ten deep.
+// Libraries recurse into nested elements. People and programs nest about ten deep.
 constexpr int kMostNesting = 200;
 
 int NestingOf(const SourceFile& file) {
@@ -42,8 +42,8 @@ int NestingOf(const SourceFile& file) {
       BracketDepth(text, '"'));
 }
 
-// Removes the next number from the front of `text`, after whitespace and comments, and returns it: 0 for a word that does not begin with a
-// digit, UINT64_MAX for a number that is too large.
+// Removes the next number from the front of `text`, after whitespace and comments. Returns: the
+// number; 0 for a word that does not begin with a digit; UINT64_MAX if the number is too large.
 uint64_t TakeCount(absl::string_view* text) {
   while (!text->empty()) {
     if (text->front() == '#') {
@@ -60,23 +60,23 @@ uint64_t TakeCount(absl::string_view* text) {
     value = value > (UINT64_MAX - digit) / 10 ? UINT64_MAX : value * 10 + digit;
     text->remove_prefix(1);
   }
-  // The rest of a word that is not a number.
+  // Skips the rest of a word that is not a number.
   while (!text->empty() && !absl::ascii_isspace(static_cast<unsigned char>(text->front())))
     text->remove_prefix(1);
   return value;
 }
 
-// The library allocates all the vertices and faces that an OFF file declares before it reads the first one. It does not miss corners that are not
-// there.
+// The library allocates all vertices and faces that an OFF file declares before it reads the first
+// one. It does not report missing corners.
 absl::Status CheckOff(const SourceFile& file) {
   absl::string_view text = file.bytes;
-  // [ST][C][N][4][n]OFF; the counts may follow at once.
+  // The magic is [ST][C][N][4][n]OFF; the counts may follow immediately.
   for (const absl::string_view option : {"ST", "C", "N", "4"}) absl::ConsumePrefix(&text, option);
   const bool has_dimension = absl::ConsumePrefix(&text, "n");
   absl::ConsumePrefix(&text, "OFF");
   if (has_dimension) TakeCount(&text);
   const uint64_t vertices = TakeCount(&text), faces = TakeCount(&text);
-  // "0 0 0" is the shortest vertex, "1 0" the shortest face, each with the end of its line.
+  // The shortest vertex is "0 0 0" and the shortest face "1 0", each with a line end.
   const uint64_t bytes = file.bytes.size();
   if (vertices > bytes / 6 || faces > bytes / 4) {
     return FileError(file,
@@ -84,7 +84,7 @@ absl::Status CheckOff(const SourceFile& file) {
                                   " faces but has only ", bytes, " bytes"),
                      "the file is truncated or damaged");
   }
-  // The number of edges, and what else stands in its line.
+  // Skips the number of edges, and the rest of its line.
   text.remove_prefix(std::min(text.find_first_of("\r\n"), text.size()));
   uint64_t lines = 0;
   for (absl::string_view line : absl::StrSplit(text, absl::ByAnyChar("\r\n"))) {
@@ -110,8 +110,9 @@ absl::Status CheckOff(const SourceFile& file) {
   return absl::OkStatus();
 }
 
-// The numbers of the entities that a STEP file defines ("#12=…") or refers to ("#12"), outside texts and comments. The library follows a
-// reference to an entity that is missing to address 0.
+// Checks the numbers of the entities that a STEP file defines ("#12=…") or refers to ("#12"),
+// outside strings and comments. The library dereferences a null pointer for a reference to a
+// missing entity.
 absl::Status CheckStepReferences(const SourceFile& file) {
   absl::string_view text = file.bytes;
   std::vector<uint64_t> defined, used;
@@ -152,7 +153,7 @@ absl::Status CheckMeshBeginning(const SourceFile& file) {
       {"off", {}, "OFF", "a file that begins with \"OFF\" is expected"},
       {"fbx", {"Kaydara FBX Binary"}, "FBX", "binary or ASCII FBX is expected"},
       {"3mf", {"PK\x03\x04"}, "", "a ZIP archive, as 3MF is, is expected"},
-      // A byte order mark: UTF-16, where words are not to be found as they stand.
+      // A byte order mark means UTF-16, in which the words cannot be found as plain bytes.
       {"dae", {"\xff\xfe", "\xfe\xff"}, "<COLLADA", "XML of <COLLADA> is expected"},
       {"blend", {"BLENDER", "\x1f\x8b"}, "", "a Blender file is expected"},
       {"ifc", {"ISO-10303-21"}, "", "a STEP file (\"ISO-10303-21\") is expected"},

@@ -1,4 +1,4 @@
-// Files of meshes that assimp reads: how they must begin.
+// Checks how files of meshes that assimp reads must begin.
 #pragma once
 
 #include "absl/status/status.h"
@@ -6,8 +6,10 @@
 
 namespace voxeld::voxelctl {
 
-// InvalidArgument unless an .off, .fbx, .3mf, .dae, .blend, .ifc or .bvh begins as such a file does and has 512 MiB at most, an .off has
-// the faces that it declares, and an .ifc defines what it refers to. Others may begin as they like.
+// Checks the beginning of a file. An .off, .fbx, .3mf, .dae, .blend, .ifc or .bvh must begin as its
+// format requires and have at most 512 MiB, an .off must have the faces that it declares, and an
+// .ifc must define the entities that it refers to. Other files are accepted. Errors:
+// InvalidArgument otherwise.
 absl::Status CheckMeshBeginning(const SourceFile& file);
 
 }  // namespace voxeld::voxelctl

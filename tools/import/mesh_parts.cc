@@ -13,12 +13,12 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr uint32_t kNoVertex = UINT32_MAX;
-constexpr double kSameNormal = 0.9999;  // cosine between normals that one vertex may serve
-constexpr int kMostCopies = 8;          // of a vertex that are searched for a normal
+constexpr double kSameNormal = 0.9999;  // cosine between normals that one vertex may have
+constexpr int kMostCopies = 8;          // copies of a vertex that are searched for a normal
 
 double Dot(const Point3& a, const Point3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
-// Length is twice the area.
+// The length of the result is twice the area.
 Point3 AreaNormal(const Point3& a, const Point3& b, const Point3& c) {
   const Point3 u = {b.x - a.x, b.y - a.y, b.z - a.z}, v = {c.x - a.x, c.y - a.y, c.z - a.z};
   return {u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x};
@@ -34,7 +34,7 @@ float Wrapped(Wrap wrap, float value) {
   return wrap == Wrap::kMirror ? Mirrored(value) : value;
 }
 
-// Whether the rule is exact when only the corners follow it.
+// Returns whether the rule is exact if it is applied to the corners only.
 bool IsExact(Wrap wrap, float a, float b, float c) {
   const float least = std::min({a, b, c}), most = std::max({a, b, c});
   if (wrap == Wrap::kClamp) return most <= 0 || least >= 1 || (least >= 0 && most <= 1);

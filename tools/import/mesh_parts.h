@@ -10,7 +10,7 @@
 
 namespace voxeld::voxelctl {
 
-// Row-major 3×4, in double precision: nodes nest.
+// Row-major 3×4, in double precision because nodes nest.
 using NodeMatrix = std::array<double, 12>;
 
 inline constexpr NodeMatrix kIdentity = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
@@ -18,38 +18,43 @@ inline constexpr NodeMatrix kIdentity = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 NodeMatrix Compose(const NodeMatrix& outer, const NodeMatrix& inner);
 Point3 MapPoint(const NodeMatrix& m, const Point3& p);
 
-// Returns: the inverse transpose up to a positive factor, so that normals stay outside under a mirror too.
+// Returns: the inverse transpose up to a positive factor, so normals point outwards even after
+// mirroring.
 NodeMatrix NormalMatrix(const NodeMatrix& m);
 
-// Whether it turns the winding of triangles round.
+// Returns whether the matrix reverses the winding of triangles.
 bool IsMirror(const NodeMatrix& m);
 
-// Of unit length, however small the model is; zero for what has no direction.
+// Returns a vector of unit length, however small the model is; zero if there is no direction.
 Point3 Direction(const Point3& p);
 
-// Returns: a channel from 0 to 1 as a byte; a value that is not a number is 0. `linear`: the value is linear light.
+// Returns: a channel from 0 to 1 as a byte; 0 if the value is not a number. `linear` means that the
+// value is linear light.
 uint8_t ColorByte(double value, bool linear);
 
-// Gives a part of triangles its normals, by the triangles' winding. A corner gets the mean normal of the triangles around its vertex if
-// its own triangle is turned by less than `crease_degrees` from it, otherwise its triangle's own normal: 0 makes every triangle flat,
-// 180 makes all smooth. Vertices with several normals are duplicated.
+// Gives a part of triangles its normals, by the winding of the triangles. A corner gets the mean
+// normal of the triangles around its vertex if its own triangle differs from it by less than
+// `crease_degrees`, otherwise its triangle's own normal: 0 makes every triangle flat, 180 makes all
+// smooth. Vertices with several normals are duplicated.
 void AddNormals(double crease_degrees, Part* part);
 
-// Removes triangles without an area, and vertices that no element refers to: they would take part in the model's size. Returns: the number of
-// triangles removed whose corners are at three places; others join strips or close poles.
+// Removes triangles without an area, and vertices that no element refers to, because they would
+// affect the model's size. Returns: the number of removed triangles whose corners are at three
+// different places; others join strips or close poles.
 uint64_t DropEmptyTriangles(Part* part);
 
-// Whether the display can show a picture with these bytes: PNG or JPEG.
+// Returns whether the display can show a picture with these bytes: PNG or JPEG.
 bool IsPicture(absl::string_view bytes);
 
-// What follows beyond the edge of a picture.
+// What is shown beyond the edge of a picture.
 enum class Wrap : uint8_t { kRepeat, kClamp, kMirror };
 
-// Rewrites the texture coordinates of a part so that a picture that repeats looks like one with these rules. Returns: the number of triangles
-// that cross the edge of a picture, for which this is an approximation.
+// Rewrites the texture coordinates of a part so that a repeating picture looks like one with these
+// rules. Returns: the number of triangles that cross the edge of a picture, for which this is an
+// approximation.
 uint64_t ApplyWrap(Wrap u, Wrap v, Part* part);
 
-// "a%20b" as "a b"; a % that two hexadecimal digits do not follow stays.
+// Decodes "a%20b" to "a b"; a % without two hexadecimal digits stays.
 std::string PercentDecode(absl::string_view text);
 
 }  // namespace voxeld::voxelctl

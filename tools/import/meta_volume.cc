@@ -1,4 +1,5 @@
-// MetaImage: lines "Name = Value", the last of which says where the samples are (https://itk.org/Wiki/ITK/MetaIO/Documentation).
+// Reads MetaImage: lines "Name = Value", the last of which says where the samples are
+// (https://itk.org/Wiki/ITK/MetaIO/Documentation).
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -99,7 +100,7 @@ class MetaReader {
                                                   "\" for ", name),
                      expected);
   }
-  // The finite numbers of a text; nothing if one of its words is another.
+  // Returns the numbers of a text; nothing if one of its words is not a finite number.
   static std::vector<double> Numbers(absl::string_view text) {
     std::vector<double> numbers;
     for (const absl::string_view word :
@@ -180,7 +181,7 @@ class MetaReader {
     return absl::OkStatus();
   }
 
-  // "%03d" as a number, which is what the format's printf() is used for.
+  // Expands "%03d" with a number; the format uses printf() only for this.
   static std::optional<std::string> Numbered(absl::string_view pattern, int64_t number) {
     const size_t from = pattern.find('%');
     const size_t end = pattern.find_first_not_of("0123456789", from + 1);
@@ -199,7 +200,7 @@ class MetaReader {
     return absl::StrCat(pattern.substr(0, from), text, pattern.substr(end + 1));
   }
 
-  // The files with the samples, in their order; none if they are in this one.
+  // Returns the files with the samples, in order; none if the samples are in this file.
   absl::StatusOr<std::vector<std::string>> DataFiles() const {
     const absl::string_view value = Field("ElementDataFile");
     std::vector<std::string> files;
@@ -218,7 +219,7 @@ class MetaReader {
       return files;
     }
     if (!absl::StrContains(value, '%')) return std::vector<std::string>{std::string(value)};
-    // A pattern, the first number, the last, and the step.
+    // The words are a pattern, the first number, the last number, and the step.
     const std::vector<absl::string_view> words = absl::StrSplit(value, ' ', absl::SkipEmpty());
     std::array<int64_t, 3> range = {1, 0, 1};
     bool good = words.size() == 4 || words.size() == 3;
@@ -238,12 +239,12 @@ class MetaReader {
     return files;
   }
 
-  // The first `wanted` bytes of the samples in `data`.
+  // Returns the first `wanted` bytes of the samples in `data`.
   absl::StatusOr<std::string> Unpack(const SourceFile& file, absl::string_view data,
                                      uint64_t wanted) const {
     const auto skipped = static_cast<uint64_t>(std::max<int64_t>(skipped_, 0));
     if (!Flag(Field("CompressedData"), false)) {
-      // -1: the samples are the file's end.
+      // -1 means that the samples are at the end of the file.
       const uint64_t all = wanted * times_;
       const uint64_t from =
           skipped_ >= 0 ? skipped : data.size() - std::min<uint64_t>(data.size(), all);
@@ -262,7 +263,7 @@ class MetaReader {
       const absl::string_view data = absl::string_view(file_.bytes).substr(body_);
       if (text) return ReadText(data, volume);
       const uint64_t wanted = count * SampleBytes(code_.type);
-      // Without a copy where they lie here as they are.
+      // Uncompressed samples in this file are decoded without a copy.
       if (!Flag(Field("CompressedData"), false) && skipped_ == 0)
         return Decode(file_, data, volume);
       const absl::StatusOr<std::string> bytes = Unpack(file_, data, wanted);
@@ -323,7 +324,7 @@ class MetaReader {
     return absl::OkStatus();
   }
 
-  // Returns: the directions of the axes, one a row; empty if the file has no matrix.
+  // Returns: the directions of the axes, one per row; empty if the file has no matrix.
   std::vector<double> Matrix() const {
     const std::vector<double> matrix =
         Numbers(AnyField({"TransformMatrix", "Rotation", "Orientation"}));
@@ -354,7 +355,8 @@ class MetaReader {
       const double step = axis < spacing.size() && spacing[axis] != 0 ? spacing[axis] : 1;
       steps[axis] = {steps[axis].x * step, steps[axis].y * step, steps[axis].z * step};
     }
-    // The viewer stands before the face, on the side of -y; the file's axes go to the patient's left, back and head.
+    // The viewer is in front of the face, on the side of -y; the file's axes point to the patient's
+    // left, back and head.
     return PlaceVolume(file_, {number(at, 0, 0), number(at, 0, 1), number(at, 0, 2)}, steps,
                        volume);
   }

@@ -1,4 +1,5 @@
-// MRC: a header of 1024 bytes, and numbers (MRC2014, https://www.ccpem.ac.uk/mrc_format/mrc2014.php; IMOD's extensions).
+// Reads MRC: a header of 1024 bytes, and numbers (MRC2014,
+// https://www.ccpem.ac.uk/mrc_format/mrc2014.php; IMOD's extensions).
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -17,7 +18,7 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr uint64_t kMrcHeader = 1024;
-// Where the words are, by their numbers in the specification: 4 bytes each, from 1 on.
+// Offsets of the words by their numbers in the specification: 4 bytes each, counted from 1.
 constexpr size_t Word(size_t number) { return 4 * (number - 1); }
 constexpr size_t kMrcSize = Word(1), kMrcMode = Word(4), kMrcStart = Word(5),
                  kMrcIntervals = Word(8), kMrcCell = Word(11), kMrcAngles = Word(14),
@@ -26,7 +27,8 @@ constexpr size_t kMrcSize = Word(1), kMrcMode = Word(4), kMrcStart = Word(5),
                  kMrcMachine = Word(54);
 constexpr size_t kImodStamp = 152, kImodFlags = 156;  // bytes
 constexpr int32_t kImod = 1146047817;
-constexpr int32_t kVolumeStack = 401;  // a space group from which on a file holds several volumes
+// The first space group that means several volumes in one file.
+constexpr int32_t kVolumeStack = 401;
 
 class MrcReader {
  public:
@@ -76,7 +78,7 @@ class MrcReader {
   }
   double Float(size_t at) const { return double{std::bit_cast<float>(Int(at))}; }
 
-  // Whether mode and axes are numbers that a header may have.
+  // Returns whether mode and axes have values that a header may have.
   bool IsSensible() const {
     const auto is_axis = [this](size_t i) {
       const int32_t axis = Int(kMrcAxes + 4 * i);
@@ -85,7 +87,8 @@ class MrcReader {
     return Int(kMrcMode) >= 0 && Int(kMrcMode) < 256 && is_axis(0) && is_axis(1) && is_axis(2);
   }
 
-  // Files from before 2000 have no machine stamp, and some programs write a wrong one. So the numbers decide.
+  // Files from before 2000 have no machine stamp, and some programs write a wrong one. So the
+  // values decide.
   absl::Status FindByteOrder() {
     const bool stamped_big = file_.bytes[kMrcMachine] == '\x11';
     for (const bool big : {stamped_big, !stamped_big}) {
@@ -142,14 +145,15 @@ class MrcReader {
     }
   }
 
-  // MRC2014 says signed. IMOD says by a flag which they are, and older programs wrote unsigned ones: then the greatest is said to be
-  // more than a signed byte can hold.
+  // MRC2014 says that bytes are signed. IMOD has a flag for it, and older programs wrote unsigned
+  // ones: then the declared maximum exceeds a signed byte.
   bool HasUnsignedBytes() const {
     if (Int(kImodStamp) == kImod) return (Int(kImodFlags) & 1) == 0;
     return Float(kMrcGreatest) > 127;
   }
 
-  // Where the axes of the cell go: the first along x, the second in the plane of x and y.
+  // Returns the directions of the cell's axes: the first along x, the second in the plane of x and
+  // y.
   std::array<Point3, 3> CellAxes() const {
     std::array<double, 3> cosines = {0, 0, 0};
     for (size_t i = 0; i < 3; ++i) {
@@ -165,7 +169,7 @@ class MrcReader {
     return {Point3{1, 0, 0}, Point3{gamma, sine, 0}, Point3{beta, y, std::sqrt(z)}};
   }
 
-  // The axes of the cell along columns, rows and sections, from 0 on.
+  // Returns the cell's axes along columns, rows and sections, counted from 0.
   std::array<size_t, 3> AxesInFile() const {
     std::array<size_t, 3> axes;
     for (size_t i = 0; i < 3; ++i) axes[i] = static_cast<size_t>(Int(kMrcAxes + 4 * i)) - 1;

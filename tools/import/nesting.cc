@@ -10,7 +10,7 @@
 namespace voxeld::voxelctl {
 
 int ElementDepth(absl::string_view text) {
-  // UTF-16 of ASCII has a NUL beside each character.
+  // UTF-16 text of ASCII characters has a NUL beside each character.
   std::string plain;
   if (text.find('\0') != absl::string_view::npos) {
     std::copy_if(text.begin(), text.end(), std::back_inserter(plain),
@@ -34,7 +34,7 @@ int ElementDepth(absl::string_view text) {
       depth = std::max(0, depth - 1);
       at += 2;
     } else {
-      // To the end of the tag; '>' may stand in its attributes.
+      // Skips to the end of the tag; its attributes may contain '>'.
       size_t end = at + 1;
       while (end < text.size() && text[end] != '>') {
         if (text[end] == '"' || text[end] == '\'') end = text.find(text[end], end + 1);

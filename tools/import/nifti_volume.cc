@@ -1,4 +1,4 @@
-// NIfTI, in one file or two.
+// Reads NIfTI, in one file or two.
 #include <nifti2_io.h>
 
 #include <algorithm>
@@ -58,12 +58,12 @@ struct FreeImage {
   void operator()(nifti_image* image) const { nifti_image_free(image); }
 };
 
-// What both headers say, in one form.
+// The contents of either header in one form.
 struct Head {
   std::array<int64_t, 8> dim = {};
   int datatype = 0, intent = 0;
   double vox_offset = 0, slope = 0, intercept = 0, cal_min = 0, cal_max = 0;
-  bool apart = false;  // the samples are in a file beside it
+  bool apart = false;  // the samples are in a separate file
 };
 
 template <typename Header>
@@ -83,7 +83,7 @@ Head HeadOf(const Header& header, bool apart) {
 
 bool IsPacked(const SourceFile& file) { return absl::StartsWith(file.bytes, "\x1f\x8b"); }
 
-// The first `most` bytes of what it holds; a copy only of what is compressed.
+// Returns the first `most` bytes of the contents. Only compressed contents are copied, into `room`.
 absl::StatusOr<absl::string_view> BeginningOf(const SourceFile& file, uint64_t most,
                                               std::string* room) {
   if (!IsPacked(file)) return absl::string_view(file.bytes).substr(0, most);
@@ -93,7 +93,8 @@ absl::StatusOr<absl::string_view> BeginningOf(const SourceFile& file, uint64_t m
   return absl::string_view(*room);
 }
 
-// The other file of two, whatever case and compression its extension has; nothing if there is none.
+// Returns the other file of two, whatever case and compression its extension has; nothing if it
+// does not exist.
 std::optional<std::string> Beside(const std::string& path, absl::string_view extension) {
   std::filesystem::path stem(path);
   if (absl::EqualsIgnoreCase(stem.extension().string(), ".gz")) stem.replace_extension();
@@ -189,12 +190,13 @@ class NiftiReader {
     }
   }
 
-  // Decodes what is compressed piece by piece, so that it is never in memory as a whole.
+  // Decodes compressed samples piece by piece, so that the compressed data are never expanded as a
+  // whole.
   absl::Status ReadPacked(const SourceFile& file, uint64_t wanted, SampledVolume* volume) const {
     const uint64_t each = BytesEach();
     uint64_t there = 0;
-    std::string rest;  // of a sample that goes on in the next piece
-    // Memory is taken when it is filled.
+    std::string rest;  // the part of a sample that continues in the next piece
+    // Memory is only used when it is filled.
     volume->samples.reserve(wanted / each);
     if (channels_ > 0) volume->colors.reserve(wanted / each);
     const absl::Status status = InflatePieces(
@@ -273,7 +275,8 @@ class NiftiReader {
     return absl::OkStatus();
   }
 
-  // ANALYZE 7.5, which NIfTI-1 was made from, has no magic: its header's size is known, and the extensions of its two files.
+  // ANALYZE 7.5, from which NIfTI-1 was derived, has no magic: it is recognised by its header's
+  // size and the extensions of its two files.
   bool TakeAnalyze() {
     const std::string path = absl::AsciiStrToLower(file_.path);
     nifti_1_header header = first_;
@@ -291,7 +294,7 @@ class NiftiReader {
     first_ = header;
     head_ = HeadOf(first_, true);
     is_analyze_ = true;
-    // It has other fields in their places, and x goes to the left (nifti1.h).
+    // Its fields differ from NIfTI's, and x points to the left (nifti1.h).
     head_.slope = head_.intercept = 0;
     first_.qform_code = first_.sform_code = 0;
     first_.pixdim[0] = 1;
@@ -361,15 +364,15 @@ class NiftiReader {
     return absl::OkStatus();
   }
 
-  // The standard leaves the steps along axes that a volume does not have without a meaning, and some programs write 0. The library
-  // takes those for steps of no length.
+  // The standard leaves the steps along missing axes undefined, and some programs write 0. The
+  // library would use these as steps of no length.
   template <typename Header>
   static Header WithSteps(Header header) {
     for (auto axis = header.dim[0] + 1; axis <= 3; ++axis) header.pixdim[axis] = 1;
     return header;
   }
 
-  // The library knows how quaternions become a matrix; it sees a header that has been checked, and nothing else.
+  // The library converts quaternions to a matrix. It sees only a checked header.
   absl::Status Place(SampledVolume* volume) const {
     const std::unique_ptr<nifti_image, FreeImage> image(
         is_second_ ? nifti_convert_n2hdr2nim(WithSteps(second_), nullptr)
@@ -377,7 +380,8 @@ class NiftiReader {
     if (image == nullptr)
       return FileError(file_, "could not be read as NIfTI", "the header is damaged");
     const nifti_dmat44& m = image->sform_code > 0 ? image->sto_xyz : image->qto_xyz;
-    // The file's x goes to the right and y to the front of the head; the viewer stands before it, on the side of -y.
+    // The file's x points to the right and y to the front of the head; the viewer is in front of
+    // the face, on the side of -y.
     const auto column = [&m](int c) { return Point3{-m.m[0][c], -m.m[1][c], m.m[2][c]}; };
     std::array<Point3, 3> steps = {column(0), column(1), column(2)};
     Point3 origin = column(3);
@@ -403,10 +407,10 @@ class NiftiReader {
 
   const SourceFile& file_;
   Head head_;
-  // The second is packed; the library takes it for aligned.
+  // The second header is packed, but the library assumes that it is aligned.
   nifti_1_header first_ = {};
   alignas(8) nifti_2_header second_ = {};
-  bool is_second_ = false;  // which of them the file has
+  bool is_second_ = false;  // which of them is in the file
   bool is_analyze_ = false;
   SampleCode code_;
   size_t channels_ = 0;  // of colours; 0: numbers

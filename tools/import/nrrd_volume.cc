@@ -1,4 +1,4 @@
-// NRRD: lines "name: value", and samples.
+// Reads NRRD: lines "name: value", and samples.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -30,7 +30,7 @@ namespace {
 
 constexpr size_t kMostHeader = 1 << 20;
 
-// In lower case, without its spaces and dashes, as some programs leave them out.
+// Returns the name in lower case, without spaces and dashes, which some programs leave out.
 std::string Plain(absl::string_view text) {
   std::string plain;
   for (const char c : text) {
@@ -145,12 +145,12 @@ class NrrdReader {
       if (absl::EndsWith(line, "\r")) line.remove_suffix(1);
       ended = line.empty();
       const size_t colon = line.find(": ");
-      // "key:=value" says nothing about the samples.
+      // "key:=value" does not describe the samples.
       if (ended || line.front() == '#' || colon == absl::string_view::npos) continue;
       const std::string name = Plain(line.substr(0, colon));
       std::string& value = fields_[name];
       value = std::string(absl::StripAsciiWhitespace(line.substr(colon + 2)));
-      // Vectors are words here, whatever blanks are in them.
+      // Blanks inside vectors are removed, so that each vector is one word.
       if (absl::StartsWith(name, "space"))
         absl::StrReplaceAll({{", ", ","}, {"( ", "("}, {" )", ")"}}, &value);
     }
@@ -162,7 +162,8 @@ class NrrdReader {
     return absl::OkStatus();
   }
 
-  // One axis more than three, or one that has no direction, counts what is at each place, if it is the first, or volumes.
+  // A fourth axis, or one without a direction, counts the values at each place if it is the first,
+  // and otherwise volumes.
   absl::Status ReadSizes() {
     size_t dimension = 0;
     if (!absl::SimpleAtoi(Field("dimension"), &dimension) || dimension < 2 || dimension > 4) {
@@ -193,7 +194,7 @@ class NrrdReader {
     return absl::StrSplit(Field(field), absl::ByAnyChar(" \t"), absl::SkipEmpty());
   }
 
-  // Which one says nothing of a place; nothing if there is none.
+  // Returns which axis is not spatial; nothing if all are.
   absl::StatusOr<std::optional<size_t>> ExtraAxis(size_t dimension) const {
     const std::vector<absl::string_view> directions = Words("spacedirections"),
                                          kinds = Words("kinds");
@@ -235,7 +236,7 @@ class NrrdReader {
     return absl::OkStatus();
   }
 
-  // Empty if the samples stand in the file itself.
+  // Returns the detached file; empty if the samples are in the file itself.
   absl::StatusOr<SourceFile> Beside() const {
     const absl::string_view name = Field("datafile");
     if (name.empty()) return SourceFile();
@@ -280,7 +281,7 @@ class NrrdReader {
     return absl::OkStatus();
   }
 
-  // Lines are skipped before the data are decompressed, bytes after.
+  // Lines are skipped before the data are decompressed, bytes afterwards.
   absl::Status ReadCompressed(absl::string_view data, uint64_t wanted,
                               SampledVolume* volume) const {
     const absl::StatusOr<int64_t> bytes = ByteSkip();
@@ -303,7 +304,8 @@ class NrrdReader {
            !absl::StartsWith(kind, "xyz");
   }
 
-  // Three or four numbers, red, green and blue, whatever the axis is called, if it says something of colours.
+  // Returns whether the values are colours: three or four per place, whatever the axis is called,
+  // if its kind is a kind of colours.
   bool AreColors() const {
     const std::vector<absl::string_view> kinds = Words("kinds");
     const std::string kind = kinds.empty() ? "" : absl::AsciiStrToLower(kinds[0]);
@@ -317,7 +319,7 @@ class NrrdReader {
            IsRgb(absl::AsciiStrToLower(kinds.back()));
   }
 
-  // Two digits a byte.
+  // The text has two digits per byte.
   absl::Status ReadHex(absl::string_view data, uint64_t wanted, SampledVolume* volume) const {
     std::string bytes;
     int high = -1;
@@ -395,7 +397,7 @@ class NrrdReader {
     return absl::OkStatus();
   }
 
-  // "(x,y,z)"
+  // Parses "(x,y,z)".
   static std::optional<Point3> Vector(absl::string_view text) {
     if (text.size() < 2 || text.front() != '(' || text.back() != ')') return std::nullopt;
     const std::vector<absl::string_view> words =
@@ -415,7 +417,7 @@ class NrrdReader {
     const std::vector<absl::string_view> directions = Words("spacedirections"),
                                          spacings = Words("spacings"), mins = Words("axismins"),
                                          maxs = Words("axismaxs");
-    // The format has two names for the field.
+    // The format has two names for this field.
     const std::vector<absl::string_view> centers =
         Words(Field("centers").empty() ? "centerings" : "centers");
     for (size_t i = 0; i < axes_.size(); ++i) {
@@ -431,11 +433,12 @@ class NrrdReader {
         if (!absl::SimpleAtod(spacings[axes_[i]], &length)) {
           return WrongField("spacings", "a number for each axis is expected");
         }
-        // "nan": not known.
+        // "nan" means unknown.
         double* const lengths[] = {&steps[0].x, &steps[1].y, &steps[2].z};
         if (std::isfinite(length) && length != 0) *lengths[i] = length;
       } else if (axes_[i] < mins.size() && axes_[i] < maxs.size()) {
-        // The ends of the axis are those of its cells, or the middles of the first and the last one.
+        // The ends of the axis are the outer edges of its cells, or the centres of the first and
+        // the last sample.
         const bool nodes = axes_[i] < centers.size() && centers[axes_[i]] == "node";
         const double steps_along = static_cast<double>(size_[i]) - (nodes ? 1 : 0);
         double least = 0, most = 0;
@@ -451,7 +454,8 @@ class NrrdReader {
       if (!origin) return WrongField("spaceorigin", "a place is expected, as (0,0,0)");
       first = *origin;
     }
-    // To the patient's left, back and head: the viewer stands before the face, on the side of -y.
+    // The axes point to the patient's left, back and head: the viewer is in front of the face, on
+    // the side of -y.
     const std::string space = Plain(Field("space"));
     const bool right = absl::StartsWith(space, "right") && absl::StrContains(space, "superior");
     const bool anterior = absl::StrContains(space, "anterior") || absl::StartsWith(space, "ras") ||
@@ -465,7 +469,7 @@ class NrrdReader {
   const SourceFile& file_;
   std::map<std::string, std::string, std::less<>> fields_;  // by Plain()
   size_t body_ = 0;
-  std::vector<size_t> axes_;  // of places, in the file's counting
+  std::vector<size_t> axes_;  // spatial axes, in the file's numbering
   uint64_t each_ = 1, volumes_ = 1;
   std::array<uint64_t, 3> size_ = {1, 1, 1};
   SampleCode code_;

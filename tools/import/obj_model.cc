@@ -36,7 +36,7 @@ constexpr absl::string_view kExpected =
     "a Wavefront OBJ is text with lines such as \"v 1 2 3\" and \"f 1 2 3\"";
 constexpr uint32_t kNone = UINT32_MAX;
 constexpr size_t kMostNames = 100'000;  // of materials
-// Where a file has neither normals nor smoothing groups: sharper edges stay edges.
+// For files with neither normals nor smoothing groups: sharper edges stay edges.
 constexpr double kCreaseDegrees = 25;
 
 bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
@@ -47,7 +47,7 @@ absl::string_view Trim(absl::string_view text) {
   return text;
 }
 
-// The next word of a line, taken off its front; empty at its end and at a comment.
+// Removes the next word from the front of a line and returns it; empty at the end and at a comment.
 absl::string_view TakeWord(absl::string_view* line) {
   size_t begin = 0;
   while (begin < line->size() && IsBlank((*line)[begin])) ++begin;
@@ -59,7 +59,7 @@ absl::string_view TakeWord(absl::string_view* line) {
   return word;
 }
 
-// The lines of a text, those that end in a backslash joined to their next.
+// The lines of a text. A line that ends in a backslash is joined to the next.
 class Lines {
  public:
   explicit Lines(absl::string_view text)
@@ -67,7 +67,7 @@ class Lines {
     absl::ConsumePrefix(&text_, "\xef\xbb\xbf");
   }
 
-  // Of the first line that Next returned: its number, from 1 on.
+  // Returns the number, from 1, of the first physical line that Next returned.
   int64_t number() const { return number_; }
 
   bool Next(absl::string_view* line) {
@@ -102,7 +102,7 @@ class Lines {
   int64_t number_ = 1, next_number_ = 1;
 };
 
-// What the library reads as it stands; it takes anything else for 0.
+// Returns whether the library reads the word as a number; it reads everything else as 0.
 bool IsNumber(absl::string_view word) {
   size_t at = 0, digits = 0;
   const auto take_digits = [&] {
@@ -130,17 +130,17 @@ bool IsNumber(absl::string_view word) {
 
 struct Material {
   std::array<double, 3> color = {1, 1, 1};
-  bool has_color = false;  // the file gives one
+  bool has_color = false;  // the file sets it
   std::array<double, 3> emission = {0, 0, 0};
   bool transparent = false;
   std::string picture;  // its name; empty: none
   size_t library = 0;   // the file that names it
   std::array<double, 2> scale = {1, 1}, offset = {0, 0};
   bool clamp = false;
-  std::vector<const char*> left_out;  // kinds of maps
+  std::vector<const char*> left_out;  // kinds of ignored maps
 };
 
-// The options of a map with as many numbers as the library reads.
+// Returns a map statement whose options have as many numbers as the library expects.
 std::string MapWithFullOptions(absl::string_view rest) {
   std::string out;
   while (true) {
@@ -169,7 +169,7 @@ std::string MapWithFullOptions(absl::string_view rest) {
   return absl::StrCat(out, " ", Trim(rest));
 }
 
-// The text of an .mtl file as the library reads it rightly.
+// Returns the text of an .mtl file in the form that the library reads correctly.
 std::string PrepareMtl(absl::string_view text) {
   std::string out;
   Lines lines(text);
@@ -185,7 +185,7 @@ std::string PrepareMtl(absl::string_view text) {
         absl::StrAppend(&out, "spectral 1\n");
         continue;
       }
-      // One number is for all three.
+      // One number applies to all three channels.
       absl::StrAppend(&out, key, " ", r, " ", IsNumber(g) ? g : r, " ", IsNumber(b) ? b : r, "\n");
       if (key == "Kd") absl::StrAppend(&out, "has_Kd 1\n");
     } else if (absl::StartsWith(key, "map_") || key == "bump" || key == "disp" || key == "refl" ||
@@ -234,16 +234,16 @@ Material FromLibrary(const tinyobj::material_t& read) {
 
 // ------------------------------------------------------------------------------------------ statements
 
-// What elements that become one part have in common.
+// What the elements of one part have in common.
 struct Group {
   Kind kind = Kind::kTriangles;
-  uint32_t material = kNone;  // its name's number
+  uint32_t material = kNone;  // the number of its name
   double crease = kCreaseDegrees;
   bool has_coordinates = false, has_normals = false;
   auto operator<=>(const Group&) const = default;
 };
 
-// Of positions, texture coordinates and normals, from 0 on; kNone where there is none.
+// Indices of positions, texture coordinates and normals, from 0; kNone if missing.
 using CornerKey = std::array<uint32_t, 3>;
 
 struct Polygons {
@@ -255,7 +255,7 @@ struct Totals {
   int64_t positions = 0, coordinates = 0, normals = 0;
 };
 
-// Gives the library one statement at a time, so that what it calls back belongs to that statement.
+// Gives the library one statement at a time, so that each callback belongs to that statement.
 class Statements final : public std::streambuf {
  public:
   Statements(const SourceFile& file, const Totals& totals, Model* model)
@@ -296,7 +296,7 @@ class Statements final : public std::streambuf {
   absl::Status status_;
 
   std::vector<Point3> positions_, normals_;
-  std::vector<std::array<float, 3>> colors_;  // as many as positions, or none
+  std::vector<std::array<float, 3>> colors_;  // one per position, or none
   std::vector<std::array<float, 2>> coordinates_;
   bool color_follows_ = false;
   bool has_colors_ = false;
@@ -305,9 +305,10 @@ class Statements final : public std::streambuf {
   Group group_;
   std::map<Group, Polygons> groups_;
   uint64_t corners_ = 0;
-  std::map<std::string, uint32_t> names_;  // of materials that are used
+  std::map<std::string, uint32_t> names_;  // of used materials
   std::map<std::string, Material> materials_;
-  std::vector<const Material*> materials_by_number_;  // of names_; null if no file defines it
+  // By number in names_; null if no file defines it.
+  std::vector<const Material*> materials_by_number_;
   std::vector<SourceFile> libraries_;
   std::map<std::pair<size_t, std::string>, uint32_t> pictures_;
   Triangulator triangulator_;
@@ -375,7 +376,7 @@ void Statements::PreparePosition(absl::string_view rest) {
           "finite decimal numbers are expected");
     }
   }
-  // After x, y and z: a weight, or red, green and blue, perhaps with an opacity.
+  // After x, y and z follows a weight, or red, green and blue, perhaps with an opacity.
   const bool has_color = count == 6 || count == 7;
   absl::StrAppend(&prepared_, "v ", words[0], " ", words[1], " ", words[2], "\n");
   if (has_color) absl::StrAppend(&prepared_, "vn ", words[3], " ", words[4], " ", words[5], "\n");
@@ -383,7 +384,7 @@ void Statements::PreparePosition(absl::string_view rest) {
   color_follows_ = has_color;
 }
 
-// A number that is not one is 0, and the statement is counted as `kind`.
+// A word that is not a number becomes 0, and the statement is counted as `kind`.
 void Statements::PrepareNumbers(absl::string_view key, absl::string_view rest, size_t least,
                                 const char* kind) {
   absl::StrAppend(&prepared_, key);
@@ -398,7 +399,7 @@ void Statements::PrepareNumbers(absl::string_view key, absl::string_view rest, s
   AddLeftOut(kind, bad > 0 ? 1 : 0, model_);
 }
 
-// The library's own check is atoi.
+// The library parses references with atoi, which checks nothing.
 bool Statements::CheckReference(absl::string_view word) {
   absl::string_view left = word;
   for (int part = 0; part < 3; ++part) {
@@ -451,7 +452,7 @@ bool Statements::LoadMaterialFile(const std::string& name) {
   return true;
 }
 
-// One name that may have blanks, or several without.
+// The names are one name that may contain blanks, or several without.
 void Statements::LoadMaterials(absl::string_view names) {
   const bool quoted = names.size() > 2 && names.front() == '"' && names.back() == '"';
   if (quoted) names = names.substr(1, names.size() - 2);
@@ -548,7 +549,7 @@ void Statements::AddColors(const Material* material, const std::vector<CornerKey
   const bool has_material =
       material != nullptr && (material->has_color || !material->picture.empty());
   if (!has_colors_ && !has_material) return;
-  // Some programs write colours of vertices to 255.
+  // Some programs write vertex colours from 0 to 255.
   const double scale = greatest_color_ > 1 ? 255 : 1;
   const std::array<double, 3> base =
       material == nullptr ? std::array<double, 3>{1, 1, 1} : material->color;
@@ -573,7 +574,7 @@ uint32_t Statements::PictureOf(const Material& material) {
   const std::string slashes = absl::StrReplaceAll(material.picture, {{"\\", "/"}});
   absl::StatusOr<SourceFile> picture = ReadOtherFile(library, material.picture);
   if (!picture.ok()) picture = ReadOtherFile(library, slashes);
-  // A path on the computer that wrote the file.
+  // The name may be a path on the computer that wrote the file.
   if (!picture.ok())
     picture = ReadOtherFile(library, std::filesystem::path(slashes).filename().string());
   if (!picture.ok()) {
@@ -594,7 +595,7 @@ bool Statements::AddPicture(const Material& material, const std::vector<CornerKe
   part->texture_coordinates.reserve(keys.size());
   for (const CornerKey& key : keys) {
     const std::array<float, 2>& at = coordinates_[key[1]];
-    // v goes up in OBJ, and down in a model.
+    // v points up in OBJ, and down in a model.
     part->texture_coordinates.push_back(
         {static_cast<float>(at[0] * material.scale[0] + material.offset[0]),
          static_cast<float>(1 - (at[1] * material.scale[1] + material.offset[1]))});
@@ -687,7 +688,7 @@ absl::Status Statements::Build() {
   return absl::OkStatus();
 }
 
-// Counts what references may refer to, which may follow them.
+// Counts the items that references may refer to, because these may follow the references.
 absl::StatusOr<Totals> Count(const SourceFile& file) {
   Totals totals;
   Lines lines(file.bytes);

@@ -27,13 +27,13 @@ static_assert(std::endian::native == std::endian::little, "values are read in pl
 
 struct Field {
   std::string name;
-  uint32_t size = 0;                // of one value
+  uint32_t size = 0;                // of one value, in bytes
   char type = 'F';                  // I, U, F
-  uint32_t count = 1;               // values of each point
-  std::optional<size_t> attribute;  // its first value is this one of a point's attributes
+  uint32_t count = 1;               // values per point
+  std::optional<size_t> attribute;  // index of the point attribute that its first value sets
 };
 
-// What a point has.
+// The values of a point.
 struct PcdPoint {
   PointRow row = {};
   std::vector<double> attributes;
@@ -45,12 +45,12 @@ struct PcdHeader {
   std::vector<Field> fields;
   uint64_t points = 0;
   Data data = Data::kAscii;
-  size_t body = 0;  // where it begins
+  size_t body = 0;  // offset of the points
   uint64_t point_bytes = 0;
 };
 
 constexpr uint64_t kMostPointBytes = 4096;
-constexpr uint64_t kMostExpanded = 100;  // times; LZF makes 264 bytes of 3 at the most
+constexpr uint64_t kMostExpanded = 100;  // a factor; LZF expands 3 bytes to 264 at most
 
 using Words = std::vector<absl::string_view>;
 
@@ -59,7 +59,7 @@ absl::Status Wrong(const SourceFile& file, size_t line, absl::string_view found,
   return FileError(file, absl::StrCat("line ", line, " ", found), expected);
 }
 
-// One line of the header. `done`: it was the last.
+// Reads one line of the header. Sets `done` if it is the last.
 absl::Status TakeLine(const SourceFile& file, size_t line, const Words& words, PcdHeader* out,
                       uint64_t* width, uint64_t* height, bool* done) {
   const absl::string_view key = words[0];
@@ -106,7 +106,7 @@ absl::Status TakeLine(const SourceFile& file, size_t line, const Words& words, P
   if (number != nullptr && (words.size() != 2 || !absl::SimpleAtoi(words[1], number))) {
     return Wrong(file, line, absl::StrCat("has no number for ", key), "one is expected");
   }
-  if (key != "DATA") return absl::OkStatus();  // VERSION, VIEWPOINT and what others may add
+  if (key != "DATA") return absl::OkStatus();  // VERSION, VIEWPOINT and unknown keys
   *done = true;
   const absl::string_view data = words.size() > 1 ? words[1] : "";
   if (data == "ascii") return absl::OkStatus();
@@ -192,7 +192,7 @@ void SetNumber(const Field& field, double value, PcdPoint* point) {
     point->row[static_cast<size_t>(*column)] = value;
 }
 
-// What becomes of a field's first value.
+// Stores a field's first value in the point.
 void Take(const Field& field, const char* at, PcdPoint* point) {
   if (IsPacked(field)) {
     uint32_t word;
@@ -203,7 +203,8 @@ void Take(const Field& field, const char* at, PcdPoint* point) {
   }
 }
 
-// A word of ascii data: a packed colour may be the float that its bits are, or a whole number.
+// Stores a word of ascii data. A packed colour may be written as the float with the same bits, or
+// as an integer.
 bool TakeWord(const Field& field, absl::string_view word, PcdPoint* point) {
   double value = 0;
   if (word == "nan" || word == "NaN" || word == "-nan") {
@@ -213,8 +214,8 @@ bool TakeWord(const Field& field, absl::string_view word, PcdPoint* point) {
     if (read.ec != std::errc() || read.ptr != word.data() + word.size()) return false;
   }
   if (IsPacked(field)) {
-    // With its alpha the word of most colours is negative as a signed number, and not a number as a float: then the text does not
-    // say which colour it is.
+    // With its alpha, the word of most colours is negative as a signed integer and not a number as
+    // a float: then the text does not determine the colour.
     const bool unknown = std::isnan(value) || value < INT32_MIN || value > UINT32_MAX;
     SetPacked(field.type == 'F' && !std::isnan(value)
                   ? std::bit_cast<uint32_t>(static_cast<float>(value))
@@ -267,7 +268,7 @@ absl::Status ReadAscii(const SourceFile& file, const PcdHeader& header, TakePoin
   return absl::OkStatus();
 }
 
-// Points one after another, or field after field (`by_field`), as the compressed data have them.
+// Reads points one after another, or field after field (`by_field`), as compressed data store them.
 absl::Status ReadBinary(const SourceFile& file, const PcdHeader& header, absl::string_view bytes,
                         bool by_field, TakePoint take) {
   if (bytes.size() < header.points * header.point_bytes) {
@@ -278,7 +279,7 @@ absl::Status ReadBinary(const SourceFile& file, const PcdHeader& header, absl::s
   }
   PcdPoint point = EmptyPoint(header);
   for (uint64_t i = 0; i < header.points; ++i) {
-    uint64_t before = 0;  // bytes of the fields before
+    uint64_t before = 0;  // bytes of the fields before it
     for (const Field& field : header.fields) {
       const uint64_t bytes_of_field = uint64_t{field.size} * field.count;
       const uint64_t at =
@@ -320,7 +321,7 @@ absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file, bool attributes) {
   absl::StatusOr<PcdHeader> header = ReadPcdHeader(file);
   if (!header.ok()) return header.status();
   std::array<bool, kPointColumns> has = {};
-  bool floats = false, wide = false;  // colours whose scale depends on their greatest value
+  bool floats = false, wide = false;  // colours whose scale depends on their maximum
   std::vector<std::string> names;
   uint64_t others = 0;
   for (Field& field : header->fields) {

@@ -1,4 +1,4 @@
-// Nothing but samples.
+// Reads files that contain only samples.
 #include <utility>
 
 #include "absl/strings/str_cat.h"

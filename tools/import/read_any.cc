@@ -144,7 +144,7 @@ constexpr Format kAssimpFormats = {
     "as glTF; NURBS, splines, morph targets outside animations",
     "assimp-testmodels: 248 of 313 (others are damaged, or game formats)"};
 
-// ".nii.gz" and ".pdb.gz" are what they are without ".gz".
+// ".nii.gz" and ".pdb.gz" are treated as if they had no ".gz".
 std::string ExtensionWithoutGz(const SourceFile& file) {
   return file.extension == "gz" ? ExtensionOf(file.path.substr(0, file.path.size() - 3))
                                 : file.extension;
@@ -165,7 +165,7 @@ absl::StatusOr<Model> ReadAny(const SourceFile& file, const ImportOptions& optio
   for (const Reader& reader : Readers()) {
     if (HasExtension(reader.format, extension)) return reader.read(file, options);
   }
-  // Slices often have no extension, or what looks like one.
+  // Slices often have no extension, or a name that seems to end in one.
   if (LooksLikeDicom(file)) return ReadDicomVolume(file);
   if (AssimpReads(file.extension)) return ReadMesh(file);
   return FileError(

@@ -15,15 +15,15 @@
 
 namespace voxeld::voxelctl {
 
-// Reads a file in this process: DICOM also by its contents, the others by their extension, those that voxelctl reads itself too.
-// Does not check the model (see CheckModel).
+// Reads a file in this process. DICOM is also recognised by its contents; other formats, including
+// those that voxelctl reads itself, by their extension. Does not check the model (see CheckModel).
 // Errors: InvalidArgument for an unknown extension; the message lists the known ones.
 absl::StatusOr<Model> ReadAny(const SourceFile& file, const ImportOptions& options);
 
-// All formats that are read, also those that voxelctl reads itself.
+// Returns all formats that can be read, including those that voxelctl reads itself.
 std::vector<Format> AllFormats();
 
-// Reads a folder, which is taken for slices of DICOM.
+// Reads a folder, whose files are taken as slices of DICOM.
 absl::StatusOr<Model> ReadFolder(const std::string& path);
 
 // Opens an animation in this process (OpenAnimation in tools/voxelctl/import/import_program.h).

@@ -29,18 +29,18 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr size_t kMostBytes = 64 << 20;
-constexpr double kDotsPerInch = 96;     // as CSS has it
-constexpr double kLargest = 1e15;       // further out nothing is told apart
-constexpr int kMostFontsTried = 16;     // to find one that can be read
-constexpr uint32_t kInk = 64;           // of the brightest channel: less than that is dark
-constexpr uint32_t kPaper = 240;        // of the darkest channel: at least that is white
-constexpr uint32_t kLeastInk = 64;      // of 255: how opaque ink on a sheet is at least
-constexpr uint32_t kFinePixels = 1024;  // along the longer side, about, of what librsvg draws
-constexpr uint32_t kMostFine = 8;       // of them along each pixel
-constexpr double kMostLift = 8;         // of thin strokes
-constexpr uint64_t kFew = 100;          // one of so many is too few to speak of
+constexpr double kDotsPerInch = 96;     // as in CSS
+constexpr double kLargest = 1e15;       // coordinates beyond it lose too much precision
+constexpr int kMostFontsTried = 16;     // to find a readable one
+constexpr uint32_t kInk = 64;           // a brightest channel below this is dark
+constexpr uint32_t kPaper = 240;        // a darkest channel from this on is white
+constexpr uint32_t kLeastInk = 64;      // of 255: minimum opacity of ink on a sheet
+constexpr uint32_t kFinePixels = 1024;  // approximate longer side of what librsvg draws
+constexpr uint32_t kMostFine = 8;       // of them along each result pixel
+constexpr double kMostLift = 8;         // maximum brightening of thin strokes
+constexpr uint64_t kFew = 100;          // one in this many is too few to mention
 
-// librsvg has no switch for them; a style sheet of the user's with !important comes before all others.
+// librsvg has no switch for these; a user style sheet with !important overrides all others.
 constexpr absl::string_view kWithoutFilters = "* { filter: none !important; }";
 constexpr absl::string_view kWithoutTexts = "text { display: none !important; }";
 
@@ -59,7 +59,7 @@ using Handle = std::unique_ptr<RsvgHandle, Unref>;
 // The part of the drawing that is shown, in its own units.
 struct Page {
   double x = 0, y = 0, width = 0, height = 0;
-  bool has_size = true;  // otherwise it is a part of an endless drawing
+  bool has_size = true;  // otherwise it is a part of an unbounded drawing
 };
 
 // Premultiplied, row by row from the top.
@@ -71,7 +71,8 @@ struct Picture {
   std::vector<Pixel> pixels;
 };
 
-// Pango finds and loads fonts on threads of its own, and ends the process if it cannot start one.
+// Pango finds and loads fonts on threads of its own, and terminates the process if it cannot start
+// one.
 bool CanStartThreads() {
   pthread_t thread;
   if (::pthread_create(
@@ -95,7 +96,8 @@ bool HasReadableFont() {
   return false;
 }
 
-// Returns: the place behind "<svg" in well-formed XML, where attributes may be put; npos if it is not found.
+// Returns: the place after "<svg" in well-formed XML, where attributes may be inserted; npos if it
+// is not found.
 size_t EndOfRootName(absl::string_view xml) {
   const auto skip = [xml](size_t at, absl::string_view end) {
     const size_t found = xml.find(end, at);
@@ -197,7 +199,7 @@ class Drawing {
 
   absl::Status Load(absl::string_view xml, absl::string_view style) {
     GError* error = nullptr;
-    // Without a base URI librsvg opens no other file.
+    // Without a base URI, librsvg opens no other file.
     handle_.reset(
         rsvg_handle_new_from_data(reinterpret_cast<const guint8*>(xml.data()), xml.size(), &error));
     if (handle_ == nullptr) return Refused(error);
@@ -218,7 +220,8 @@ class Drawing {
                                          &has_view_box, &box);
     if (rsvg_handle_get_intrinsic_size_in_pixels(handle_.get(), &page.width, &page.height) ==
         FALSE) {
-      // It is as large as the page around it, which has no size here: the shape is that of the view box, else of what is drawn.
+      // The drawing takes the size of the page around it, and there is none here. So its shape is
+      // that of the view box, or otherwise of its ink.
       page.width = box.width;
       page.height = box.height;
       if (has_view_box == FALSE) {
@@ -234,7 +237,7 @@ class Drawing {
                      absl::StrCat("both must be positive, and at most ", kLargest));
   }
 
-  // What is drawn of an endless drawing.
+  // Returns the part of an unbounded drawing that has ink.
   absl::StatusOr<Page> FindInk() const {
     GError* error = nullptr;
     const RsvgRectangle viewport = {0, 0, kDrawingPixels, kDrawingPixels};
@@ -242,14 +245,15 @@ class Drawing {
     if (rsvg_handle_get_geometry_for_layer(handle_.get(), nullptr, &viewport, &ink, &logical,
                                            &error) == FALSE)
       return Refused(error);
-    // What has no area is still there.
+    // Ink without an area is still shown.
     const double least = std::max(ink.width, ink.height) / kMostDrawingPixels;
     if (least == 0) return Empty();
     return Page{ink.x, ink.y, std::max(ink.width, least), std::max(ink.height, least), false};
   }
 
-  // Loads the drawing again, with a view box that holds what is drawn: without one librsvg cuts off what is half opaque outside its
-  // viewport. Leaves it alone where lengths are shares of the viewport, which the view box would change.
+  // Loads the drawing again with a view box around its ink: without one, librsvg clips
+  // half-transparent parts outside its viewport. Does nothing if lengths are percentages of the
+  // viewport, because the view box would change them.
   void SetViewBox(absl::string_view xml, absl::string_view style, Page* page) {
     const size_t at = EndOfRootName(xml);
     if (page->has_size || at == absl::string_view::npos || absl::StrContains(xml, '%')) return;
@@ -263,7 +267,7 @@ class Drawing {
     }
   }
 
-  // Pixels of the rendered picture along a pixel of the result.
+  // Returns how many pixels of the rendered picture there are along one result pixel.
   uint32_t Fine() const {
     return std::clamp(kFinePixels / std::max(across_, up_), uint32_t{1}, kMostFine);
   }
@@ -310,20 +314,21 @@ class Drawing {
     return picture;
   }
 
-  // Channels are rounded after they were multiplied by alpha.
+  // Channels were rounded after the multiplication by alpha.
   static bool IsDark(const Pixel& p) {
     const uint32_t brightest = std::max({p.r, p.g, p.b, uint8_t{1}}) - 1u;
     return p.alpha > 0 && brightest * 255 < kInk * p.alpha;
   }
 
-  // The least opaque paint that gives this colour on a white sheet.
+  // Returns the least opaque paint that gives this colour on a white sheet.
   static Pixel InkOf(const Pixel& p) {
     const uint8_t white = std::min({p.r, p.g, p.b});
     const auto less = [white](uint8_t channel) { return static_cast<uint8_t>(channel - white); };
     return {less(p.r), less(p.g), less(p.b), static_cast<uint8_t>(255 - white)};
   }
 
-  // Whether white paper, most of which is empty, lies behind all that is drawn, and something on it is dark.
+  // Returns whether a mostly empty white sheet is behind everything that is drawn, with something
+  // dark on it.
   static bool HasSheet(const Picture& picture) {
     uint32_t left = picture.width, right = 0, top = picture.height, bottom = 0;
     for (uint32_t y = 0; y < picture.height; ++y) {
@@ -335,7 +340,7 @@ class Drawing {
     }
     uint64_t all = 0, white = 0;
     bool has_ink = false;
-    // The outermost ones may be covered in part.
+    // The outermost pixels may be partly covered.
     for (uint32_t y = top + 1; y < bottom; ++y) {
       for (uint32_t x = left + 1; x < right; ++x) {
         const Pixel& p = picture.pixels[size_t{y} * picture.width + x];
@@ -349,7 +354,8 @@ class Drawing {
     return has_ink && white > all / 2;
   }
 
-  // A display cannot show black. Returns: what people should know of it; usually empty.
+  // A display cannot show black, so dark ink becomes light. Returns: a note for people about this;
+  // usually empty.
   static std::string ShowInLight(Picture* picture) {
     uint64_t painted = 0, dark = 0;
     for (const Pixel& p : picture->pixels) {
@@ -359,7 +365,7 @@ class Drawing {
     const bool all_dark = (painted - dark) * kFew <= painted;
     if (all_dark || HasSheet(*picture)) {
       for (Pixel& p : picture->pixels) {
-        // The edge of a sheet, which is covered in part, is white as well.
+        // The edge of a sheet, which is partly covered, is white too.
         if (!all_dark) p = p.alpha < 255 ? Pixel() : InkOf(p);
         if (IsDark(p)) p = {p.alpha, p.alpha, p.alpha, p.alpha};
       }
@@ -372,13 +378,13 @@ class Drawing {
                            100.0 * static_cast<double>(dark) / static_cast<double>(painted));
   }
 
-  // Means of `fine` by `fine` pixels. What is thinner than a pixel of the result, so that no pixel beside it is covered as a whole, is
-  // made as bright as if it covered one.
+  // Averages blocks of `fine` by `fine` pixels. Strokes so thin that no pixel beside them is fully
+  // covered are made as bright as if they covered one result pixel.
   static Picture Reduced(const Picture& from, uint32_t fine) {
     Picture picture;
     picture.width = from.width / fine;
     picture.height = from.height / fine;
-    std::vector<float> covered;  // share of each pixel
+    std::vector<float> covered;  // covered share of each pixel
     covered.reserve(size_t{picture.width} * picture.height);
     for (uint32_t y = 0; y < picture.height; ++y) {
       for (uint32_t x = 0; x < picture.width; ++x) {
@@ -444,7 +450,8 @@ class Drawing {
 bool IsDrawing(absl::string_view extension) { return extension == "svg" || extension == "svgz"; }
 
 std::vector<std::string> PrepareDrawings() {
-  // gdk-pixbuf has PNG and JPEG built in. For other pictures it would load plug-ins from the folder that this list names.
+  // gdk-pixbuf has PNG and JPEG built in. For other pictures it would load plug-ins from the folder
+  // that this list names.
   ::setenv("GDK_PIXBUF_MODULE_FILE", "/dev/null", 1);
   std::vector<std::string> folders;
   FcStrList* list = FcInit() == FcFalse ? nullptr : FcConfigGetFontDirs(nullptr);

@@ -27,21 +27,22 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// librsvg draws recursively: 8 MiB of stack are enough for about 1200 elements within each other.
+// librsvg draws recursively: 8 MiB of stack suffice for about 1200 nested elements.
 constexpr uint32_t kMostDepth = 200;
 constexpr int kMostBrackets = 100;  // in style sheets
 constexpr size_t kMostElements = 1'000'000;
-// Work, in bytes that are parsed or drawn: again wherever they are used, so that the file's size does not bound it.
+// The work of a drawing in bytes that are parsed or drawn. Elements count each time they are used,
+// so the file's size does not limit the work.
 constexpr double kBytesOfAnElement = 128, kBytesOfAVertex = 4;
 constexpr double kMostWork = kMostElements * kBytesOfAnElement + (128 << 20);
-constexpr size_t kMostTextBytes = 2000;      // librsvg needs minutes for long ones
-constexpr double kMostFontPixels = 500'000;  // librsvg ends the process at two million
+constexpr size_t kMostTextBytes = 2000;      // librsvg needs minutes for longer ones
+constexpr double kMostFontPixels = 500'000;  // librsvg terminates the process at two million
 constexpr size_t kMostKinds = 20;            // of unknown elements that are named
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 
 constexpr absl::string_view kSvgNamespace = "http://www.w3.org/2000/svg";
 
-// Elements that librsvg draws, that serve those, or that are not to be seen.
+// Elements that librsvg draws, elements that those use, and elements that are invisible.
 constexpr absl::string_view kKnown =
     " a circle clipPath color-profile cursor defs desc ellipse filter font-face g glyph hkern "
     "image "
@@ -71,7 +72,7 @@ bool IsKnown(absl::string_view name) {
   return absl::StartsWith(name, "fe") || absl::StrContains(kKnown, absl::StrCat(" ", name, " "));
 }
 
-// Returns: why librsvg does not draw this picture, as a kind of what is left out; empty if it does.
+// Returns: why librsvg does not draw this picture, as a kind of left-out content; empty if it does.
 absl::string_view PictureFault(absl::string_view href) {
   href = absl::StripLeadingAsciiWhitespace(href);
   if (href.empty()) return "";
@@ -91,7 +92,7 @@ absl::string_view PictureFault(absl::string_view href) {
   return is_good ? "" : "damaged pictures";
 }
 
-// Whether these are pairs of numbers. librsvg does not draw shapes that have others.
+// Returns whether these are pairs of numbers. librsvg does not draw shapes with other points.
 bool ArePoints(absl::string_view text) {
   size_t numbers = 0;
   const char* const whitespace = " \t\r\n\f";
@@ -102,7 +103,7 @@ bool ArePoints(absl::string_view text) {
       if (text.empty()) return false;
     }
     if (text.empty()) return numbers % 2 == 0;
-    // A sign, digits with at most one point among them, and an exponent.
+    // A number is a sign, digits with at most one point among them, and an exponent.
     size_t end = text[0] == '-' || text[0] == '+' ? 1 : 0, digits = 0;
     bool point = false;
     for (; end < text.size() && (absl::ascii_isdigit(text[end]) || (text[end] == '.' && !point));
@@ -123,10 +124,10 @@ bool ArePoints(absl::string_view text) {
   }
 }
 
-// The greatest sizes of fonts that a text asks for.
+// The largest font sizes that a text uses.
 struct FontSizes {
-  double pixels = 64;  // of those in units of length, and by name
-  double times = 1;    // of those that multiply the size of the element around
+  double pixels = 64;  // of sizes in units of length, and by name
+  double times = 1;    // of sizes relative to the element around
 
   void AddValue(absl::string_view text) {
     // The size is among other words of "font".
@@ -153,7 +154,7 @@ struct FontSizes {
     }
   }
 
-  // Declarations of a style.
+  // Adds the declarations of a style.
   void AddStyle(absl::string_view style) {
     for (size_t at = style.find("font"); at != absl::string_view::npos;
          at = style.find("font", at + 4)) {
@@ -164,11 +165,11 @@ struct FontSizes {
     }
   }
 
-  // Of elements that are so deep within each other.
+  // Returns the largest size at that nesting depth.
   double Greatest(uint32_t depth) const { return pixels * std::pow(times, depth); }
 };
 
-// Calls `visit` with each id that stands in url(#…) in `text`.
+// Calls `visit` with each id in url(#…) in `text`.
 template <typename Visit>
 void ForEachUrl(absl::string_view text, Visit visit) {
   for (size_t at = text.find("url("); at != absl::string_view::npos; at = text.find("url(", at)) {
@@ -182,7 +183,7 @@ void ForEachUrl(absl::string_view text, Visit visit) {
   }
 }
 
-// Whether rules for this medium are not for a display that is as bright as others.
+// Returns whether rules for this medium do not apply to a normal screen.
 bool IsOtherMedium(absl::string_view medium) {
   return medium == "print" || medium == "speech" ||
          absl::StrContains(medium, "prefers-color-scheme: dark") ||
@@ -230,7 +231,7 @@ class Scanner {
       return absl::ResourceExhaustedError(absl::StrCat(file_.path, ": no memory"));
     *context->sax = handler;
     context->_private = this;
-    // Entities outside the file are not loaded without XML_PARSE_NOENT and XML_PARSE_DTDLOAD.
+    // External entities are not loaded without XML_PARSE_NOENT and XML_PARSE_DTDLOAD.
     xmlDoc* document =
         xmlCtxtReadMemory(context.get(), xml.data(), static_cast<int>(xml.size()), nullptr, nullptr,
                           XML_PARSE_NONET | XML_PARSE_NOERROR | XML_PARSE_NOWARNING);
@@ -259,18 +260,18 @@ class Scanner {
   struct Element {
     uint32_t parent = kNone, first_child = kNone, next_sibling = kNone;
     uint32_t first_use = 0, uses = 0;  // in uses_
-    bool is_target = false;            // is drawn where url(#…) names it
-    bool is_marker = false;            // at each vertex
-    // Of all that is drawn with it.
+    bool is_target = false;            // url(#…) draws it where it is named
+    bool is_marker = false;            // drawn at each vertex
+    // The totals including everything that is drawn with it.
     uint32_t depth = 0;
     double work = 0;
-    double bytes = 0;  // of its path data or points
+    double bytes = 0;  // size of its path data or points
     int line = 0;
   };
   struct Use {
     std::string id;
     bool by_url = false;
-    bool by_vertex = false;  // if it is a marker
+    bool by_vertex = false;  // as a marker
   };
 
   static Scanner* Of(void* context) {
@@ -303,7 +304,7 @@ class Scanner {
     unknown_.emplace_back(EscapeForTerminal(name.substr(0, 60)), 1);
   }
 
-  // Elements in entities would be drawn without having been seen here.
+  // Elements in entities would be drawn without being checked here.
   void Entity(void* context, absl::string_view name, absl::string_view content) {
     if (!absl::StrContains(content, '<')) return;
     Fail(context, FileError(file_,
@@ -372,7 +373,7 @@ class Scanner {
         uses_.push_back({std::string(id), true, by_vertex});
       });
     }
-    // What is within an element that is left out goes with it.
+    // The contents of a left-out element are left out too.
     if (left_out_depth_ > 0) {
       ++left_out_depth_;
       return;
@@ -404,7 +405,7 @@ class Scanner {
     } else {
       for (const NamedKind& kind : kLeftOut) {
         if (kind.element != name) continue;
-        // No program draws what asks for extensions, such as the data of Adobe Illustrator.
+        // No program draws elements that require extensions, such as the data of Adobe Illustrator.
         if (!needs_extension) Count(kind.kind);
         left_out_depth_ = 1;
         return;
@@ -480,7 +481,7 @@ class Scanner {
                      absl::StrCat("at most ", kMostDepth, " deep are read"));
   }
 
-  // Finds depth and work of every element with what it uses, without recursion.
+  // Computes depth and work of every element with everything it uses, without recursion.
   absl::Status CheckWork() {
     if (brackets_ > kMostBrackets) {
       return FileError(file_, absl::StrCat("has a style with brackets ", brackets_, " deep"),
@@ -539,7 +540,7 @@ class Scanner {
         stack.pop_back();
       }
     }
-    // Whatever a style sheet names may be drawn within anything, though not within itself.
+    // Elements that a style sheet names may be drawn within any element, except within themselves.
     uint64_t depth = elements_[0].depth;
     for (const std::string& id : style_targets_) {
       const auto found = ids_.find(id);
@@ -568,7 +569,7 @@ class Scanner {
   bool in_style_ = false;
   FontSizes fonts_;
   uint32_t open_text_ = kNone;
-  size_t text_bytes_ = 0, longest_text_ = 0;  // of the text that is open, and of all
+  size_t text_bytes_ = 0, longest_text_ = 0;  // of the open text, and of the longest
   std::string style_;
 };
 

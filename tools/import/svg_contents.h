@@ -1,4 +1,4 @@
-// What an SVG file contains, before librsvg draws it.
+// Examines an SVG file's contents before librsvg draws it.
 #pragma once
 
 #include <cstdint>
@@ -15,12 +15,12 @@ namespace voxeld::voxelctl {
 struct SvgContents {
   std::vector<LeftOut> left_out;  // elements and rules that librsvg ignores
   uint64_t texts = 0;
-  bool can_draw_texts = true;  // by librsvg, which some large sizes and long texts would end
+  bool can_draw_texts = true;  // false if librsvg would fail on large sizes or long texts
 };
 
-// Parses `xml`, the text of `file`, without loading anything that it names.
-// Errors: InvalidArgument: it is not well-formed, has another root than <svg>, or its elements are within each other, or use each
-// other, so deep or so often that drawing them would need too much stack or time.
+// Parses `xml`, the text of `file`, without loading anything that it names. Errors: InvalidArgument
+// if it is not well-formed, if its root is not <svg>, or if its elements nest or use each other so
+// deep or so often that drawing them would need too much stack or time.
 absl::StatusOr<SvgContents> ScanSvg(const SourceFile& file, absl::string_view xml);
 
 }  // namespace voxeld::voxelctl

@@ -25,7 +25,8 @@ constexpr uint32_t kNoNumber = UINT32_MAX;
 
 constexpr uint64_t kMostEntryBytes = uint64_t{512} << 20;
 
-// The entries of a ZIP archive, by its central directory. assimp has a reader of archives but does not export it.
+// The entries of a ZIP archive, by its central directory. assimp has a reader for archives but does
+// not export it.
 class Archive {
  public:
   explicit Archive(const SourceFile& file) : file_(file) {
@@ -45,7 +46,7 @@ class Archive {
 
   const std::map<std::string, size_t>& entries() const { return entries_; }
 
-  // Empty if there is no such entry, or if it is damaged.
+  // Returns an empty string if the entry is missing or damaged.
   std::string Read(const std::string& name) const {
     const auto entry = entries_.find(name);
     if (entry == entries_.end()) return {};
@@ -72,10 +73,10 @@ class Archive {
   }
 
   const SourceFile& file_;
-  std::map<std::string, size_t> entries_;  // where in the directory
+  std::map<std::string, size_t> entries_;  // offset in the directory
 };
 
-// Attributes of the element at which a reader is.
+// Attributes of a reader's current element.
 class Attributes {
  public:
   explicit Attributes(xmlTextReader* reader) : reader_(reader) {}
@@ -88,7 +89,7 @@ class Attributes {
     xmlFree(value);
     return text;
   }
-  // kNoNumber if it is not there or not a number.
+  // Returns kNoNumber if it is missing or not a number.
   uint32_t Number(const char* name) const {
     uint32_t number = 0;
     return absl::SimpleAtoi(Text(name), &number) ? number : kNoNumber;
@@ -102,7 +103,7 @@ class Attributes {
   xmlTextReader* const reader_;
 };
 
-// "#RRGGBB" or "#RRGGBBAA"; white for what is neither.
+// Parses "#RRGGBB" or "#RRGGBBAA"; returns white for anything else.
 Rgb ColorOf(absl::string_view text, bool* transparent) {
   uint32_t value = 0;
   if (!absl::ConsumePrefix(&text, "#") || (text.size() != 6 && text.size() != 8) ||
@@ -183,7 +184,7 @@ void ThreeMfColors::ReadModel(const std::string& text,
         group->colors.push_back(
             ColorOf(at.Text(name == "base" ? "displaycolor" : "color"), &transparent));
     } else if (name == "tex2coord") {
-      // v goes up in 3MF, and down in a model.
+      // v points up in 3MF, and down in a model.
       if (group != nullptr) group->coordinates.push_back({at.Real("u"), 1 - at.Real("v")});
     } else if (name == "texture2d") {
       Group& texture = textures_[at.Number("id")];
@@ -228,7 +229,7 @@ std::vector<Part> ThreeMfColors::Paint(const std::string& name, Part part, Model
     return parts;
   }
   const Object& object = found->second;
-  // By the group whose picture they have; without one by whether they have colours.
+  // Keyed by the group whose picture they have; without a picture, by whether they have colours.
   struct Painted {
     Part part;
     const Group* group = nullptr;
@@ -255,7 +256,7 @@ std::vector<Part> ThreeMfColors::Paint(const std::string& name, Part part, Model
       const uint32_t entry = has_picture || has_colors
                                  ? property.entries[group->one_a_triangle && !has_picture ? 0 : c]
                                  : 0;
-      // Colours of several groups meet in one part.
+      // One part may have colours of several groups.
       const Rgb color = has_colors && !has_picture ? group->colors[entry] : Rgb{255, 255, 255};
       const uint32_t packed =
           has_picture ? entry

@@ -1,4 +1,5 @@
-// Colours and textures of 3MF, which assimp reads for a whole object at most, and of one kind.
+// Reads colours and textures of 3MF. assimp reads them only for a whole object, and only of one
+// kind.
 #pragma once
 
 #include <array>
@@ -16,23 +17,25 @@ namespace voxeld::voxelctl {
 
 class ThreeMfColors {
  public:
-  // Reads base materials, colour groups and texture groups of the archive's model with libxml2, and its pictures into `model`. Counts there what
-  // is not shown: composite materials, layers, lattices of beams, slices, objects in other models of the archive. What is damaged has
-  // no colour: assimp reports it.
+  // Reads base materials, colour groups and texture groups of the archive's model with libxml2, and
+  // its pictures into `model`. Counts there what is not shown: composite materials, layers, beam
+  // lattices, slices, and objects in other models of the archive. Damaged groups have no colour:
+  // assimp reports the damage.
   ThreeMfColors(const SourceFile& file, Model* model);
 
-  // Cuts `part`, which has the triangles of an object in the file's order and no colours, into parts with the object's colours.
+  // Splits `part`, which has an object's triangles in the file's order and no colours, into parts
+  // with the object's colours.
   std::vector<Part> Paint(const std::string& object, Part part, Model* model) const;
 
  private:
   struct Group {
-    std::vector<Rgb> colors;                        // of base materials and colour groups
-    bool one_a_triangle = false;                    // base materials
-    std::vector<std::array<float, 2>> coordinates;  // of texture groups
+    std::vector<Rgb> colors;                        // for base materials and colour groups
+    bool one_a_triangle = false;                    // for base materials
+    std::vector<std::array<float, 2>> coordinates;  // for texture groups
     uint32_t picture = kNoPicture;
     Wrap wrap_u = Wrap::kRepeat, wrap_v = Wrap::kRepeat;
   };
-  // A group's number and an entry for each corner.
+  // A group's number, and an entry for each corner.
   struct Property {
     uint32_t group = UINT32_MAX;
     std::array<uint32_t, 3> entries = {};
@@ -48,7 +51,7 @@ class ThreeMfColors {
 
   std::map<uint32_t, Group> groups_;
   std::map<std::string, Object> objects_;
-  std::map<uint32_t, Group> textures_;  // picture and rules
+  std::map<uint32_t, Group> textures_;  // pictures and their rules
 };
 
 }  // namespace voxeld::voxelctl

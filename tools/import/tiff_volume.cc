@@ -1,4 +1,4 @@
-// TIFF: pages in a stack, by libtiff, which reads them from memory.
+// Reads TIFF: pages in a stack, with libtiff, which reads them from memory.
 #include <tiffio.h>
 
 #include <algorithm>
@@ -28,10 +28,11 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr size_t kMostPages = 65'536;
-constexpr tmsize_t kMostAtOnce = tmsize_t{1} << 30;  // bytes that the library may allocate at once
+// Limit of one allocation by the library, in bytes.
+constexpr tmsize_t kMostAtOnce = tmsize_t{1} << 30;
 constexpr uint32_t kReducedOrMask = FILETYPE_REDUCEDIMAGE | FILETYPE_MASK;
 
-// The file in memory, as the library wants it: a place, and what went wrong last.
+// The file in memory as the library needs it: a position, and the latest error.
 struct Source {
   absl::string_view bytes;
   uint64_t at = 0;
@@ -61,14 +62,14 @@ toff_t Seek(thandle_t handle, toff_t offset, int whence) {
 int CloseNothing(thandle_t) { return 0; }
 toff_t SizeOf(thandle_t handle) { return SourceOf(handle).bytes.size(); }
 int Map(thandle_t handle, void** base, toff_t* size) {
-  // The library does not write there: the file is open to read alone.
+  // The library does not write there: the file is opened for reading only.
   *base = const_cast<char*>(SourceOf(handle).bytes.data());
   *size = SourceOf(handle).bytes.size();
   return 1;
 }
 void Unmap(thandle_t, void*, toff_t) {}
 
-// Keeps the first error, which is the cause of the others.
+// Keeps the first error, which causes the others.
 int KeepError(TIFF*, void* source, const char*, const char* format, va_list values) {
   std::string& error = static_cast<Source*>(source)->error;
   if (!error.empty()) return 1;
@@ -83,7 +84,7 @@ struct CloseTiff {
   void operator()(TIFF* tiff) const { TIFFClose(tiff); }
 };
 
-// Pages of one stack are alike in these.
+// Pages of one stack have these properties in common.
 struct PageKind {
   uint32_t width = 0, height = 0;
   uint16_t channels = 1, bits = 1, format = SAMPLEFORMAT_UINT, photometric = PHOTOMETRIC_MINISBLACK;
@@ -91,10 +92,11 @@ struct PageKind {
   auto operator<=>(const PageKind&) const = default;
 };
 
-// The meaning of the pages, by a description: their numbers, the order in which they change, and the lengths of a sample.
+// The meaning of the pages, from a description: their counts, the order in which they change, and
+// the lengths of a sample.
 struct Description {
-  uint64_t slices = 0, channels = 1, times = 1;  // 0 slices: nothing is known of the pages
-  std::string order = "CZT";                     // the first changes from page to page
+  uint64_t slices = 0, channels = 1, times = 1;  // 0 slices: the layout is unknown
+  std::string order = "CZT";                     // the first one changes from page to page
   std::optional<std::array<double, 3>> spacing;
   std::optional<double> depth;  // in the unit of the resolution
   uint64_t images = 0;          // pages that the description counts; 0: it does not
@@ -113,7 +115,7 @@ double LengthOf(absl::string_view text) {
   return absl::SimpleAtod(text, &length) && std::isfinite(length) && length > 0 ? length : 0;
 }
 
-// ImageJ's lines "name=value".
+// Parses ImageJ's lines "name=value".
 Description FromImageJ(absl::string_view text) {
   Description found;
   for (const absl::string_view line : absl::StrSplit(text, '\n')) {
@@ -125,14 +127,14 @@ Description FromImageJ(absl::string_view text) {
                              : field.first == "images"   ? &found.images
                                                          : nullptr;
     if (number != nullptr && (!absl::SimpleAtoi(field.second, number) || *number == 0)) *number = 1;
-    // Some stacks have negative ones.
+    // Some stacks have a negative spacing.
     if (field.first == "spacing") found.depth = LengthOf(absl::StripPrefix(field.second, "-"));
   }
   if (found.slices == 0 && (found.channels > 1 || found.times > 1)) found.slices = 1;
   return found;
 }
 
-// The value of an attribute of the first element "Pixels".
+// Returns the value of an attribute of the first element "Pixels".
 absl::string_view OmeAttribute(absl::string_view pixels, absl::string_view name) {
   const std::string before = absl::StrCat(" ", name, "=\"");
   const size_t at = pixels.find(before);
@@ -256,7 +258,7 @@ class TiffReader {
   }
 
   absl::StatusOr<Model> ReadStack() {
-    // Where the directories of the pages are, by the kind of page.
+    // The kind of each page, and the offset of its directory.
     std::vector<std::pair<PageKind, uint64_t>> pages;
     uint64_t previews = 0;
     do {
@@ -272,7 +274,7 @@ class TiffReader {
         pages.emplace_back(KindOfPage(), TIFFCurrentDirOffset(tiff_));
       }
     } while (TIFFReadDirectory(tiff_) == 1);
-    // The library ends alike at the last page and at one that is damaged.
+    // The library stops in the same way at the last page and at a damaged one.
     if (!source_.error.empty())
       return Undecoded(absl::StrCat("page ", pages.size() + previews + 1));
 
@@ -301,7 +303,8 @@ class TiffReader {
     const bool grey =
         most.photometric == PHOTOMETRIC_MINISBLACK || most.photometric == PHOTOMETRIC_MINISWHITE;
     if (grey) AddLeftOut("further components", most.channels - 1u, &model);
-    // All at once, so that it is not copied while it grows; memory is taken when it is filled.
+    // Reserves everything at once, so that nothing is copied while it grows; memory is only used
+    // when it is filled.
     volume.samples.reserve(size[0] * size[1] * size[2]);
     for (const size_t page : shown) {
       if (!SetPage(pages[page].second)) return Undecoded(absl::StrCat("page ", page + 1));
@@ -385,13 +388,13 @@ class TiffReader {
     if (description.spacing) {
       spacing = *description.spacing;
     } else if (known) {
-      // TIFF has no distance of pages; ImageJ adds one.
+      // TIFF has no distance between pages; ImageJ adds one.
       spacing = {1 / across, 1 / down, 1 / across};
       if (description.depth.value_or(0) > 0) spacing[2] = *description.depth;
     } else if (description.depth.value_or(0) > 0) {
       spacing[2] = *description.depth;
     }
-    // Where columns and rows go, by the first row's and the first column's sides.
+    // The directions of columns and rows, given the sides of the first row and the first column.
     const Point3 right = {1, 0, 0}, left = {-1, 0, 0}, back = {0, 1, 0}, front = {0, -1, 0};
     static constexpr int kOrientations = 8;
     const std::array<std::pair<Point3, Point3>, kOrientations> directions = {{{right, back},
@@ -413,7 +416,7 @@ class TiffReader {
         volume);
   }
 
-  // Colours of any kind: palettes, YCbCr, CMYK and so on.
+  // Reads colours of any kind: palettes, YCbCr, CMYK and so on.
   absl::Status ReadColors(const PageKind& kind, size_t page, SampledVolume* volume) {
     const uint64_t count = uint64_t{kind.width} * kind.height;
     std::array<char, 1024> why = {};
@@ -423,13 +426,13 @@ class TiffReader {
           absl::StrCat("has colours that are not read (", EscapeForTerminal(why.data()), ")"),
           "grey of 1 to 64 bits, and colours of 8 or 16, are read");
     }
-    // Without initialisation: a damaged page takes no memory.
+    // The memory is not initialised, so a damaged page uses none.
     const std::unique_ptr<uint32_t[]> colors = std::make_unique_for_overwrite<uint32_t[]>(count);
     const auto orientation = TagOf<uint16_t>(tiff_, TIFFTAG_ORIENTATION, ORIENTATION_TOPLEFT);
     if (TIFFReadRGBAImageOriented(tiff_, kind.width, kind.height, colors.get(), orientation, 1) !=
         1)
       return Undecoded(absl::StrCat("page ", page + 1));
-    // The library has multiplied them by how opaque they are.
+    // The library has premultiplied the colours by their opacity.
     for (uint64_t i = 0; i < count; ++i) colors[i] |= 0xff000000u;
     DecodeColors({reinterpret_cast<const char*>(colors.get()), count * sizeof(uint32_t)}, 4,
                  volume);
@@ -458,13 +461,13 @@ class TiffReader {
       case 64:
         return is_signed ? SampleType::kI64 : SampleType::kU64;
       default:
-        // Fewer bits than a byte has, or 12, are made 8 or 16.
+        // Bits per sample below 8, and 12, are expanded to 8 or 16.
         if (is_signed || kind.bits == 0 || kind.bits > 16) return std::nullopt;
         return kind.bits < 8 ? SampleType::kU8 : SampleType::kU16;
     }
   }
 
-  // The first channel of `count` pixels in `row`, behind those of `out`.
+  // Appends the first channel of `count` pixels in `row` to `out`.
   static void DecodeRow(const PageKind& kind, const SampleCode& code, size_t channels,
                         absl::string_view row, size_t count, std::vector<float>* out) {
     const size_t whole = SampleBytes(code.type) * 8;
@@ -486,7 +489,7 @@ class TiffReader {
     }
   }
 
-  // Strips are tiles as wide as the page. A row of tiles at a time.
+  // Reads a row of tiles at a time. Strips are tiles as wide as the page.
   absl::Status ReadGrey(const PageKind& kind, size_t page, SampledVolume* volume) {
     const std::optional<SampleType> type = TypeOf(kind);
     if (!type) {
@@ -519,7 +522,7 @@ class TiffReader {
     }
     const uint64_t tile_bytes = row_bytes * high;
     const size_t across = (size_t{kind.width} + wide - 1) / wide;
-    // Without initialisation: a damaged page takes no memory.
+    // The memory is not initialised, so a damaged page uses none.
     const std::unique_ptr<char[]> tile = std::make_unique_for_overwrite<char[]>(tile_bytes);
     std::vector<std::vector<float>> rows;
     for (uint32_t top = 0; top < kind.height; top += std::min(high, kind.height - top)) {

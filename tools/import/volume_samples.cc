@@ -18,10 +18,11 @@ namespace {
 static_assert(std::endian::native == std::endian::little);
 
 constexpr uint64_t kMostAlong = 65536;
-constexpr size_t kColorsAtOnce = 65536;  // whose channels are numbers between
-constexpr double kLeastSlab = 0.05;      // of a volume's greatest length
+constexpr size_t kColorsAtOnce = 65536;  // colours that are converted through numbers at a time
+constexpr double kLeastSlab = 0.05;      // share of a volume's greatest length
 
-// For `more` behind what is there. Grows by its size, since samples come a slice or a row at a time.
+// Reserves space for `more` values. The capacity grows in proportion to the size, because samples
+// come a slice or a row at a time.
 template <typename T>
 void MakeRoom(size_t more, std::vector<T>* values) {
   if (values->capacity() - values->size() >= more) return;
@@ -61,7 +62,7 @@ void Decode(absl::string_view bytes, const SampleCode& code, std::vector<float>*
   out->resize(before + count);
   float* const numbers = out->data() + before;
   const char* const from = bytes.data();
-  // Most files, and most of the time of large ones.
+  // The fast path for most files, which take most of the time if they are large.
   if constexpr (std::is_integral_v<T>) {
     if (!code.big_endian && code.spare_bits == 0 && code.slope == 1 && code.intercept == 0) {
       for (size_t i = 0; i < count; ++i)
@@ -82,7 +83,7 @@ void Decode(absl::string_view bytes, const SampleCode& code, std::vector<float>*
   }
 }
 
-// Of a colour's channel.
+// Returns the maximum of a colour channel of this type.
 double GreatestOf(SampleType type) {
   switch (type) {
     case SampleType::kI8:

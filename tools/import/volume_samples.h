@@ -1,4 +1,4 @@
-// What volumes have in common, whatever file they are from.
+// Functions that the readers of all volume formats share.
 #pragma once
 
 #include <array>
@@ -18,28 +18,31 @@
 
 namespace voxeld::voxelctl {
 
-// Bytes of one.
+// Returns the number of bytes per sample.
 size_t SampleBytes(SampleType type);
 
-// InvalidArgument unless each is 1 to 65536, and together they are kMaxModelSamples at most.
+// Checks that each size is 1 to 65536, and that the product is at most kMaxModelSamples. Errors:
+// InvalidArgument otherwise.
 absl::Status CheckVolumeSize(const SourceFile& file, const std::array<uint64_t, 3>& size);
 
 struct SampleCode {
   SampleType type = SampleType::kU8;
   bool big_endian = false;
-  // High bits of an integer that are no part of the number, such as a DICOM overlay. Less than all of its bits.
+  // The number of high bits of an integer that are not part of the value, such as a DICOM overlay;
+  // less than all of its bits.
   int spare_bits = 0;
-  double slope = 1, intercept = 0;  // a number is `intercept` and `slope` times what is stored
+  double slope = 1, intercept = 0;  // value = `intercept` + `slope` · stored
 };
 
-// As many as `bytes` holds whole, behind those of `out`. What is not finite becomes not a number.
+// Appends all complete samples in `bytes` to `out`. Non-finite values become not-a-number.
 void DecodeSamples(absl::string_view bytes, const SampleCode& code, std::vector<float>* out);
 
-// Colours of 3 bytes each (r g b), or of 4, the last of which says how opaque it is, behind those of `volume`; their brightness (0 to
-// 255, by ITU-R BT.601) as samples.
+// Appends colours of 3 bytes each (r g b), or of 4 with opacity as the last, to `volume`, and their
+// brightness (0 to 255, by ITU-R BT.601) as samples.
 void DecodeColors(absl::string_view bytes, size_t bytes_each, SampledVolume* volume);
 
-// The same for channels of any type, `channels` (3 or 4) for each colour. Integers reach to the greatest of their type, floats to 1.
+// The same for channels of any type, with `channels` (3 or 4) per colour. Full intensity is an
+// integer type's maximum, and 1 for floats.
 void DecodeColors(absl::string_view bytes, const SampleCode& code, size_t channels,
                   SampledVolume* volume);
 
@@ -60,12 +63,13 @@ absl::Status ReadTextSamples(const SourceFile& file, absl::string_view text, uin
 absl::StatusOr<absl::string_view> TakeSamples(const SourceFile& file, absl::string_view all,
                                               uint64_t from, uint64_t count, uint64_t bytes_each);
 
-// Keeps the first of each `each` samples.
+// Keeps the first of every `each` samples.
 void KeepFirstOfEach(size_t each, std::vector<float>* samples);
 
-// Where a volume lies: the centre of its first sample, and from one to the next along each axis. Few layers are made
-// thick enough to be seen, a twentieth of the greatest length together.
-// InvalidArgument if that is not finite, or spans nothing.
+// Places a volume: `first` is the centre of its first sample, and `steps` lead from one sample to
+// the next along each axis. A volume of few layers is made thick enough to be seen: a twentieth of
+// its greatest length in total. Errors: InvalidArgument if the result is not finite or has no
+// extent.
 absl::Status PlaceVolume(const SourceFile& file, const Point3& first,
                          const std::array<Point3, 3>& steps, SampledVolume* volume);
 
