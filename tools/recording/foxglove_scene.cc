@@ -30,7 +30,7 @@ Map MapOf(const v1::Affine& in) {
   return out;
 }
 
-// First b, then a.
+// Returns the map that applies b first and then a.
 Map Compose(const Map& a, const Map& b) {
   Map out;
   for (size_t r = 0; r < 3; ++r) {
@@ -105,7 +105,8 @@ class Drawing {
     out->set_z(m[8] * x + m[9] * y + m[10] * z + m[11]);
   }
 
-  // In single precision, as the server tells what it keeps; nothing if it is told otherwise.
+  // Returns the numbers in single precision, in which the server sends them; nothing for any other
+  // format.
   static std::vector<float> Floats(const v1::Vertices& in) {
     std::vector<float> out;
     if (in.position_type() > v1::ELEMENT_TYPE_F32 ||
@@ -182,7 +183,7 @@ class Drawing {
     SetVertices(in, map, color, tint, out_->add_triangles());
   }
 
-  // A grid of places that closes around in one direction, as triangles.
+  // Draws a grid of places that is closed in one direction, as triangles.
   template <typename Place>
   void DrawGrid(int around, int along, const Map& map, uint32_t color, Place place) {
     foxglove::TriangleListPrimitive* triangles = out_->add_triangles();
@@ -207,7 +208,7 @@ class Drawing {
   }
 
   void DrawBox(const v1::Box& in, const Map& map, uint32_t color) {
-    // Its lower and upper faces are rings that close at their own middles.
+    // The lower and upper faces are rings that close at their own centres.
     DrawGrid(4, 3, map, color, [&](int u, int v) {
       const double rim = v == 0 || v == 3 ? 0 : 0.5;
       const double x = u == 0 || u == 3 ? -rim : rim, y = u < 2 ? -rim : rim;

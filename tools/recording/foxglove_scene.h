@@ -1,11 +1,11 @@
-// A scene for viewers that know foxglove.SceneUpdate: lines, triangles and letters, under the maps of entity
-// and layer, in the scene's own space (frame "voxeld").
+// Converts a scene for viewers that support foxglove.SceneUpdate: lines, triangles and letters,
+// transformed by the maps of entity and layer into the scene's own space (frame "voxeld").
 //
 //   segments, meshes, boxes, spheres, cylinders   as they are, round ones in facets
 //   points                                        short lines along the axes, at most kMostPoints of an entity
 //   instances                                     what their objects draw, to depth 8
 //   text                                          as text that faces the viewer
-//   everything else                               its kind's name, where it stands
+//   everything else                               the name of its kind, at its place
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ namespace voxeld::recording {
 
 inline constexpr int kMostPoints = 5000;
 
-// What changed since the mirror was asked last, over whatever is in `out`.
+// Writes what changed since the previous call into `out`, and replaces its contents.
 void MakeSceneUpdate(SceneMirror& mirror, uint64_t time_ns, foxglove::SceneUpdate* out);
 
 }  // namespace voxeld::recording

@@ -1,14 +1,16 @@
-// MCAP files (https://mcap.dev/spec, version 0): messages with times, on channels that name their schema, in
-// compressed chunks with an index. What is written here other tools open, and the other way round.
+// Reads and writes MCAP files (https://mcap.dev/spec, version 0): messages with times, on channels
+// that name their schema, in compressed chunks with an index. Other tools can open the files that
+// are written here, and the reverse.
 //
 //   magic, Header
-//   Chunk (zstd, CRC of what is in it): Schema and Channel records before their first message, Messages
+//   Chunk (zstd, CRC of the contents): Schema and Channel records before their first message, Messages
 //   MessageIndex for each channel of the chunk, …
-//   DataEnd (CRC of all before)
+//   DataEnd (CRC of everything before it)
 //   summary: Schemas, Channels, Statistics, ChunkIndexes; SummaryOffsets
 //   Footer (CRC of the summary), magic
 //
-// A file that ends early, as when its writer was killed, has all its whole chunks; Reader takes it as it is.
+// A file that ends early, for example because its writer was killed, has all its complete chunks;
+// McapReader accepts it.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +28,7 @@
 namespace voxeld::recording {
 
 struct McapSchema {
-  std::string name, encoding, data;  // "protobuf": a FileDescriptorSet
+  std::string name, encoding, data;  // for "protobuf": a FileDescriptorSet
 };
 
 struct McapChannel {
@@ -45,28 +47,29 @@ struct McapMessage {
 // Not thread-safe.
 class McapWriter {
  public:
-  // A chunk ends with the message that takes it to this size.
+  // A chunk ends with the message that makes it at least this large.
   static constexpr size_t kChunkBytes = 1u << 20;
 
-  // A new file; AlreadyExists if there is one. `library` names the writer.
+  // Creates a new file. `library` names the writer. Errors: AlreadyExists if the file exists.
   static absl::StatusOr<std::unique_ptr<McapWriter>> Create(const std::string& path,
                                                             const std::string& library);
-  // Without Close the file ends after its last whole chunk.
+  // Without Close, the file ends after its last complete chunk.
   ~McapWriter();
   McapWriter(const McapWriter&) = delete;
   McapWriter& operator=(const McapWriter&) = delete;
 
-  // Before the first message on them. Numbers count from 1.
+  // Add a schema or channel. Requires: called before the first message that uses it. Returns: its
+  // number, counted from 1.
   uint16_t AddSchema(McapSchema schema);
   uint16_t AddChannel(McapChannel channel);
 
   absl::Status Write(const McapMessage& message);
-  // Ends the chunk under way, and has the system put all on the disk.
+  // Ends the current chunk, and syncs everything to the disk.
   absl::Status Flush();
-  // Ends the chunk and writes the index. Nothing can be written any more.
+  // Ends the chunk and writes the index. Nothing can be written afterwards.
   absl::Status Close();
 
-  uint64_t bytes() const { return written_; }  // in the file
+  uint64_t bytes() const { return written_; }  // file size so far
   uint64_t messages() const { return messages_; }
 
  private:
@@ -83,7 +86,7 @@ class McapWriter {
   const std::string path_;
   int file_;
   uint64_t written_ = 0;
-  uint32_t crc_ = 0;  // of all so far
+  uint32_t crc_ = 0;  // of everything so far
   std::vector<McapSchema> schemas_;
   std::vector<McapChannel> channels_;
   size_t schemas_written_ = 0, channels_written_ = 0;  // into chunks
@@ -99,38 +102,38 @@ class McapWriter {
 struct McapSummary {
   uint64_t messages = 0, chunks = 0;
   uint64_t start_ns = 0, end_ns = 0;
-  bool whole = false;  // it has its end; else it was cut off
+  bool whole = false;  // the file has an end; otherwise it is truncated
   std::map<uint16_t, McapSchema> schemas;
   std::map<uint16_t, McapChannel> channels;
 };
 
-// Reads front to end, chunk by chunk, so that files of any size and those that were cut off are read alike.
-// Not thread-safe.
+// Reads from front to end, chunk by chunk, so files of any size, including truncated ones, are read
+// in the same way. Not thread-safe.
 class McapReader {
  public:
-  // Greatest chunk, uncompressed: what a file may make a reader hold.
+  // The maximum uncompressed size of a chunk, which limits the memory that a file may require.
   static constexpr uint64_t kMostChunkBytes = uint64_t{4} << 30;
 
-  // NotFound; InvalidArgument for what is no MCAP file.
+  // Opens a file. Errors: NotFound; InvalidArgument if it is not an MCAP file.
   static absl::StatusOr<std::unique_ptr<McapReader>> Open(const std::string& path);
   ~McapReader();
 
-  // What is in it, found by reading it once; then it stands at its beginning again. DataLoss with the place
-  // for a chunk that is damaged.
+  // Reads the file once and returns a summary; then rewinds. Errors: DataLoss with the offset if a
+  // chunk is damaged.
   absl::StatusOr<McapSummary> Summarise();
 
-  // From where it stands, every message in the order of the file, until `each` answers false. DataLoss as
-  // above; a file that was cut off ends where its last whole chunk does.
+  // Calls `each` with every message from the current position on, in the file's order, until it
+  // returns false. A truncated file ends with its last complete chunk. Errors: DataLoss as above.
   absl::Status Read(const std::function<bool(const McapMessage&)>& each);
   void Rewind();
 
-  // Known so far.
+  // Return what is known so far.
   const std::map<uint16_t, McapChannel>& channels() const { return summary_.channels; }
   const std::map<uint16_t, McapSchema>& schemas() const { return summary_.schemas; }
 
  private:
   McapReader(std::string path, int file) : path_(std::move(path)), file_(file) {}
-  // The next record; false at the end of the data, or of what there is of it.
+  // Reads the next record. Returns false at the end of the data, or of the available part of it.
   absl::StatusOr<bool> NextRecord(uint8_t* kind, std::string* content);
   absl::Status ReadChunk(std::string_view content,
                          const std::function<bool(const McapMessage&)>& each, bool* go_on);

@@ -1,4 +1,4 @@
-// MCAP's ways of writing numbers, texts and records.
+// MCAP's encodings of numbers, texts and records.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ enum McapRecord : uint8_t {
   kDataEnd = 0x0F,
 };
 
-// An opcode and a length of 64 bits.
+// An opcode and a 64-bit length.
 inline constexpr size_t kRecordHead = 9;
 
 class McapBytes {
@@ -45,7 +45,7 @@ class McapBytes {
     text_.append(bytes);
     return *this;
   }
-  // Of entries that are written already.
+  // Writes a map whose entries are already encoded.
   McapBytes& Map(const McapBytes& entries) { return Text(entries.text_); }
   McapBytes& Map(const std::map<std::string, std::string>& entries) {
     McapBytes inner;
@@ -64,7 +64,7 @@ class McapBytes {
   std::string text_;
 };
 
-// Reads what McapBytes writes. What is not there any more is 0 or empty, and `ok` says so.
+// Reads what McapBytes writes. Missing data are read as 0 or empty, and `ok` reports it.
 class McapParse {
  public:
   explicit McapParse(std::string_view bytes) : rest_(bytes) {}

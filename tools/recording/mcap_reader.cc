@@ -19,7 +19,7 @@ namespace {
 
 constexpr uint64_t kMostRecordBytes = (uint64_t{4} << 30) + (uint64_t{1} << 20);
 
-// How many of the bytes there were; fewer only at the file's end.
+// Returns how many bytes were read; fewer than `size` only at the end of the file.
 absl::StatusOr<size_t> ReadAt(int file, uint64_t at, char* into, size_t size) {
   size_t got = 0;
   while (got < size) {
@@ -32,13 +32,14 @@ absl::StatusOr<size_t> ReadAt(int file, uint64_t at, char* into, size_t size) {
   return got;
 }
 
-// False unless it comes to just so many bytes. It takes memory for what is there, whatever size is said.
+// Returns false unless the data expand to exactly `size` bytes. Memory grows with the actual data,
+// whatever size is declared.
 bool Unpack(std::string_view compressed, uint64_t size, std::string* plain) {
   const std::unique_ptr<ZSTD_DStream, size_t (*)(ZSTD_DStream*)> stream(ZSTD_createDStream(),
                                                                         &ZSTD_freeDStream);
   if (stream == nullptr) return false;
   ZSTD_inBuffer in = {compressed.data(), compressed.size(), 0};
-  size_t left = 1;  // of the frame; 0: it ended
+  size_t left = 1;  // of the frame; 0: it is complete
   while (left > 0 || in.pos < in.size) {
     const size_t before = plain->size(), consumed = in.pos;
     plain->resize(std::min<uint64_t>(size, before + ZSTD_DStreamOutSize()));
@@ -46,7 +47,7 @@ bool Unpack(std::string_view compressed, uint64_t size, std::string* plain) {
     left = ZSTD_decompressStream(stream.get(), &out, &in);
     plain->resize(before + out.pos);
     if (ZSTD_isError(left)) return false;
-    if (out.pos == 0 && in.pos == consumed && left > 0) return false;  // too long, or cut short
+    if (out.pos == 0 && in.pos == consumed && left > 0) return false;  // too long, or truncated
   }
   return plain->size() == size;
 }
@@ -89,7 +90,7 @@ absl::StatusOr<bool> McapReader::NextRecord(uint8_t* kind, std::string* content)
   struct stat found;
   if (fstat(file_, &found) == 0 &&
       static_cast<uint64_t>(found.st_size) < at_ + kRecordHead + size) {
-    return false;  // it was cut off
+    return false;  // the file is truncated
   }
   content->resize(size);
   const absl::StatusOr<size_t> body = ReadAt(file_, at_ + kRecordHead, content->data(), size);
@@ -160,7 +161,7 @@ absl::Status McapReader::TakeRecord(uint8_t kind, std::string_view content,
       ++summary_.chunks;
       return ReadChunk(content, each, go_on);
     default:
-      return absl::OkStatus();  // indexes, and what later versions add
+      return absl::OkStatus();  // indexes, and records of later versions
   }
 }
 

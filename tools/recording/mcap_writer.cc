@@ -77,7 +77,7 @@ absl::Status McapWriter::Put(std::string_view bytes) {
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) {
       const int error = n < 0 ? errno : ENOSPC;
-      failed_ = true;  // where it ends is not known
+      failed_ = true;  // the end of the file is unknown
       return absl::ErrnoToStatus(error, path_);
     }
     rest.remove_prefix(static_cast<size_t>(n));
@@ -147,7 +147,7 @@ absl::Status McapWriter::EndChunk() {
     bytes += McapBytes().Number(channel).Map(entries).Record(kMessageIndex);
   }
   index.index_length = bytes.size() - index.length;
-  // A chunk and its index in one go: what is cut off has no half of it.
+  // A chunk and its index are written together, so a truncated file contains no partial pair.
   if (absl::Status status = Put(bytes); !status.ok()) return status;
   chunks_.push_back(std::move(index));
   chunk_.clear();
@@ -221,7 +221,7 @@ absl::Status McapWriter::Close() {
   }
   group(kChunkIndex, records);
   const uint64_t offsets_start = summary_start + summary.size();
-  // The footer's CRC is of the summary and of its own first fields.
+  // The footer's CRC covers the summary and the footer's own first fields.
   const std::string footer_head = McapBytes()
                                       .Number(uint8_t{kFooter})
                                       .Number(uint64_t{20})

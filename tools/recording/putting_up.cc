@@ -9,9 +9,9 @@
 namespace voxeld::recording {
 namespace {
 
-constexpr size_t kMostNameBytes = 240;  // a number behind it still fits into max_id_bytes
+constexpr size_t kMostNameBytes = 240;  // leaves space for a number within max_id_bytes
 
-// At most so many bytes; no code point is cut.
+// Truncates the text to at most `bytes` bytes, between code points.
 std::string UpTo(std::string text, size_t bytes) {
   if (text.size() <= bytes) return text;
   while (bytes > 0 && (text[bytes] & 0xc0) == 0x80) --bytes;
@@ -60,7 +60,7 @@ void PuttingUp::PutLayers(std::vector<v1::LayerInfo> layers, std::vector<v1::Str
 void PuttingUp::PutObjects(const std::map<ObjectName, v1::Object>& objects,
                            std::vector<v1::StreamRequest>* out) const {
   std::set<ObjectName> begun;
-  // Those that others refer to come first.
+  // Objects that others refer to come first.
   const auto put = [&](const auto& self, const ObjectName& key) -> void {
     const auto found = objects.find(key);
     if (found == objects.end() || !begun.insert(key).second) return;
@@ -140,7 +140,7 @@ std::vector<v1::StreamRequest> PuttingUp::Step(const v1::WatchSceneResponse& cha
     masks_.erase(layer);
   };
   for (const v1::LayerKey& key : changes.removed_layers()) empty({key.owner(), key.layer()});
-  // One that was removed and made again has another number.
+  // A layer that was removed and created again has another number.
   for (const v1::LayerInfo& info : changes.layers()) {
     const auto was = mirror_.layers().find({info.owner(), info.layer()});
     const bool removed = std::any_of(
@@ -166,7 +166,7 @@ std::vector<v1::StreamRequest> PuttingUp::Step(const v1::WatchSceneResponse& cha
   PutLayers({changes.layers().begin(), changes.layers().end()}, &out);
   PutMasks(&out);
   for (const v1::WatchedEntity& entity : changes.entities()) PutEntity(entity, &out);
-  // Whatever else referred to them is gone, or refers to others now.
+  // Everything else that referred to them has been removed, or refers to others now.
   for (const auto& [owner, object] : leaving) {
     out.emplace_back().mutable_delete_object()->set_object(ObjectOf(owner, object));
   }

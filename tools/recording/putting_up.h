@@ -1,8 +1,9 @@
-// What has to be sent so that a daemon's scene becomes what a recording says, change set by change set.
+// Computes the requests that make a daemon's scene match a recording, change set by change set.
 //
-// All that was recorded becomes one client's: a layer goes by its name behind a prefix ("night: map"), and by a number
-// where there are several of that name at once ("night: map (2)"); an object by its owner and name. So whatever several
-// had stays apart. Layers are made in the order of their numbers, as they blend by it.
+// Everything in the recording becomes the property of one client: a layer is named by its name
+// after a prefix ("night: map"), with a number if several have that name at the same time ("night:
+// map (2)"); an object is named by its owner and name. So the contents of different owners stay
+// separate. Layers are created in the order of their numbers, because they blend in that order.
 #pragma once
 
 #include <cstdint>
@@ -21,18 +22,19 @@ namespace voxeld::recording {
 // Not thread-safe.
 class PuttingUp {
  public:
-  // `prefix`: of all layers' names in the daemon's scene.
+  // `prefix` is put before all layers' names in the daemon's scene.
   explicit PuttingUp(std::string prefix = "") : prefix_(std::move(prefix)) {}
 
-  // The requests of one commit that leads from what was put up to `changes`, a change set in one message.
+  // Returns the requests of one commit that leads from the current state to `changes`, which is a
+  // change set in one message.
   std::vector<v1::StreamRequest> Step(const v1::WatchSceneResponse& changes);
 
-  // Only remembers: what it leads to is in the next Whole.
+  // Records the changes only: the next Whole() includes them.
   void Skip(const v1::WatchSceneResponse& changes) { mirror_.Apply(changes); }
-  // All of it, for a scene that has nothing of it yet.
+  // Returns the requests for the whole state, for a scene that contains nothing of it yet.
   std::vector<v1::StreamRequest> Whole();
 
-  // Layers that have been emptied since this was asked last, and can be removed.
+  // Returns the layers that have been emptied since the previous call and can be removed.
   std::vector<std::string> TakeEmptied();
 
  private:
@@ -45,17 +47,17 @@ class PuttingUp {
   void PutObjects(const std::map<ObjectName, v1::Object>& objects,
                   std::vector<v1::StreamRequest>* out) const;
   void PutEntity(const v1::WatchedEntity& entity, std::vector<v1::StreamRequest>* out);
-  // Those that `changes` removes: whichever has others as parts before these.
+  // Returns the objects that `changes` removes, each before its parts.
   std::vector<ObjectName> InOrderOfLeaving(const v1::WatchSceneResponse& changes) const;
-  // Masks go by names, and a mask's layer may have become another.
+  // Masks refer to layers by name, and the layer of a mask may have changed.
   void PutMasks(std::vector<v1::StreamRequest>* out);
 
   const std::string prefix_;
   SceneMirror mirror_;
-  // The daemon's names, by owner, layer and number; and the same, none of them twice.
+  // The daemon's names, by owner, layer and number; and the set of these names, which are unique.
   std::map<std::tuple<uint64_t, std::string, uint64_t>, std::string> names_;
   std::set<std::string> taken_;
-  std::map<LayerName, std::string> masks_;  // as they were put up last
+  std::map<LayerName, std::string> masks_;  // as they were last sent
   std::vector<std::string> emptied_;
 };
 

@@ -58,7 +58,7 @@ void SceneMirror::Apply(const v1::WatchSceneResponse& message) {
     (shown ? changes_.gone : changes_.changed).erase(name);
   }
   if (redefined.empty()) return;
-  // Whatever may refer to them.
+  // Marks everything that may refer to them.
   for (const auto& [name, entity] : entities_) {
     if (redefined.contains(name.layer.owner) && entity.primitive().has_instance() &&
         !changes_.gone.contains(name)) {

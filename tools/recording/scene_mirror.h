@@ -1,4 +1,5 @@
-// What a watched scene comes to, kept from its change sets: for whoever needs more of it than what changed.
+// Maintains the state of a watched scene from its change sets, for users that need more than the
+// changes.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +26,7 @@ struct EntityName {
 
 class SceneMirror {
  public:
-  // In the order in which a message applies.
+  // Applies a message's parts in their defined order.
   void Apply(const v1::WatchSceneResponse& message);
 
   const std::map<LayerName, v1::LayerInfo>& layers() const { return layers_; }
@@ -33,8 +34,8 @@ class SceneMirror {
   const std::map<std::pair<uint64_t, std::string>, v1::Object>& objects() const { return objects_; }
   const v1::Object* FindObject(uint64_t owner, const std::string& name) const;
 
-  // Entities that look otherwise than when this was asked last, by themselves, their layer or an object;
-  // and those that are not there any more, or not to be seen.
+  // Entities that look different from the previous call, because of themselves, their layer or an
+  // object; and entities that were removed or are now invisible.
   struct Changes {
     std::set<EntityName> changed, gone;
   };

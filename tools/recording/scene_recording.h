@@ -1,10 +1,11 @@
-// A recording of a scene: change sets as the daemon tells them (WatchSceneResponse), from which the scene can
-// be put up again bit for bit; beside them what other people's viewers show.
+// A recording of a scene. It contains the change sets as the daemon sends them
+// (WatchSceneResponse), from which the scene can be restored bit for bit, and in addition a form
+// that third-party viewers can show.
 //
 //   voxeld/scene    voxeld.v1.WatchSceneResponse, protobuf. The first change set is the whole scene
 //   scene           foxglove.SceneUpdate, protobuf
 //
-// Times are Unix time in nanoseconds. A change set's messages have one time, that of the last.
+// Times are Unix time in nanoseconds. All messages of a change set have the time of the last one.
 #pragma once
 
 #include <cstdint>
@@ -26,15 +27,16 @@ inline constexpr char kViewersTopic[] = "scene";
 // Not thread-safe.
 class SceneRecorder {
  public:
-  // What a crash of the writer loses at most.
+  // The maximum loss if the writer crashes.
   static constexpr uint64_t kFlushNs = 500'000'000;
 
   static absl::StatusOr<std::unique_ptr<SceneRecorder>> Create(const std::string& path,
                                                                const std::string& version);
 
-  // One after another, as the daemon tells them. `time_ns`: now.
+  // Adds the daemon's messages in their order. `time_ns` is the current time.
   absl::Status Add(const v1::WatchSceneResponse& message, uint64_t time_ns);
-  // Puts on the disk what has waited for kFlushNs; to be called about that often also when nothing comes.
+  // Syncs messages that have waited for kFlushNs to the disk. Call it about that often even if no
+  // messages come.
   absl::Status Tick(uint64_t time_ns);
   absl::Status Close() { return writer_->Close(); }
 
@@ -49,18 +51,18 @@ class SceneRecorder {
   const std::unique_ptr<McapWriter> writer_;
   uint16_t scene_, viewers_;
   SceneMirror mirror_;
-  uint64_t change_sets_ = 0, since_ = 0;  // when the oldest came that is not on the disk; 0: none
+  uint64_t change_sets_ = 0, since_ = 0;  // when the oldest unsynced one came; 0: none
   uint32_t sequence_ = 0;
 };
 
-// One state of the scene and how to come to it from the one before.
+// One state of the scene, and the changes that lead to it from the previous one.
 struct ChangeSet {
   uint64_t time_ns = 0, snapshot = 0;
   v1::WatchSceneResponse changes;  // all of them in one message
 };
 
-// Calls `each` with the change sets, in their order, until it answers false. DataLoss for what is damaged,
-// InvalidArgument for a file without a scene.
+// Calls `each` with the change sets in order until it returns false. Errors: DataLoss if the file
+// is damaged; InvalidArgument if it has no scene.
 absl::Status ReadScene(McapReader& reader, const std::function<bool(ChangeSet)>& each);
 
 }  // namespace voxeld::recording

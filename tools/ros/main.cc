@@ -1,4 +1,4 @@
-// voxeld-ros: markers of ROS 1 put up in a voxeld.
+// voxeld-ros: shows markers of ROS 1 in a voxeld.
 #include <unistd.h>
 
 #include <csignal>
@@ -75,7 +75,7 @@ int Run(const Options& options, voxelctl::Interrupt& interrupt, voxelctl::Consol
 int main(int argc, char** argv) {
   using namespace voxeld;  // NOLINT(google-build-using-namespace)
   try {
-    // A reader that goes away is an error of the write, not the end of the process.
+    // A closed reader becomes an error of the write and does not terminate the process.
     std::signal(SIGPIPE, SIG_IGN);
     const ros1::ParsedCommandLine parsed = ros1::ParseCommandLine(
         std::vector<std::string>(argv + 1, argv + argc), ros1::EnvironmentVariable);

@@ -18,7 +18,7 @@ constexpr std::array<absl::string_view, 12> kTypes = {
     "ARROW",     "CUBE",        "SPHERE", "CYLINDER",         "LINE_STRIP",    "LINE_LIST",
     "CUBE_LIST", "SPHERE_LIST", "POINTS", "TEXT_VIEW_FACING", "MESH_RESOURCE", "TRIANGLE_LIST"};
 
-// As viewers draw arrows whose heads are not told of.
+// Viewers draw arrows with this head if its size is not given.
 constexpr double kHeadOfLength = 0.23, kHeadOfWidth = 2;
 
 absl::string_view View(const auto& text) { return {text.data(), text.size()}; }
@@ -35,12 +35,12 @@ struct Turn {
     const double l = length();
     return l > 0 ? Turn{x / l, y / l, z / l, w / l} : Turn();
   }
-  // First `other`, then this.
+  // Returns the rotation that applies `other` first, then this one.
   Turn operator*(const Turn& o) const {
     return {w * o.x + x * o.w + y * o.z - z * o.y, w * o.y - x * o.z + y * o.w + z * o.x,
             w * o.z + x * o.y - y * o.x + z * o.w, w * o.w - x * o.x - y * o.y - z * o.z};
   }
-  // Of length 1.
+  // The quaternion has length 1.
   Vector operator()(const Vector& v) const {
     const Vector c{y * v.z - z * v.y + w * v.x, z * v.x - x * v.z + w * v.y,
                    x * v.y - y * v.x + w * v.z};
@@ -49,7 +49,7 @@ struct Turn {
   }
 };
 
-// The shortest one that has x point along `to`, of any length but 0.
+// Returns the shortest rotation that turns x to `to`, which may have any length except 0.
 Turn FromXTo(const Vector& to) {
   const double length = std::hypot(to.x, to.y, to.z);
   const Turn turn{0, -to.z / length, to.y / length, 1 + to.x / length};
@@ -87,7 +87,7 @@ void SetColor(const Color& from, foxglove::Color* to) {
   to->set_a(from.a);
 }
 
-// How many of the points each colour is of; 0: colours are not one for each.
+// Returns the number of points per colour; 0 if the colours do not match the points.
 size_t PointsAColor(const Marker& marker) {
   const size_t points = marker.points.size(), colors = marker.colors.size();
   if (colors == 0) return 0;
@@ -153,7 +153,7 @@ void FillTriangles(const Marker& marker, foxglove::TriangleListPrimitive* triang
   SetColors(marker, PointsAColor(marker), triangles);
 }
 
-// Corner i of a cube has the lesser x, y or z where bit 0, 1 or 2 of i is not set.
+// Corner i of a cube has the lesser x, y or z if bit 0, 1 or 2 of i is not set.
 void FillCubes(const Marker& marker, foxglove::TriangleListPrimitive* triangles) {
   constexpr std::array<std::array<uint32_t, 4>, 6> kFaces = {
       {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}}};
@@ -244,7 +244,7 @@ bool AllFinite(const Marker& marker) {
          std::all_of(marker.colors.begin(), marker.colors.end(), color);
 }
 
-// Empty: nothing.
+// Returns an empty string if nothing is wrong.
 std::string WhatIsWrong(const Marker& marker) {
   if (marker.type < 0 || marker.type >= static_cast<int>(kTypes.size())) {
     return absl::StrCat("has type ", marker.type, "; 0 to ", kTypes.size() - 1, " are known");
@@ -353,7 +353,7 @@ void PendingMarkers::Put(foxglove::SceneEntity entity) {
   const size_t bytes = entity.SpaceUsedLong();
   if (pieces_ + pieces > markers::kMostPieces || bytes_ + bytes > kMostBytes) {
     left_out_.insert("markers beyond what one update may have");
-    return Delete(id);  // what it was is not so any more
+    return Delete(id);  // the previous state no longer applies
   }
   pieces_ += pieces;
   bytes_ += bytes;

@@ -1,6 +1,6 @@
-// visualization_msgs/Marker as foxglove.SceneUpdate: what each is, and what several after one another come to.
+// Converts visualization_msgs/Marker to foxglove.SceneUpdate, and combines successive markers.
 //
-// Pure. Frames (header.frame_id, frame_locked) and stamps are not looked at.
+// Performs no I/O. Frames (header.frame_id, frame_locked) and stamps are ignored.
 #pragma once
 
 #include <cstdint>
@@ -14,31 +14,36 @@
 
 namespace voxeld::ros1 {
 
-// "NS/ID", which names a marker within its topic.
+// Returns "NS/ID", which identifies a marker within its topic.
 std::string EntityId(const Marker& marker);
 
-// A marker that is to be shown. A point of POINTS is a line from it to itself, as thick as scale.x: a ball; CUBE_LIST is triangles. Of
-// a MESH_RESOURCE there is a model, by its URL. InvalidArgument names the marker, what is wrong and what would be right: numbers that are not
-// finite, an orientation whose length is more than a tenth from 1 (all zeros are none), points that make no whole arrow, line or triangle, as
-// many cubes or spheres as markers::kMostPieces, text that is not UTF-8, a lifetime below 0, a type that there is not.
+// Converts a marker that is to be shown. A point of POINTS becomes a line from it to itself with
+// the thickness scale.x, which is a ball; CUBE_LIST becomes triangles. A MESH_RESOURCE becomes a
+// model, by its URL. Errors: InvalidArgument with the marker, what is wrong and what would be
+// right: numbers that are not finite; an orientation whose length differs from 1 by more than a
+// tenth (all zeros mean no rotation); points that do not form complete arrows, lines or triangles;
+// as many cubes or spheres as markers::kMostPieces; text that is not UTF-8; a negative lifetime; an
+// unknown type.
 absl::StatusOr<foxglove::SceneEntity> EntityOf(const Marker& marker);
 
-// What markers of one topic come to that nobody has taken yet. Whatever is told again, or taken away, stands in for what was told before.
+// The combined update of one topic that has not been taken yet. A marker that is added again or
+// deleted replaces its earlier state.
 class PendingMarkers {
  public:
-  // Of Add, in bytes that waiting takes, about. Beyond, as beyond markers::kMostPieces, markers are left out, and told.
+  // The approximate maximum memory of waiting Add markers, in bytes. Beyond it, and beyond
+  // markers::kMostPieces, markers are left out and reported.
   static constexpr size_t kMostBytes = size_t{256} << 20;
 
   struct Taken {
-    foxglove::SceneUpdate update;  // deletions are of what was there before
+    foxglove::SceneUpdate update;  // its deletions refer to the state before it
     uint64_t malformed = 0;        // markers that could not be read
-    std::string malformed_last;    // and why
+    std::string malformed_last;    // the reason for the last of them
     std::set<std::string> left_out;
   };
 
-  // By the marker's action. One that could not be read takes away what it was before.
+  // Applies a marker by its action. A marker that could not be read removes its earlier state.
   void Add(const Marker& marker);
-  // All that is told of a whole message that could not be read.
+  // Counts a whole message that could not be read.
   void AddMalformed(std::string why);
 
   bool empty() const;
@@ -54,9 +59,9 @@ class PendingMarkers {
   void Drop(const std::string& id);
 
   std::map<std::string, Waiting> entities_;  // by id
-  std::set<std::string> deletions_;          // of none that is in entities_
-  bool all_deleted_ = false;                 // before the rest
-  int64_t pieces_ = 0;                       // of entities_
+  std::set<std::string> deletions_;          // of entities that are not in entities_
+  bool all_deleted_ = false;                 // before everything else
+  int64_t pieces_ = 0;                       // in entities_
   size_t bytes_ = 0;
   uint64_t malformed_ = 0;
   std::string malformed_last_;

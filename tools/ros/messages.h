@@ -8,8 +8,9 @@
 
 namespace voxeld::ros1 {
 
-// Messages as they are generated ask their allocator for what C++20's own has no more, to be bound anew. What one array of a message
-// may have is limited: lengths are a publisher's word, and believed before the rest is read.
+// Generated messages require their allocator to have `rebind`, which C++20 removed from the
+// standard one. It also limits the size of one array of a message, because lengths come from a
+// publisher and are used before the rest is read.
 template <typename T>
 struct MessageAllocator : std::allocator<T> {
   static constexpr size_t kMostBytes = size_t{256} << 20;

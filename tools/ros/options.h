@@ -1,4 +1,4 @@
-// What voxeld-ros's command line says.
+// The command line of voxeld-ros.
 #pragma once
 
 #include <optional>
@@ -18,7 +18,7 @@ struct Options {
   RosOptions ros;
 };
 
-// Either what to do, or what to print and the code to end with (help, version, a usage error).
+// Either the options, or a text to print with the exit code (help, version, a usage error).
 struct ParsedCommandLine {
   std::optional<Options> options;
   int exit_code = 0;
@@ -28,8 +28,9 @@ struct ParsedCommandLine {
 inline constexpr int kExitFailure = 1;
 inline constexpr int kExitUsage = 2;
 
-// `arguments` without the program's name; those that have ":=" are ROS's own, as roslaunch gives them. The master is
-// --master's, else __master's, else `environment`'s (ROS_MASTER_URI), else the one of this machine.
+// `arguments` excludes the program's name; those with ":=" are ROS's own, as roslaunch passes them.
+// The master is that of --master, or else of __master, or else of `environment` (ROS_MASTER_URI),
+// or else the one on this machine.
 ParsedCommandLine ParseCommandLine(const std::vector<std::string>& arguments,
                                    const client::Environment& environment);
 

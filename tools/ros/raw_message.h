@@ -1,4 +1,5 @@
-// A message of visualization_msgs as the bytes that came: roscpp hands them over unread, so that what cannot be read is known of.
+// A message of visualization_msgs as received bytes: roscpp passes them on unparsed, so that
+// unreadable messages can be counted.
 #pragma once
 
 #include <ros/builtin_message_traits.h>
@@ -13,7 +14,7 @@
 
 namespace voxeld::ros1 {
 
-// `Message`: which, by its MD5, as publishers are asked for it.
+// `Message` is the message type, whose MD5 publishers are asked for.
 template <typename Message>
 struct RawMessage {
   std::vector<uint8_t> bytes;

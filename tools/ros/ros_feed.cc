@@ -30,7 +30,7 @@ void AddAll(const MarkerArray& array, PendingMarkers* to) {
   for (const Marker& marker : array.markers) to->Add(marker);
 }
 
-// Calls what may throw as roscpp does.
+// Runs a call that may throw roscpp's exceptions, and converts them to a status.
 absl::Status Guarded(const std::function<void()>& call) {
   try {
     call();
@@ -63,7 +63,7 @@ class RosFeed::Impl {
       ros::init(remappings, kNodeName,
                 ros::init_options::AnonymousName | ros::init_options::NoSigintHandler |
                     ros::init_options::NoRosout);
-      // What is to be said of its calls is said here.
+      // Errors of roscpp's calls are reported here, so its own logging is turned off.
       ros::console::set_logger_level(ROSCONSOLE_DEFAULT_NAME, ros::console::levels::Fatal);
       ros::console::notifyLoggerLevelsChanged();
       ros::master::setRetryTimeout(ros::WallDuration(1));
@@ -71,7 +71,7 @@ class RosFeed::Impl {
     });
   }
 
-  // Until Interrupt.
+  // Runs until Interrupt.
   void Run() {
     while (!stopped()) {
       Look();
@@ -145,7 +145,7 @@ class RosFeed::Impl {
     changed_.NotifyAll();
   }
 
-  // One call of the master's, without its waiting for one that is away.
+  // Calls the master once, without waiting for one that is unreachable.
   bool Ask(const char* method, const std::string& argument, XmlRpc::XmlRpcValue* payload) {
     XmlRpc::XmlRpcValue arguments, answer;
     arguments[0] = ros::this_node::getName();
@@ -187,7 +187,7 @@ class RosFeed::Impl {
       spinner_->start();
       return;
     }
-    // A master that was started anew knows nobody.
+    // A restarted master does not know this node.
     XmlRpc::XmlRpcValue payload;
     if (!subscriptions_.empty() && !Ask("lookupNode", ros::this_node::getName(), &payload)) {
       subscriptions_.clear();
@@ -210,7 +210,7 @@ class RosFeed::Impl {
         subscriptions_.erase(at);
       }
       ros::Subscriber subscriber = array ? Subscribe<MarkerArray>(name) : Subscribe<Marker>(name);
-      if (!subscriber) continue;  // the master has gone meanwhile
+      if (!subscriber) continue;  // the master became unreachable meanwhile
       subscriptions_[name] = {type, subscriber};
       News(absl::StrCat("follows ", name, " (", type, ")"));
     }
@@ -221,7 +221,8 @@ class RosFeed::Impl {
   template <typename Message>
   ros::Subscriber Subscribe(const std::string& topic) {
     ros::SubscribeOptions options;
-    // None is lost before it is counted: they are read at once.
+    // The queue is unlimited, so no message is lost before it is counted; they are read
+    // immediately.
     constexpr uint32_t kUnlimited = 0;
     options.init<RawMessage<Message>>(
         topic, kUnlimited, [this, topic](const boost::shared_ptr<const RawMessage<Message>>& raw) {
@@ -257,7 +258,7 @@ class RosFeed::Impl {
     changed_.NotifyAll();
   }
 
-  // Of the topic behind the one that was taken last, so that each has its turn.
+  // Takes from the topic after the previous one, so that each has its turn.
   bool TakePending(markers::FeedUpdate* out) VOXELD_REQUIRES(mutex_) {
     auto at = pending_.upper_bound(taken_last_);
     for (size_t i = 0; i < pending_.size(); ++i, ++at) {
@@ -281,7 +282,7 @@ class RosFeed::Impl {
   const std::function<void()> on_shutdown_;
   mutable sync::SystemClock clock_;
 
-  // Of the thread that runs.
+  // Used only by the running thread.
   std::set<std::string> wanted_;
   std::optional<bool> there_;
   ros::CallbackQueue queue_;

@@ -1,4 +1,4 @@
-// Markers of ROS 1: a node that subscribes to visualization_msgs/MarkerArray and Marker.
+// A feed of ROS 1 markers: a node that subscribes to visualization_msgs/MarkerArray and Marker.
 #pragma once
 
 #include <functional>
@@ -17,20 +17,21 @@ namespace voxeld::ros1 {
 struct RosOptions {
   std::string master;  // http://HOST:PORT
   std::vector<std::string>
-      topics;  // names as ROS resolves them; empty: all of the two types that have a publisher
-  std::map<std::string, std::string> remappings;  // as roslaunch gives them: "__name" to a name
+      topics;  // names resolved by ROS; empty: all of the two types that have a publisher
+  std::map<std::string, std::string> remappings;  // as roslaunch passes them: "__name" to a name
 };
 
-// One in a process, and once. The master is asked each second, by a thread of its own, which topics there are; one that is away, or
-// another in its place, is waited for and told (FeedUpdate::news), and everything is subscribed to anew. Messages are taken as they
-// come; those of a topic that nobody has taken yet become one update. Of a message that is longer than kMostMessageBytes, or that is cut
-// short, nothing is taken.
+// Requires: created at most once per process. A thread asks the master every second which topics
+// exist. If the master is unreachable or was replaced, the feed reports it (FeedUpdate::news),
+// waits for it and subscribes to everything again. Messages are received as they come; messages of
+// a topic that have not been taken yet are combined into one update. A message that is longer than
+// kMostMessageBytes or truncated is dropped completely.
 class RosFeed final : public markers::MarkerFeed {
  public:
   static constexpr size_t kMostMessageBytes = size_t{64} << 20;
 
-  // Does not wait for the master. `on_shutdown` is called from a thread of the feed when the master has this node end.
-  // InvalidArgument: an address, a name.
+  // Does not wait for the master. `on_shutdown` is called from a thread of the feed when the master
+  // asks this node to end. Errors: InvalidArgument for an invalid address or name.
   static absl::StatusOr<std::unique_ptr<RosFeed>> Open(const RosOptions& options,
                                                        std::function<void()> on_shutdown);
   ~RosFeed() override;
@@ -40,18 +41,19 @@ class RosFeed final : public markers::MarkerFeed {
   absl::StatusOr<markers::FeedUpdate> Next() override;
   size_t subscribed() const override;
   std::vector<std::string> passed_over() const override;
-  // "messages" that came; those "joined" to others that still waited.
+  // "messages" that were received; "joined", those combined with others that still waited.
   std::vector<std::pair<std::string, uint64_t>> counts() const override;
   void Interrupt() override;
 
-  // Takes the node from the master. False: the master did not answer in a few seconds, and threads are left that only the process's
-  // end, without destructors (std::_Exit), ends.
+  // Unregisters the node from the master. Returns false if the master did not answer within a few
+  // seconds: then threads remain that only the end of the process without destructors (std::_Exit)
+  // ends.
   bool Close();
 
  private:
   class Impl;
   explicit RosFeed(std::shared_ptr<Impl> impl);
-  std::shared_ptr<Impl> impl_;  // the thread's as well
+  std::shared_ptr<Impl> impl_;  // shared with the thread
   std::thread thread_;
 };
 
