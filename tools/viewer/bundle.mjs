@@ -1,5 +1,5 @@
-// Bundles the page: TypeScript and styles from src/ into --out, each file as gzip, with the libraries in --modules. Which of these are
-// in it, esbuild says: modules.json.
+// Bundles the page: TypeScript and styles from src/ into --out, each file compressed with gzip, with the libraries in
+// --modules. esbuild reports which of these are included: modules.json.
 import { createRequire } from "node:module";
 import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { dirname, join, resolve } from "node:path";

@@ -1,19 +1,20 @@
-// How an eye adapts: crowded light is turned down until its brightest places can be told apart, sparse light is left as it
-// is. By a sample of the points, so that every renderer comes to the same.
+// Simulates how an eye adapts: crowded light is dimmed until its brightest places can be distinguished, sparse light
+// stays as it is. It uses a sample of the points, so that every renderer gets the same result.
 import { View } from "./camera";
 import { PointStore } from "./point_store";
 import { Sweep, lightOf } from "./renderer";
 
 const kColumns = 64;
 const kSamples = 30_000;
-const kBright = 0.97; // of the lit places, by their light: this one is to be
-const kWanted = 0.8; // so bright
+const kBright = 0.97; // the lit place at this quantile of light gets
+const kWanted = 0.8; // this brightness
 
 export class Adaptation {
   private readonly cells = new Float32Array(kColumns * kColumns);
   private readonly sorted: number[] = [];
 
-  // A factor of light, at most 1. `view` is of places in steps; `area(w)` is how many picture elements a point covers at depth w.
+  // Returns a factor of light, at most 1. `view` is for places in steps; `area(w)` is how many picture elements a point
+  // covers at depth w.
   factor(store: PointStore, view: View, sweep: Sweep, width: number, height: number, area: (w: number) => number, cue: (w: number) => number): number {
     const total = store.points();
     if (total === 0) return 1;

@@ -1,17 +1,17 @@
-// Where the volume is looked at from: an orbit around a point, +z upright. Millimetres.
+// The camera: an orbit around a point, +z upright. Lengths are in millimetres.
 
 export interface Orbit {
   azimuth: number; // degrees, counter-clockwise seen from above; 0 is in front, towards −y
   elevation: number; // degrees, −89 to 89
-  distance: number; // of the volume's radius
+  distance: number; // in radii of the volume
   target: [number, number, number];
 }
 
-// Rows of 4: x and y of the picture and depth, before the division, of a point in millimetres; the picture's middle is 0,
-// y is up, and 1 is half the picture's lesser side.
+// Rows of 4: x and y of the picture and depth, before the division, of a point in millimetres. The picture's centre is
+// 0, y points up, and 1 is half of the picture's shorter side.
 export type View = Float64Array;
 
-const kFieldOfView = 30; // degrees, of the picture's lesser side
+const kFieldOfView = 30; // degrees, along the picture's shorter side
 
 export const kHome: Orbit = { azimuth: 24, elevation: 20, distance: 1, target: [0, 0, 0] };
 
@@ -34,7 +34,7 @@ export function viewOf(orbit: Orbit, middle: readonly number[], radius: number):
 
 export interface Sphere { middle: number[]; radius: number }
 
-// What a camera looks at.
+// Returns the sphere that a camera looks at.
 export function sphereOf(low: readonly number[], high: readonly number[]): Sphere {
   return {
     middle: low.map((each, i) => (each + high[i]!) / 2),
@@ -42,7 +42,7 @@ export function sphereOf(low: readonly number[], high: readonly number[]): Spher
   };
 }
 
-// The same for points in steps of a box.
+// Returns the same view for points in steps of a box.
 export function inSteps(view: View, low: readonly number[], high: readonly number[], steps: number): View {
   const out = new Float64Array(12);
   for (let row = 0; row < 3; ++row) {
@@ -56,7 +56,7 @@ export function inSteps(view: View, low: readonly number[], high: readonly numbe
   return out;
 }
 
-// Picture elements from the left and the top, and depth in millimetres.
+// Returns picture elements from the left and the top, and depth in millimetres.
 export function project(view: View, x: number, y: number, z: number, width: number, height: number): [number, number, number] {
   const w = view[8]! * x + view[9]! * y + view[10]! * z + view[11]!;
   const half = Math.min(width, height) / 2;

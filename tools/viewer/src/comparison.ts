@@ -1,13 +1,13 @@
-// The scene as it was sent beside what a display shows, and their difference. Asked of the daemon again whenever what is
-// shown has changed, one display after the other; where several are looked at, each is told how far off it is.
+// Shows the scene as it was sent beside what a display shows, and their difference. It asks the daemon again whenever a
+// display shows something else, one display after the other. If several are viewed, each shows how far it is off.
 import { Orbit } from "./camera";
 import { DisplayView, Look } from "./display_view";
 import { OutlineColors } from "./outline";
 import { Compared, LayerInfo, Watching, kDifference, kSent } from "./protocol";
 
 const kTick = 250;
-const kAgainAfter = 500; // an answer that there is none yet
-const kPatience = 60_000; // for an answer
+const kAgainAfter = 500; // milliseconds after the answer that there is none yet
+const kPatience = 60_000; // milliseconds to wait for an answer
 
 export const layerKey = (layer: { owner: string; layer: string }) => `${layer.owner}/${layer.layer}`;
 
@@ -26,7 +26,7 @@ export function atLength(c: Compared): string {
 
 interface Asking {
   volume: number;
-  layers: number; // the choice of layers, counted
+  layers: number; // version of the choice of layers
   notBefore: number;
 }
 
@@ -46,7 +46,7 @@ export class Comparison {
   private readonly hidden = new Map<string, { owner: string; layer: string }>();
   private choice = 0;
   private underWay: { id: number; since: number } | null = null;
-  private came: Compared | null = null; // whose points are still to come
+  private came: Compared | null = null; // whose points have not arrived yet
   private timer: ReturnType<typeof setInterval> | undefined;
 
   constructor(private readonly page: ComparisonPage) {}
@@ -61,12 +61,12 @@ export class Comparison {
     this.restart();
   }
 
-  // The daemon was lost: it answers nothing that it was asked.
+  // The connection was lost: the daemon will not answer the requests.
   lost(): void {
     this.underWay = null;
   }
 
-  // Other displays are looked at.
+  // The viewed displays have changed.
   restart(): void {
     clearInterval(this.timer);
     this.sent?.dispose();
@@ -103,9 +103,9 @@ export class Comparison {
     const took = this.underWay === null ? 0 : performance.now() - this.underWay.since;
     this.underWay = null;
     if (view === undefined || asked === undefined || !this.on) return;
-    asked.notBefore = performance.now() + took; // half of the time at the most
+    asked.notBefore = performance.now() + took; // so it uses at most half of the time
     if (compared.why !== undefined) {
-      asked.volume = -1; // it is asked for again
+      asked.volume = -1; // so that it is asked for again
       asked.notBefore = performance.now() + kAgainAfter;
       this.page.tell(`${view.name} is not compared: ${compared.why}.`);
       return;
@@ -116,7 +116,7 @@ export class Comparison {
     this.came = compared;
   }
 
-  // Whether the message is one of a comparison's. What was there stays until it is here.
+  // Returns whether the message belongs to a comparison. The previous points stay until it is complete.
   points(message: ArrayBuffer): boolean {
     const header = new DataView(message);
     const kind = header.getUint8(0);
@@ -132,7 +132,7 @@ export class Comparison {
     return true;
   }
 
-  // Layers that there are: what is not there any more is not left out either.
+  // Updates the known layers: a layer that was removed is no longer left out.
   know(layers: LayerInfo[]): void {
     const there = new Set(layers.map(layerKey));
     for (const key of this.hidden.keys()) if (!there.has(key)) this.hidden.delete(key);
@@ -157,7 +157,7 @@ export class Comparison {
       const asked = this.known.get(id);
       if (view.watching === null || view.drawn.volume === 0) continue;
       if (asked !== undefined && (now < asked.notBefore || (asked.volume === view.drawn.volume && asked.layers === this.choice))) continue;
-      this.known.delete(id); // to the end of the line
+      this.known.delete(id); // reinserted at the end of the queue
       this.known.set(id, { volume: view.drawn.volume, layers: this.choice, notBefore: 0 });
       this.underWay = { id, since: now };
       this.page.ask(id, [...this.hidden.values()]);
@@ -166,7 +166,7 @@ export class Comparison {
   }
 }
 
-// Without slices, and looked at as the display is.
+// Returns a view without slices, with the camera of the display.
 function placesOf(compared: Compared, shown: Watching): Watching {
   const { low_mm, high_mm, pitch_mm } = compared;
   return {

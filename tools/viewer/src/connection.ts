@@ -1,4 +1,4 @@
-// The page's WebSocket: comes back by itself when the daemon does.
+// The page's WebSocket, which reconnects when the daemon is reachable again.
 import { FromDaemon } from "./protocol";
 
 export interface Listener {

@@ -1,4 +1,4 @@
-// One display on the page: its canvas, what draws it, and where it is looked at from.
+// One display on the page: its canvas, its renderer and its camera.
 import { Orbit, kHome, sphereOf, viewOf } from "./camera";
 import { OutlineColors, drawOutline } from "./outline";
 import { Watching } from "./protocol";
@@ -27,7 +27,7 @@ export class DisplayView {
   private noted = "";
   private why = "";
 
-  // `told`: to those who do not see it.
+  // `told` describes it to people who do not see it.
   constructor(readonly name: string, told: string, makeRenderer: (canvas: HTMLCanvasElement) => Renderer, private readonly redraw: () => void) {
     this.element.className = "view";
     this.overlay.className = "overlay";
@@ -52,7 +52,7 @@ export class DisplayView {
     this.renderer.begin(watching);
   }
 
-  // Whether the display gives light, and why not.
+  // Sets whether the display gives light, and otherwise why not.
   light(lit: boolean, why: string): void {
     if (this.over !== "") return;
     this.element.classList.toggle("unlit", !lit);
@@ -60,13 +60,13 @@ export class DisplayView {
     this.write();
   }
 
-  // Beside the name, while it gives light.
+  // Sets a note beside the name, shown while the display gives light.
   note(text: string): void {
     this.noted = text;
     this.write();
   }
 
-  // Nothing more will come of this watch.
+  // Ends the view: no more messages of this watch will come.
   end(why: string): void {
     this.over = why;
     this.element.classList.add("unlit");
@@ -90,7 +90,7 @@ export class DisplayView {
     else context.clearRect(0, 0, width, height);
   }
 
-  // As the renderers have it.
+  // Returns the view as the renderers use it.
   view(orbit: Orbit = kHome): Float64Array {
     const { low_mm, high_mm } = this.watching!.around ?? this.watching!;
     const { middle, radius } = sphereOf(low_mm, high_mm);

@@ -1,5 +1,5 @@
-// Files that people drop on the page, or choose: sent to the daemon, which has them played. What it says of that is shown beside the
-// other controls, alike on all pages that have control.
+// Handles files that people drop on the page or choose: they are sent to the daemon, which has them played. The
+// daemon's reports about them are shown beside the other controls, on all pages that have control.
 import { FromDaemon, Play } from "./protocol";
 import { bytes } from "./panels";
 
@@ -22,7 +22,7 @@ export class Dropped {
   private play: Play = {};
   private sending: XMLHttpRequest | null = null;
 
-  // `over`: what files are dropped on; `among`: the other controls; `say`: to whoever has none.
+  // `over` is what files are dropped on, `among` holds the other controls, and `say` informs people without control.
   constructor(over: HTMLElement, among: HTMLElement, private readonly send: (message: object) => void, private readonly say: (text: string) => void) {
     const row = element("div", { className: "play" });
     this.chooser.ariaLabel = "A file to play";
@@ -36,12 +36,12 @@ export class Dropped {
     this.chooser.addEventListener("change", () => {
       const file = this.chooser.files?.[0];
       if (file !== undefined) this.take(file);
-      this.chooser.value = ""; // the same one may be chosen again
+      this.chooser.value = ""; // so that the same file may be chosen again
     });
     this.stop.addEventListener("click", () => this.send({ stop: true }));
     this.cancel.addEventListener("click", () => this.sending?.abort());
 
-    // A file that misses must not take the page's place.
+    // A file that is dropped elsewhere must not replace the page.
     for (const kind of ["dragover", "drop"]) {
       addEventListener(kind, (event) => {
         if (!hasFiles(event as DragEvent)) return;
@@ -54,7 +54,7 @@ export class Dropped {
       event.preventDefault();
       event.stopPropagation();
       const refused = this.refusal();
-      event.dataTransfer!.dropEffect = "copy"; // one that is refused, too, so that it is said why
+      event.dataTransfer!.dropEffect = "copy"; // also for a file that is refused, so that the reason is shown
       this.target.textContent = refused ?? "Drop the file here, and it plays";
       this.target.classList.toggle("refused", refused !== null);
       this.target.hidden = false;
@@ -71,7 +71,7 @@ export class Dropped {
     });
   }
 
-  // Of what the daemon says this is for what concerns it.
+  // Handles the daemon's messages that concern files.
   told(message: FromDaemon): void {
     if (message.hello !== undefined) {
       this.control = message.hello.control;
@@ -87,17 +87,17 @@ export class Dropped {
     this.stop.hidden = playing === undefined;
     this.state.textContent = playing !== undefined ? `playing ${playing}` : whyNot ?? "";
     if (failed === undefined) this.complain("");
-    else if (why?.startsWith(`${failed}: `)) this.complain(`Not played: ${why}`); // as it is of what is in the file
+    else if (why?.startsWith(`${failed}: `)) this.complain(`Not played: ${why}`); // an error in the file itself
     else this.complain(`${failed} was not played: ${why ?? ""}`);
   }
 
   private complain(text: string): void {
     this.trouble.textContent = text;
     this.trouble.hidden = text === "";
-    if (text !== "" && this.trouble.offsetParent === null) this.say(text); // the panel is put away
+    if (text !== "" && this.trouble.offsetParent === null) this.say(text); // the panel is hidden
   }
 
-  // Why no file is taken here; null: one is.
+  // Returns why no file is accepted; null if one is.
   private refusal(): string | null {
     if (!this.control) return kOnlyLook;
     if (this.play.why_not !== undefined) return `Files are not played here: ${this.play.why_not}`;
@@ -118,7 +118,7 @@ export class Dropped {
     if (file.size > most) return this.complain(`${file.name} has ${bytes(file.size)}; files up to ${bytes(most)} are played (server.http_max_upload_bytes).`);
     if (file.size === 0) return this.complain(`${file.name} is empty, or is not a file.`);
     this.complain("");
-    const request = new XMLHttpRequest(); // fetch does not tell how far it is
+    const request = new XMLHttpRequest(); // fetch does not report progress
     this.sending = request;
     this.progress.value = 0;
     this.progress.hidden = this.cancel.hidden = false;

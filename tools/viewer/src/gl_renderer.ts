@@ -1,4 +1,4 @@
-// Points on a GPU: added up in a picture of half floats, then developed as the splat does it.
+// Draws points on a GPU: they are summed in a picture of half floats and then developed like the splat's.
 import {
   AddEquation, BufferAttribute, BufferGeometry, Camera, CustomBlending, DynamicDrawUsage, GLSL3, HalfFloatType, Mesh, NearestFilter,
   NoBlending, OneFactor, Points as PointCloud, RawShaderMaterial, Scene as Stage, Vector2, Vector4, WebGLRenderer, WebGLRenderTarget,
@@ -74,7 +74,7 @@ export class GlRenderer implements Renderer {
   private size = new Vector2(1, 1);
   private asked: Scene | null = null;
 
-  // Throws where there is no WebGL2, or no pictures of half floats.
+  // Throws if WebGL2 or pictures of half floats are not supported.
   constructor(canvas: HTMLCanvasElement) {
     this.gl = new WebGLRenderer({ canvas, alpha: true, antialias: false, premultipliedAlpha: false, powerPreference: "high-performance" });
     if (this.gl.getContext().getExtension("EXT_color_buffer_float") === null) {
@@ -145,13 +145,13 @@ export class GlRenderer implements Renderer {
     this.gl.forceContextLoss();
   }
 
-  // Of all buffers of points.
+  // Returns the bytes of all buffers of points.
   gpuBytes(): number {
     const clouds = [...this.chunks.map((chunk) => chunk?.cloud), this.dark];
     return clouds.reduce((sum, cloud) => sum + Object.values(cloud?.geometry.attributes ?? {}).reduce((bytes, each) => bytes + each.array.byteLength, 0), 0);
   }
 
-  // Milliseconds for a picture of so many points, with all that the GPU has to do for it.
+  // Returns the milliseconds for a picture of that many points, including all work of the GPU.
   static try(points: number): number {
     const canvas = document.createElement("canvas");
     let renderer: GlRenderer;
@@ -177,7 +177,7 @@ export class GlRenderer implements Renderer {
       const began = performance.now();
       renderer.render(watching, { orbit: { azimuth: 24, elevation: 20, distance: 1, target: [0, 0, 0] }, exposure: 1, sweep: wholeSweep(1), dark: false });
       const gl = renderer.gl.getContext();
-      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // until it is done
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // waits until the GPU has finished
       least = Math.min(least, performance.now() - began);
     }
     renderer.dispose();

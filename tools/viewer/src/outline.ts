@@ -1,5 +1,5 @@
-// What stands around the light: the display's box or cylinder, its axes, and a scale. Drawn by the page itself over what a
-// renderer draws.
+// Draws the surroundings of the light: the display's box or cylinder, its axes, and a scale. The page draws them over
+// the renderer's picture.
 import { View, project } from "./camera";
 import { DisplayDescription, Watching } from "./protocol";
 
@@ -26,7 +26,8 @@ function cylinder(radius: number, low: number, high: number): Line[] {
   return lines;
 }
 
-// The display's volume, and under it the housing that turns or moves the light: a rotor's axle and base, a stack's frame.
+// Returns the outline of the display's volume, and below it the housing that turns or moves the light: a rotor's axle
+// and base, a stack's frame.
 export function outlineOf(display: DisplayDescription): Line[] {
   const { grid } = display.geometry;
   const low = [grid.origin_mm.x, grid.origin_mm.y, grid.origin_mm.z];
@@ -43,7 +44,7 @@ export function outlineOf(display: DisplayDescription): Line[] {
   return box(low, high);
 }
 
-// A round length of about a fourth of the extent, mm.
+// Returns a round length of about a fourth of the extent, in mm.
 export function scaleOf(extent: number): number {
   const about = extent / 4;
   const power = Math.pow(10, Math.floor(Math.log10(about)));

@@ -1,4 +1,5 @@
-// The page: displays chosen, looked around, and told of. What is in the address (display, camera, slice) can be sent to others.
+// The page: choosing displays, looking around them, and describing them. The address (display, camera, slice) can be
+// sent to others.
 import { Orbit, kHome, project } from "./camera";
 import { Comparison } from "./comparison";
 import { Connection } from "./connection";
@@ -30,7 +31,8 @@ class Page {
   private readonly comparison: Comparison;
   private nextWatch = 0;
   private dirty = false;
-  private readonly owed = new Map<number, number>(); // watches whose newest volume, of that number, has not been drawn yet
+  // Watches whose newest volume, with that number, has not been drawn yet.
+  private readonly owed = new Map<number, number>();
   private framesBefore = 0;
   private sweepAt = 0;
   private lastTick = 0;
@@ -118,7 +120,7 @@ class Page {
 
   private wantsAll = new URLSearchParams(location.hash.slice(1)).get("display") === "";
 
-  // The display stopped, or its bytes could not be read: what is drawn is not what it shows any more.
+  // The display stopped, or its bytes could not be read: the picture is no longer what it shows.
   private ended(id: number, why: string): void {
     const view = this.views.get(id);
     if (view === undefined) return;
@@ -189,7 +191,7 @@ class Page {
 
   private askForFigures(): void {
     if (document.hidden) return;
-    this.connection.send({ stats: true }); // of the displays' state, too
+    this.connection.send({ stats: true }); // includes the displays' state
     if (!byId("panel").hidden) this.connection.send({ layers: true });
   }
 
@@ -216,7 +218,7 @@ class Page {
     });
   }
 
-  // A sweep in slow motion goes on by the time that went by.
+  // A slow-motion sweep advances by the elapsed time.
   private turn(now: number): void {
     const passed = this.lastTick === 0 ? 0 : Math.min(0.1, (now - this.lastTick) / 1000);
     this.lastTick = now;
@@ -403,13 +405,13 @@ class Page {
     this.comparison.set(input("compare").checked);
     const slice = parts.get("slice");
     if (slice !== null && /^\d+$/.test(slice)) {
-      input("slice").max = slice; // until it is known how many there are
+      input("slice").max = slice; // until the number of slices is known
       input("slice").value = slice;
       input("one").checked = true;
     }
   }
 
-  // For tests and for the curious: where a place in millimetres is on the first display's canvas, and what is drawn.
+  // For tests and curious people: where a place in millimetres is on the first display's canvas, and what is drawn.
   inspect(): object {
     const view = this.first();
     return {
@@ -431,7 +433,7 @@ function kindOf(display: DisplayDescription): string {
   return "stack of planes";
 }
 
-// The faster of the two, unless the address names one (?renderer=2d or gl).
+// Chooses the faster of the two, unless the address names one (?renderer=2d or gl).
 async function chooseRenderer(): Promise<(canvas: HTMLCanvasElement) => Renderer> {
   const asked = new URLSearchParams(location.search).get("renderer");
   const splat = (canvas: HTMLCanvasElement) => new SplatRenderer(canvas);

@@ -1,9 +1,9 @@
-// What the panel beside the volume tells: the display's figures, where time goes, and the layers of the scene.
+// The panel beside the volume: the display's statistics, the time of each stage, and the layers of the scene.
 import uPlot from "uplot";
 import { layerKey } from "./comparison";
 import { DisplayStats, Latency, LayerInfo, Stats } from "./protocol";
 
-// Stages of a commit, in their order; those of the daemon first, then the display's own.
+// Stages of a commit in order: first the daemon's, then the display's own.
 const kStages: [string, "stats" | "display"][] = [
   ["sending", "stats"], ["decoding", "stats"], ["applying", "stats"],
   ["waiting", "display"], ["assemble", "display"], ["slice", "display"], ["copy", "display"], ["transferring", "display"], ["showing", "display"],
@@ -31,7 +31,7 @@ function state(text: string): string {
   return text.replace(/^DISPLAY_STATE_/, "").toLowerCase();
 }
 
-// Layers that are drawn in the scene as sent.
+// The layers that are drawn in the scene as sent.
 export interface LayerChoice {
   isHidden(layer: LayerInfo): boolean;
   hide(layer: LayerInfo, hidden: boolean): void;
@@ -85,13 +85,13 @@ export class Panels {
     this.rate.setData([x, volumes, latency]);
   }
 
-  // Forget what was of another display.
+  // Discards the data of the previous display.
   restart(): void {
     for (const series of this.data) series.length = 0;
     this.timeBefore = 0;
   }
 
-  // Rows stay while their layers do: who is at one with the keyboard stays there.
+  // Updates the rows. They stay as long as their layers do, so that the keyboard focus stays in place.
   layers(all: LayerInfo[], control: boolean, clear: (layer: LayerInfo) => void, choice: LayerChoice): void {
     const body = byId("layers");
     const keys = new Set(all.map(layerKey));
@@ -105,7 +105,8 @@ export class Panels {
       const [box, name, client, entities, seen] = row.cells as unknown as HTMLTableCellElement[];
       (box!.firstChild as HTMLInputElement).checked = !choice.isHidden(layer);
       const texts = [layer.layer || "(default)", layer.client_name, layer.entities, layer.visible ? `${Math.round(layer.opacity / 2.55)} %` : "hidden"];
-      [name, client, entities, seen].forEach((cell, n) => (cell!.textContent = texts[n]!)); // whatever a client called it
+      // As text, because a client chose the names.
+      [name, client, entities, seen].forEach((cell, n) => (cell!.textContent = texts[n]!));
       if (body.children[i] !== row) body.insertBefore(row, body.children[i] ?? null);
     }
     byId("no-layers").hidden = all.length > 0;
@@ -130,7 +131,7 @@ export class Panels {
     return row;
   }
 
-  // Medians one behind the other: together they are what a commit takes, no stage left out.
+  // Shows the medians one after another: together they are the duration of a commit, with every stage.
   private bar(stats: Stats, display: DisplayStats): void {
     const parts = kStages.map(([name, of]) => {
       const latency = (of === "stats" ? stats[name] : display[name]) as Latency | undefined;

@@ -1,5 +1,5 @@
-// The rebuilt volume: the lit pixels of each slice, as they came last. What a slice had is overwritten in place, so that
-// memory grows with the most that was lit and not with how often it changed.
+// The rebuilt volume: the lit pixels of each slice, as last received. A slice is overwritten in place, so memory grows
+// with the greatest number of lit pixels and not with the number of changes.
 import { Points } from "./protocol";
 import { Sweep, lightOf } from "./renderer";
 
@@ -9,7 +9,7 @@ export interface Slice {
   y: Uint16Array;
   z: Uint16Array;
   rgb: Uint8Array;
-  changed: number; // the update, counted, in which it last did
+  changed: number; // the number of the update that last changed it
 }
 
 export class PointStore {
@@ -23,7 +23,7 @@ export class PointStore {
     }
   }
 
-  // Answers the slices that came.
+  // Returns the slices that were received.
   update(points: Points): number[] {
     ++this.updates;
     this.volume = points.volume;
@@ -54,7 +54,7 @@ export class PointStore {
     return came;
   }
 
-  // Of the slices that give light.
+  // Returns the number of points of the slices that give light.
   lit(sweep: Sweep): number {
     return this.slices.reduce((sum, slice, i) => sum + (lightOf(sweep, i, this.slices.length) > 0 ? slice.count : 0), 0);
   }

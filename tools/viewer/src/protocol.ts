@@ -1,4 +1,4 @@
-// What the page and the daemon say to one another: docs/protocols/viewer.md.
+// The messages between the page and the daemon: docs/protocols/viewer.md.
 
 export interface Vec3 { x: number; y: number; z: number }
 
@@ -69,17 +69,18 @@ export interface LayerInfo {
   client_name: string;
 }
 
-// Where a watch's places lie: place q of an axis is low + q / kPlaceSteps · (high − low).
+// The space of a watch's places: place q of an axis is low + q / kPlaceSteps · (high − low).
 export interface Watching {
   id: number;
   low_mm: [number, number, number];
   high_mm: [number, number, number];
   pitch_mm: number;
   display: DisplayDescription;
-  around?: { low_mm: [number, number, number]; high_mm: [number, number, number] }; // what a camera looks at; else all places
+  // What the camera looks at; otherwise all places.
+  around?: { low_mm: [number, number, number]; high_mm: [number, number, number] };
 }
 
-// What a display shows, held against what it was sent; or why it is not.
+// A comparison of what a display shows with what was sent to it, or why there is none.
 export interface Compared {
   id: number;
   why?: string;
@@ -98,7 +99,7 @@ export interface Compared {
 
 export interface Hello { version: string; control: boolean; displays: DisplayDescription[] }
 
-// Of files that are played: told to pages with control. `why_not`: none are.
+// The state of playing files, sent to pages with control. `why_not` is why no files are accepted.
 export interface Play { max_bytes?: number; playing?: string; failed?: string; why?: string; why_not?: string }
 
 export type FromDaemon = {
@@ -120,7 +121,7 @@ export const kSent = 3;
 export const kDifference = 4;
 const kHeaderBytes = 24;
 
-// A binary message, as views of its bytes: slices[2·i] has slices[2·i + 1] points, which follow one another.
+// A binary message, as views of its bytes: slice slices[2·i] has slices[2·i + 1] points, which are stored in sequence.
 export interface Points {
   kind: number;
   whole: boolean;

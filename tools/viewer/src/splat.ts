@@ -1,6 +1,7 @@
-// The volume as a picture without a GPU: every point adds its light to a small square of picture elements. Squares of one
-// side are put down as single elements, whose sums over that side, which run along rows and columns, are the picture: a point
-// costs three additions, whatever its square. All in whole numbers, so the same as square by square.
+// Draws the volume without a GPU: every point adds its light to a small square of picture elements. Squares of the same
+// side are recorded as single elements, and the running sums of these over that side, along rows and columns, are the
+// picture. So a point costs three additions, whatever the size of its square. All arithmetic is in integers, so the
+// result is the same as square by square.
 import { View } from "./camera";
 import { PointStore } from "./point_store";
 import { Adaptation } from "./adaptation";
@@ -8,12 +9,12 @@ import { Sweep, depthCue, kFarLight, lightOf, sideOf, tone } from "./renderer";
 
 export const kLargest = 24; // side of a square
 const kUnit = 16384; // the full light of one pixel
-export const kFocal = 1 / Math.tan(Math.PI / 12); // of camera.ts
+export const kFocal = 1 / Math.tan(Math.PI / 12); // see camera.ts
 
 export interface SplatScene {
-  view: View; // of places in steps
+  view: View; // for places in steps
   pitch: number; // of the display's pixels, in the view's units (mm)
-  near: number; // depth of the volume's nearest and farthest point
+  near: number; // depths of the volume's nearest and farthest point
   far: number;
   exposure: number;
   sweep: Sweep;
@@ -22,8 +23,8 @@ export interface SplatScene {
 export class Splat {
   private light: Int32Array = new Int32Array(0);
   private readonly put: (Int32Array | null)[] = []; // by side: where squares begin
-  private readonly rows: [number, number][] = []; // of these, the first and the last that have any
-  private sums = new Int32Array(0); // of a row's columns
+  private readonly rows: [number, number][] = []; // for each of them, the first and the last row that has any
+  private sums = new Int32Array(0); // of the columns of a row
   private picture = new Uint8ClampedArray(0);
   private readonly adaptation = new Adaptation();
   width = 0;
@@ -38,7 +39,7 @@ export class Splat {
     this.picture = new Uint8ClampedArray(width * height * 4);
   }
 
-  // Answers how many points there were. The picture is this.pixels().
+  // Returns how many points there were. The picture is this.pixels().
   draw(store: PointStore, dark: PointStore | null, scene: SplatScene): number {
     this.light.fill(0);
     let points = 0;
@@ -116,7 +117,7 @@ export class Splat {
       if (top > last) last = top;
       let close = (far - w) * depth;
       close = close < 0 ? 0 : close > 1 ? 1 : close;
-      const s = scale * (kFarLight + (1 - kFarLight) * close * close); // depthCue
+      const s = scale * (kFarLight + (1 - kFarLight) * close * close); // as depthCue
       const at = (top * width + left) * 3;
       if (color === null) {
         const from = i * 3;
@@ -138,7 +139,7 @@ export class Splat {
     range[1] = Math.max(range[1], last);
   }
 
-  // Sums of what was put down, side by side, into the light; what was put down is gone.
+  // Adds the sums of the recorded squares to the light, side by side, and clears the records.
   private spread(): void {
     const { light, put, rows, sums } = this;
     const wide = this.width * 3;

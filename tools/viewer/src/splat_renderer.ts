@@ -1,10 +1,11 @@
-// The splat's end in the page.
+// The page's side of the splat.
 import { Watching } from "./protocol";
 import { Drawn, Renderer, Scene } from "./renderer";
 import type { ToWorker } from "./splat_worker";
 
 const kWorker = "/splat_worker.js";
-const kMostRatio = 1.5; // picture elements of the splat for each of the page: more costs time and shows nothing
+// Picture elements of the splat per picture element of the page: more costs time without visible effect.
+const kMostRatio = 1.5;
 
 export class SplatRenderer implements Renderer {
   readonly name = "2D";
@@ -57,7 +58,7 @@ export class SplatRenderer implements Renderer {
   }
 }
 
-// Milliseconds for a picture of so many points.
+// Measures the milliseconds for a picture of that many points.
 export function trySplat(points: number): Promise<number> {
   const worker = new Worker(kWorker, { type: "module" });
   return new Promise((resolve) => {

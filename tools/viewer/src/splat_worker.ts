@@ -1,4 +1,4 @@
-// The splat's thread: it has the volume, and draws into the page's canvas.
+// The splat's thread: it holds the volume, and draws into the page's canvas.
 import { Orbit, inSteps, project, sphereOf, viewOf } from "./camera";
 import { PointStore } from "./point_store";
 import { Points, Watching, kDark, kPlaceSteps, readPoints } from "./protocol";
@@ -41,7 +41,7 @@ function draw(where: Watching, scene: Scene): void {
   postMessage({ drawn: { volume: store.volume, points, milliseconds: performance.now() - began } });
 }
 
-// How long a picture of so many points takes, put about at random.
+// Measures how long a picture of that many randomly placed points takes.
 function trial(count: number): number {
   const points: Points = {
     kind: 1, whole: true, watch: 0, volume: 0,
