@@ -45,7 +45,7 @@ absl::StatusOr<const aiScene*> LoadScene(const SourceFile& file, Assimp::Importe
 absl::StatusOr<Model> ModelOf(const SourceFile& file, const aiScene& scene, const Pose* pose);
 
 // Opens animation `number`, from 1, with frames at `fps` per second. Errors: InvalidArgument if
-// there is no such animation.
+// the animation does not exist.
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenAssimpAnimation(SourceFile file, size_t number,
                                                                  double fps);
 

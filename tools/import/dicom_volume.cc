@@ -155,7 +155,8 @@ Point3 StepOf(const std::vector<Layer>& layers, const Slice& first, std::string*
   return Times(first.Normal(), between);
 }
 
-// MONOCHROME1 stores white as the smallest value. Inverts the values within the window, or within their range if there is none.
+// MONOCHROME1 stores white as the smallest value. Inverts the values within the window, or within
+// their range without one.
 void TurnRound(SampledVolume* volume) {
   double sum = 0;
   if (volume->window) {

@@ -624,7 +624,7 @@ struct CifBlock {
   std::vector<CifTable> loops;
 
   // Returns: the columns `names` after `prefix` of the table that has the first of them; no rows if
-  // there is no such table.
+  // no table has it.
   CifColumns Find(string_view prefix, const std::vector<string_view>& names) const {
     const auto place = [&](const CifTable& table, string_view name) {
       const auto at = std::find(table.tags.begin(), table.tags.end(),

@@ -30,7 +30,7 @@ namespace voxeld::voxelctl {
 absl::StatusOr<Model> ReadGltfModel(const SourceFile& file, bool attributes = false);
 
 // Opens animation `number`, from 1, with frames at `fps` per second. Errors: InvalidArgument if
-// there is no such animation, with the names of the existing ones.
+// the animation does not exist, with the names of the existing ones.
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenGltfAnimation(SourceFile file, size_t number,
                                                                double fps);
 

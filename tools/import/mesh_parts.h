@@ -25,7 +25,7 @@ NodeMatrix NormalMatrix(const NodeMatrix& m);
 // Returns whether the matrix reverses the winding of triangles.
 bool IsMirror(const NodeMatrix& m);
 
-// Returns a vector of unit length, however small the model is; zero if there is no direction.
+// Returns a vector of unit length, however small the model is; zero without a direction.
 Point3 Direction(const Point3& p);
 
 // Returns: a channel from 0 to 1 as a byte; 0 if the value is not a number. `linear` means that the
@@ -46,7 +46,7 @@ uint64_t DropEmptyTriangles(Part* part);
 // Returns whether the display can show a picture with these bytes: PNG or JPEG.
 bool IsPicture(absl::string_view bytes);
 
-// What is shown beyond the edge of a picture.
+// The content beyond the edge of a picture.
 enum class Wrap : uint8_t { kRepeat, kClamp, kMirror };
 
 // Rewrites the texture coordinates of a part so that a repeating picture looks like one with these

@@ -234,7 +234,7 @@ Material FromLibrary(const tinyobj::material_t& read) {
 
 // ------------------------------------------------------------------------------------------ statements
 
-// What the elements of one part have in common.
+// The common properties of the elements of one part.
 struct Group {
   Kind kind = Kind::kTriangles;
   uint32_t material = kNone;  // the number of its name

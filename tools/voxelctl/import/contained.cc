@@ -37,9 +37,10 @@ absl::Status NoSandbox(const SourceFile& file, const absl::Status& why) {
                    "; Linux 5.13 or later with Landlock and seccomp is expected"));
 }
 
-// Call it in the child. Closes all descriptors but the standard streams and `kept`, which becomes kAnswerDescriptor.
+// Closes all descriptors except the standard streams and `kept`, which becomes kAnswerDescriptor.
+// Requires: called in the child.
 void KeepOnly(int kept, pid_t parent) {
-  // Ends with the thread that waits for it, which may have ended already.
+  // The child is killed when the thread that waits for it ends, and that may have happened already.
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(1);
   sigset_t none;
@@ -47,16 +48,17 @@ void KeepOnly(int kept, pid_t parent) {
   ::sigprocmask(SIG_SETMASK, &none, nullptr);
   for (const int signal : {SIGINT, SIGTERM, SIGABRT, SIGSEGV, SIGBUS, SIGFPE})
     ::signal(signal, SIG_DFL);
-  // Move it above the streams' numbers first, so that no dup2 closes it.
+  // Moved above the numbers of the streams first, so that no dup2 closes it.
   const int aside = ::fcntl(kept, F_DUPFD, kAnswerDescriptor);
-  // The connections of this process are not for the reader. What a library says is not for people.
+  // The reader must not use this process's connections, and people should not see a library's
+  // messages.
   const int nowhere = ::open("/dev/null", O_RDWR | O_CLOEXEC);
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, stream);
   if (aside != kAnswerDescriptor) ::dup2(aside, kAnswerDescriptor);
   ::close_range(kAnswerDescriptor + 1, ~0U, 0);
 }
 
-// Waits for the end of `child`. Returns: its state, as waitpid gives it.
+// Waits for `child` to exit. Returns: its state, as waitpid reports it.
 int Await(pid_t child) {
   int state = 0;
   while (::waitpid(child, &state, 0) < 0 && errno == EINTR) {
@@ -70,7 +72,7 @@ absl::Status NoReader(const SourceFile& file) {
                    ": cannot run the process that reads it: ", std::strerror(errno)));
 }
 
-// Returns: why a reader that ended in this state did not do what it should; OK if it did.
+// Returns: why a reader that ended in this state failed; OK if it succeeded.
 absl::Status EndOf(const SourceFile& file, int state) {
   if (WIFSIGNALED(state)) {
     const int signal = WTERMSIG(state);
@@ -91,7 +93,7 @@ absl::Status EndOf(const SourceFile& file, int state) {
   return absl::OkStatus();
 }
 
-// A process that reads, and this end of the socket to it.
+// A process that reads, and this process's end of the socket to it.
 class Reader {
  public:
   Reader(absl::string_view path, Interrupt* interrupt, const ReaderLimits& limits)
@@ -122,13 +124,15 @@ class Reader {
     return absl::OkStatus();
   }
 
-  // Asks a reader that serves frames for one. A reader that has ended, or does not take numbers any more, does not answer either.
+  // Requests a frame from a reader that serves frames. Errors are ignored, because a reader that
+  // has exited or no longer accepts numbers does not answer either.
   void Ask(int64_t frame) {
     (void)::send(socket_.get(), &frame, sizeof(frame), MSG_NOSIGNAL | MSG_DONTWAIT);
   }
 
-  // Returns: the reader's next answer, of `most_bytes` at most, as `read` (ReadModel, ReadFrameCount) reads it. What is no answer ends the
-  // reader; the error is that of all later answers, too.
+  // Returns: the reader's next answer, of at most `most_bytes`, parsed by `read` (ReadModel,
+  // ReadFrameCount). An invalid answer ends the reader; its error is also that of all later
+  // answers.
   template <typename T>
   absl::StatusOr<T> Answer(uint64_t most_bytes,
                            absl::Status (*read)(const SourceFile&, const TakeBytes&,
@@ -144,11 +148,11 @@ class Reader {
     absl::StatusOr<T> answer = Spoilt(file_, "gave up");
     const absl::Status whole = read(
         file_, [this](void* out, size_t size) { return Take(out, size); }, &answer);
-    // What the reader uses while it is not asked for a frame counts for the next one.
+    // CPU time that the reader uses between requests counts for the next frame.
     used_s_ = ProcessorSeconds();
     if (interrupt_ != nullptr) interrupt_->RemoveListener(listener);
     if (whole.ok()) return answer;
-    // A reader that has ended says why by its exit status, unless this kills it before.
+    // The exit status of a reader that has exited gives the reason, unless it is killed here first.
     if (!closed_) ::kill(child_, SIGKILL);
     const absl::Status end = EndOf(file_, Await(std::exchange(child_, -1)));
     ended_ = interrupt_ != nullptr && interrupt_->requested() ? absl::CancelledError("interrupted")
@@ -161,7 +165,7 @@ class Reader {
  private:
   static std::chrono::steady_clock::time_point Now() { return std::chrono::steady_clock::now(); }
 
-  // TakeBytes of the socket, within the limits. Small pieces are taken from a buffer.
+  // Implements TakeBytes for the socket, within the limits. Small pieces are read from a buffer.
   bool Take(void* out, size_t size) {
     char* at = static_cast<char*>(out);
     while (size > 0) {
@@ -183,11 +187,12 @@ class Reader {
     return true;
   }
 
-  // Returns: how many bytes came, `size` at most; 0 if the reader has ended (`closed_`) or is over a limit (`over_`).
+  // Returns: how many bytes were received, at most `size`; 0 if the reader has exited (`closed_`)
+  // or exceeded a limit (`over_`).
   size_t Receive(char* out, size_t size) {
     while (!closed_ && over_.ok()) {
       pollfd ready = {socket_.get(), POLLIN, 0};
-      constexpr int kLookAgainMs = 250;  // at the limits of time
+      constexpr int kLookAgainMs = 250;  // interval at which the time limits are checked
       const int found = ::poll(&ready, 1, kLookAgainMs);
       if (ProcessorSeconds() - used_s_ > limits_.processor_s) {
         over_ = TimedOut(limits_.processor_s, " of processor time");
@@ -224,16 +229,16 @@ class Reader {
   daemon::Descriptor socket_;
   pid_t child_ = -1;
   std::vector<char> buffer_ = std::vector<char>(16 << 10);
-  size_t begin_ = 0, end_ = 0;  // of what is left in the buffer
-  double used_s_ = 0;           // of processor time, when it last answered
-  absl::Status ended_;          // why the reader is not there any more
+  size_t begin_ = 0, end_ = 0;  // the unread part of the buffer
+  double used_s_ = 0;           // CPU time at its last answer
+  absl::Status ended_;          // why the reader has ended
 
-  // Of the answer that is being taken.
+  // State of the current answer.
   std::chrono::steady_clock::time_point until_;
   uint64_t taken_ = 0, most_bytes_ = 0;
 
-  bool closed_ = false;  // the reader's end of the socket
-  absl::Status over_;    // the limit that was passed
+  bool closed_ = false;  // whether the reader's end of the socket is closed
+  absl::Status over_;    // the limit that was exceeded
 };
 
 class ContainedFrames final : public FrameSource {

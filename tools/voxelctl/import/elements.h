@@ -1,5 +1,6 @@
-// The chemical elements as molecules are drawn. Covalent radii are those of Cordero and others (2008), van der Waals' radii those of
-// Bondi and of the Blue Obelisk, 2 where neither has one, and colours those of Jmol.
+// The chemical elements as molecules are drawn. Covalent radii are those of Cordero and others
+// (2008), van der Waals radii those of Bondi and of the Blue Obelisk or otherwise 2, and colours
+// those of Jmol.
 #pragma once
 
 #include "absl/strings/string_view.h"
@@ -8,15 +9,16 @@
 namespace voxeld::voxelctl {
 
 struct ChemicalElement {
-  int number = 0;            // of protons; 0 if it is not known
-  absl::string_view symbol;  // as "Cl"; empty of what is not known
+  int number = 0;            // of protons; 0 if unknown
+  absl::string_view symbol;  // such as "Cl"; empty if unknown
   double covalent = 0;       // radii, in ångström
   double van_der_waals = 0;
-  Rgb color;          // by Corey, Pauling and Koltun, and of Jmol for the others
-  bool bonds = true;  // ions next to others are not bound to them
+  Rgb color;          // by Corey, Pauling and Koltun, or of Jmol for other elements
+  bool bonds = true;  // ions near others are not bonded to them
 };
 
-// Returns: the element with a symbol (in any case) or a number of protons; null if there is none.
+// Returns: the element with a symbol (case-insensitive) or a number of protons; null if it is
+// unknown.
 const ChemicalElement* FindElement(absl::string_view symbol);
 const ChemicalElement* FindElement(int number);
 const ChemicalElement& UnknownElement();

@@ -19,7 +19,7 @@ namespace {
 
 constexpr size_t kMostDigits = 12;
 
-// A name with a place for a number.
+// A file name with a place for a number.
 struct Pattern {
   std::string before, after;
   size_t digits = 1;

@@ -1,4 +1,4 @@
-// Models that follow one another.
+// Sequences of models.
 #pragma once
 
 #include <cstdint>
@@ -14,9 +14,9 @@
 
 namespace voxeld::voxelctl {
 
-inline constexpr int64_t kMaxFrames = 1'000'000;  // of a source
+inline constexpr int64_t kMaxFrames = 1'000'000;  // per source
 
-// Frames by their number. Used by one thread at a time.
+// Frames by number. Used by one thread at a time.
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
@@ -24,10 +24,10 @@ class FrameSource {
   virtual absl::StatusOr<Model> Read(int64_t frame) = 0;
 };
 
-// A file of an own format for each (IsOwnFormat).
+// A source with one file of our own formats (IsOwnFormat) per frame.
 class FileFrames final : public FrameSource {
  public:
-  // `interrupt`, which may be null, outlives it.
+  // `interrupt`, which may be null, must outlive the source.
   FileFrames(std::vector<std::string> paths, const ImportOptions& options, Interrupt* interrupt)
       : paths_(std::move(paths)), options_(options), interrupt_(interrupt) {}
   int64_t count() const override { return static_cast<int64_t>(paths_.size()); }
@@ -39,21 +39,22 @@ class FileFrames final : public FrameSource {
   Interrupt* const interrupt_;
 };
 
-// Whether the name of a file has a place for a number: "####" or "%04d". A file of just that name is none.
+// Returns whether a file name has a place for a number: "####" or "%04d". Returns false if a file
+// of exactly that name exists.
 bool IsSequence(const std::string& path);
 
-// The files that there are, in the order of their numbers. A number has as many digits as there are # (or as printf would
-// write), or more without a 0 at the front. NotFound if there is none.
+// Returns the existing files, sorted by number. A number has as many digits as there are # (or as
+// printf would write), or more without a leading 0. Errors: NotFound if none exist.
 absl::StatusOr<std::vector<std::string>> FindSequence(const std::string& path);
 
-// Has one frame read on a thread of its own while another is up.
+// Reads one frame on a separate thread while another is shown.
 class FrameAhead {
  public:
   // `source` must outlive it.
   explicit FrameAhead(FrameSource& source) : source_(source) {}
-  // The frame that the next Take gives; it is read from now on.
+  // Starts reading the frame that the next Take returns.
   void Ask(int64_t frame);
-  // Waits until it is there.
+  // Waits until the frame has been read.
   absl::StatusOr<Model> Take() { return next_.get(); }
 
  private:

@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::json;
 
-// Depth of what it walks is bounded by ParseJson.
+// ParseJson limits the depth of the recursion.
 class GeoJsonReader {
  public:
   GeoJsonReader(const SourceFile& file, bool globe, bool attributes)
@@ -51,10 +51,11 @@ absl::Status GeoJsonReader::ReadPosition(const json& position, const std::string
   return absl::OkStatus();
 }
 
-// depth 0: one position; 1: a line of positions; more: arrays of such.
+// `depth` 0 is one position; 1 is a line of positions; greater depths are arrays of such.
 absl::Status GeoJsonReader::ReadCoordinates(const json& coordinates, const std::string& where,
                                             int depth, bool closed, bool points) {
-  // RFC 7946, 3.1: an empty array means the same as null. Exporters write one for each empty part, too.
+  // RFC 7946, 3.1: an empty array means the same as null. Exporters write one for each empty part,
+  // too.
   if (coordinates.is_array() && coordinates.empty()) {
     lines_.LeaveOut(kNoCoordinates);
     return absl::OkStatus();
@@ -142,7 +143,7 @@ MapFeature FeatureOf(const json* properties, MapLines* lines) {
   const auto color = [&](const char* key, const char* opacity) -> std::optional<Rgb> {
     const auto found = properties->find(key);
     if (found == properties->end() || !found->is_string()) return std::nullopt;
-    // simplestyle allows #rgb without its mark.
+    // simplestyle allows #rgb without the #.
     const std::string& text = found->get_ref<const std::string&>();
     std::optional<uint32_t> parsed = ParseColor(text);
     if (!parsed) parsed = ParseColor("#" + text);

@@ -1,4 +1,4 @@
-// Maps: GeoJSON (RFC 7946) and TopoJSON (its specification, version 1).
+// Reads maps: GeoJSON (RFC 7946) and TopoJSON (its specification, version 1).
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -13,17 +13,20 @@ namespace voxeld::voxelctl {
 
 inline constexpr std::string_view kNoCoordinates = "geometries without coordinates";
 
-// Reads properties: the colours of simplestyle 1.1 (stroke, or else fill, and marker-color with their opacities) and all numbers. Counts
-// in `lines` what of a style is not drawn. Nothing if `properties` is null or not an object.
+// Reads properties: the colours of simplestyle 1.1 (stroke, or otherwise fill, and marker-color
+// with their opacities) and all numbers. Counts in `lines` the parts of a style that are not drawn.
+// Returns an empty feature if `properties` is null or not an object.
 MapFeature FeatureOf(const nlohmann::json* properties, MapLines* lines);
 
-// Any GeoJSON object: lines and the rings of polygons become lines, points become points; a third coordinate is a height. InvalidArgument names the member that is wrong.
+// Reads any GeoJSON object. Lines and rings of polygons become lines, and points become points; a
+// third coordinate is a height. Errors: InvalidArgument with the invalid member.
 absl::StatusOr<Model> ReadGeoJson(const SourceFile& file, const nlohmann::json& document,
                                   bool globe, bool attributes = false);
 
-// A Topology. Arcs are decoded (deltas and transform, if it has one) and each that an object refers
-// to is drawn once, however many neighbours share it; so every polygon's rings are closed and no
-// border is doubled; it has the colour and the numbers of the first.
+// Reads a Topology. Arcs are decoded (deltas and, if present, the transform), and each arc that an
+// object refers to is drawn once, however many neighbours share it. So the rings of all polygons
+// are closed and no border is doubled; a shared arc has the colour and the numbers of the first
+// object.
 absl::StatusOr<Model> ReadTopoJson(const SourceFile& file, const nlohmann::json& document,
                                    bool globe, bool attributes = false);
 

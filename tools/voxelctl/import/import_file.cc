@@ -77,7 +77,8 @@ bool HasSoundPicture(const Part& part, size_t pictures) {
                      [](const std::array<float, 2>& at) { return AllFinite(at); });
 }
 
-// Arrays have the lengths that all who read them rely on: the reader of a file may be in a stranger's hands.
+// Checks the lengths of arrays, which all users rely on, because a hostile file may have taken over
+// the reader.
 bool IsSound(const Part& part, size_t pictures) {
   const size_t count = part.positions.size();
   const size_t each = part.kind == Kind::kPoints ? 0 : part.kind == Kind::kSegments ? 2 : 3;
@@ -90,7 +91,7 @@ bool IsSound(const Part& part, size_t pictures) {
                      [&](const Attribute& one) { return one.values.size() == count; });
 }
 
-// 0 if there are none, or more than a model may hold.
+// Returns 0 if there are none, or more than a model may hold.
 uint64_t SamplesOf(const SampledVolume& volume) {
   uint64_t samples = 1;
   for (const uint32_t size : volume.size) {
@@ -102,7 +103,7 @@ uint64_t SamplesOf(const SampledVolume& volume) {
 
 }  // namespace
 
-// What every reader promises, held to: a slip in a library must not reach the server.
+// Verifies what every reader promises: an error in a library must not reach the server.
 absl::Status CheckModel(const SourceFile& file, const Model& model) {
   uint64_t vertices = 0, indices = 0, all_samples = 0;
   for (const Part& part : model.parts) {
@@ -200,7 +201,7 @@ absl::StatusOr<Model> ReadOwnFormat(const SourceFile& file, const ImportOptions&
   if (extension == "vox") return ReadVoxModel(file);
   if (extension == "json" || extension == "geojson" || extension == "topojson")
     return ReadMap(file, options.globe, options.attributes);
-  // Chemistry and surveyors use the same extension.
+  // Chemistry and surveying use the same extension.
   if (IsXyzMolecule(file.bytes)) return ReadXyzMolecule(file, options.style, options.attributes);
   return ReadTextPoints(file, options.attributes);
 }

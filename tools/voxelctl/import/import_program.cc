@@ -21,7 +21,7 @@ namespace {
 
 constexpr char kProgram[] = "voxeld-import";
 
-// Returns: the program's path; empty if there is none.
+// Returns: the program's path; empty if it is missing.
 std::string FindProgram() {
   std::error_code error;
   const std::filesystem::path here =
@@ -49,12 +49,12 @@ absl::Status NoProgram(absl::string_view subject) {
 #endif
 }
 
-// A description of the file, whose contents the program reads.
+// Returns a description of the file without contents, which the program reads.
 SourceFile Unread(const std::string& path, OtherFiles other_files) {
   return {.path = path, .extension = ExtensionOf(path), .bytes = {}, .other_files = other_files};
 }
 
-// The options that tools/import/main.cc takes.
+// Returns the options for tools/import/main.cc.
 std::vector<std::string> ArgumentsOf(const ImportOptions& options) {
   constexpr absl::string_view kOtherFiles[] = {"none", "below", "any"};
   constexpr absl::string_view kStyles[] = {"balls", "space"};
@@ -73,7 +73,7 @@ std::vector<std::string> ArgumentsOf(const ImportOptions& options) {
   return arguments;
 }
 
-// `more`: further command-line options.
+// `more` are further command-line options.
 absl::StatusOr<std::vector<std::string>> Command(const std::vector<std::string>& paths,
                                                  const ImportOptions& options,
                                                  const std::vector<std::string>& more) {

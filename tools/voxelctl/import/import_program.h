@@ -1,4 +1,4 @@
-// voxeld-import, the program that reads the files for which libraries are needed. It is an optional package.
+// voxeld-import, the program that reads the files that need libraries. It is an optional package.
 #pragma once
 
 #include <memory>
@@ -15,21 +15,24 @@
 
 namespace voxeld::voxelctl {
 
-// Returns: OK if the program exists beside this one or in ../libexec/voxeld. Errors: Unimplemented "SUBJECT: …" with how to get it.
+// Returns: OK if the program exists beside this one or in ../libexec/voxeld. Errors: Unimplemented
+// "SUBJECT: …" with how to install it.
 absl::Status CheckImporters(absl::string_view subject);
 
-// Reads a file or folder as ImportFile does, with the program.
+// Reads a file or folder like ImportFile, with the program.
 absl::StatusOr<Model> ImportByProgram(const std::string& path, const ImportOptions& options,
                                       Interrupt* interrupt);
 
-// Animation `number`, from 1 on, of a mesh file or skeleton (glTF, FBX, COLLADA, BVH, …), in frames of `fps` a second from its
-// beginning to its end. Meshes follow their bones; without meshes the bones are lines. The program runs as long as the result lives.
-// `interrupt` may be null. Errors: InvalidArgument if there is no such animation, with the names of those there are; as above.
+// Opens animation `number`, from 1, of a mesh file or skeleton (glTF, FBX, COLLADA, BVH, …), with
+// frames at `fps` per second from beginning to end. Meshes follow their bones; without
+// meshes the bones are lines. The program runs as long as the result lives. `interrupt` may be
+// null. Errors: InvalidArgument if the animation does not exist, with the names of the existing ones;
+// as above.
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenAnimation(
     const std::string& path, size_t number, double fps, OtherFiles other_files = OtherFiles::kBelow,
     Interrupt* interrupt = nullptr);
 
-// Files that are frames, all of them read by one run of the program.
+// Opens files that are frames; one run of the program reads all of them.
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenSequence(const std::vector<std::string>& paths,
                                                           const ImportOptions& options,
                                                           Interrupt* interrupt);

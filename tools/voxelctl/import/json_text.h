@@ -1,4 +1,4 @@
-// JSON from files that nobody vouches for.
+// Parses JSON of untrusted files.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -9,8 +9,8 @@
 
 namespace voxeld::voxelctl {
 
-// `text` is the whole of `file` or a part of it.
-// InvalidArgument: what is wrong, and at which byte or depth.
+// `text` is all or a part of `file`. Errors: InvalidArgument with what is wrong, and at which byte
+// or depth.
 absl::StatusOr<nlohmann::json> ParseJson(const SourceFile& file, absl::string_view text);
 
 }  // namespace voxeld::voxelctl

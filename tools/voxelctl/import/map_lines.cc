@@ -14,7 +14,7 @@ namespace {
 constexpr double kStepDegrees = 2;
 constexpr double kOnCut = 1e-9;
 constexpr double kMostLatitude = 90 + kOnCut;
-constexpr uint64_t kMostNumbers = uint64_t{1} << 27;  // of all attributes: half a gigabyte
+constexpr uint64_t kMostNumbers = uint64_t{1} << 27;  // over all attributes: half a gigabyte
 constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 
 Point3 OnSphere(LonLat p) {
@@ -22,7 +22,7 @@ Point3 OnSphere(LonLat p) {
   return {std::cos(lat) * std::sin(lon), -std::cos(lat) * std::cos(lon), std::sin(lat)};
 }
 
-// The place between two others, of which `to` is at 1.
+// Interpolates between two places; `t` is 1 at `to`.
 LonLat Between(LonLat from, LonLat to, double t) {
   return {from.lon + (to.lon - from.lon) * t, from.lat + (to.lat - from.lat) * t,
           from.height + (to.height - from.height) * t};
@@ -53,7 +53,7 @@ uint32_t MapLines::BeginFeature(const MapFeature& feature) {
     numbers_.emplace_back(at->second, value);
   }
   kept.end = numbers_.size();
-  // Features that have nothing of all this share an entry.
+  // Features without any of these share an entry.
   if (!kept.line && !kept.point && kept.begin == kept.end) {
     return feature_ = 0;
   }
@@ -95,7 +95,7 @@ uint32_t MapLines::AddVertex(LonLat p) {
 void MapLines::AddEdge(LonLat from, LonLat to) {
   if (globe_ && ((IsOnCut(from) && IsOnCut(to)) || (IsPole(from) && IsPole(to)))) return;
   if (cut_ && std::abs(to.lon - from.lon) > 180) {
-    // The same end, counted on over the cut.
+    // The same end, with its longitude continued across the cut.
     const bool is_eastward = to.lon < from.lon;
     const LonLat onward{to.lon + (is_eastward ? 360 : -360), to.lat, to.height};
     if (globe_) {
@@ -199,7 +199,8 @@ void MapLines::AddFeatures(const std::vector<uint32_t>& features, std::vector<do
 }
 
 absl::Status MapLines::Finish(std::string format, Model* model) && {
-  // In degrees the map's edges are one place: those at ±180, or those at 0 and 360.
+  // In degrees, the map's left and right edges are the same place: those at ±180, or those at 0 and
+  // 360.
   const bool degrees = least_lon_ >= -360 && most_lon_ <= 360 && most_lat_ <= kMostLatitude;
   const bool around_zero = least_lon_ >= -180 && most_lon_ <= 180;
   if (degrees && !around_zero && least_lon_ >= 0) {

@@ -1,4 +1,4 @@
-// Longitude and latitude to lines and points of a model.
+// Converts longitude and latitude to lines and points of a model.
 #pragma once
 
 #include <cstdint>
@@ -20,52 +20,54 @@ namespace voxeld::voxelctl {
 // Degrees on a globe; any units on a flat map.
 struct LonLat {
   double lon = 0, lat = 0;
-  double height = std::numeric_limits<double>::quiet_NaN();  // none
+  double height = std::numeric_limits<double>::quiet_NaN();  // not-a-number: none
   bool operator==(const LonLat& other) const { return lon == other.lon && lat == other.lat; }
 };
 
-// What the lines and points of a feature have in common.
+// Properties that the lines and points of a feature have in common.
 struct MapFeature {
   std::optional<Rgb> line, point;                       // colours
-  std::vector<std::pair<std::string, double>> numbers;  // properties by which it can be coloured
+  std::vector<std::pair<std::string, double>> numbers;  // properties that can determine its colour
 };
 
-// Returns: `color`, as much darker as it is transparent: light cannot be seen through.
+// Returns: `color`, darkened by its transparency, because light cannot occlude.
 Rgb WithOpacity(Rgb color, double opacity);
 
 // Collects the lines and points of one map.
 //
 // Globe: the unit sphere, poles on ±z, longitude 0 to the front (−y), east to the right. Edges
-// follow the sphere in steps of at most 2°; those that run along the cut at ±180° or lie in a pole
-// belong to the paper, not the Earth, and are left out. An edge longer than 180° in longitude goes
-// the short way round. Flat: x to the right, y up, in the map's own units. If the map is in
-// degrees, an edge longer than 180° is split at the cut, which is at 360° if no longitude is negative and one is beyond 180°.
+// follow the sphere in steps of at most 2°. Edges along the cut at ±180° or in a pole are artefacts
+// of the flat map and are left out. An edge longer than 180° in longitude takes the short way
+// round. Flat: x to the right, y up, in the map's own units. If the map is in degrees, an edge
+// longer than 180° is split at the cut, which is at 360° if no longitude is negative and one is
+// beyond 180°.
 class MapLines {
  public:
-  // `file` must outlive it. Without `attributes` the model has none.
+  // `file` must outlive this object. Without `attributes` the model has none.
   MapLines(const SourceFile& file, bool globe, bool attributes)
       : file_(file), globe_(globe), attributes_(attributes) {}
 
-  // What is added from here on belongs to `feature`. Returns: a number for ResumeFeature.
+  // Everything added from here on belongs to `feature`. Returns: a number for ResumeFeature.
   uint32_t BeginFeature(const MapFeature& feature);
   void ResumeFeature(uint32_t number) { feature_ = number; }
 
-  // One strip, or a loop if `closed`: its last point goes on to its first.
-  // InvalidArgument if a coordinate is not finite, or no longitude and latitude on a globe,
-  // or the model becomes too large.
+  // Adds one strip, or a loop if `closed`, in which the last point is connected to the first.
+  // Errors: InvalidArgument if a coordinate is not finite, or not a longitude and latitude on a
+  // globe, or the model becomes too large.
   absl::Status AddLine(std::span<const LonLat> line, bool closed);
   absl::Status AddPoint(LonLat point);
 
-  // Counts what the map has and the model does not show.
+  // Counts contents of the map that the model does not show.
   void LeaveOut(std::string_view kind, uint64_t count = 1) { AddLeftOut(kind, count, &counted_); }
 
-  // A colour for each vertex if any feature has one, white for the others; an attribute for each property that is a number in any
-  // feature, and "height" if any is not 0; the heights are counted, since no line is drawn above the map. InvalidArgument if nothing
-  // was added.
+  // Writes the model, with a colour for each vertex if any feature has one (white for the others);
+  // an attribute for each property that is a number in any feature; and "height" if any is not 0.
+  // The heights are counted, because no line is drawn above the map. Errors: InvalidArgument if
+  // nothing was added.
   absl::Status Finish(std::string format, Model* model) &&;
 
  private:
-  // Lines are drawn when all are known: where the map is cut depends on all.
+  // Lines are drawn when all are known, because the position of the cut depends on all of them.
   struct Line {
     size_t begin = 0, end = 0;  // of corners_
     uint32_t feature = 0;
@@ -81,7 +83,7 @@ class MapLines {
 
   const SourceFile& file_;
   bool globe_, attributes_;
-  double least_lon_ = 0, most_lon_ = 0, most_lat_ = 0;  // the last without its sign
+  double least_lon_ = 0, most_lon_ = 0, most_lat_ = 0;  // the last is absolute
   std::optional<double> cut_;                           // longitude of the map's right edge
   std::vector<LonLat> corners_;
   std::vector<Line> to_draw_;
@@ -93,14 +95,14 @@ class MapLines {
   std::vector<std::string> names_;                        // of properties
   std::map<std::string, uint32_t> name_numbers_;          // indices of names_
   std::vector<std::pair<uint32_t, double>> numbers_;      // name and value
-  std::vector<uint32_t> line_features_, point_features_;  // of each vertex
-  std::vector<double> line_heights_, point_heights_;      // of each vertex
-  uint64_t heights_ = 0;                                  // that are not 0
+  std::vector<uint32_t> line_features_, point_features_;  // per vertex
+  std::vector<double> line_heights_, point_heights_;      // per vertex
+  uint64_t heights_ = 0;                                  // number of heights other than 0
   uint32_t feature_ = 0;
   Part lines_{.kind = Kind::kSegments};
   Part points_{.kind = Kind::kPoints};
   Model counted_;
-  LonLat last_;  // the vertex that ended the edge before
+  LonLat last_;  // the vertex at the end of the previous edge
   bool has_last_ = false;
 };
 

@@ -22,14 +22,15 @@ constexpr std::array<char, 8> kMarker = {'V', 'X', 'M', 'O', 'D', 'E', 'L', kMod
 constexpr char kOfAnotherRelease[] =
     ": voxeld-import and voxelctl are of different releases; install both packages of one release";
 
-// Lists are written and read by so many bytes at a time.
+// Lists are written and read in chunks of this many bytes.
 constexpr size_t kChunk = size_t{1} << 20;
 
-// Limits of lists, beside those of the whole model (CheckModel).
+// Limits of lists, in addition to those of the whole model (CheckModel).
 constexpr uint64_t kMostTextBytes = 64 << 10, kMostItems = 1 << 20,
                    kMostPictureBytes = uint64_t{1} << 30;
 
-// Gives back the whole pages among these bytes, which are not used any more. Their contents become zero.
+// Releases the whole pages among these unused bytes to the system. Their
+// contents become zero.
 void GiveBackPages(const char* bytes, size_t size) {
   static const auto page = static_cast<uintptr_t>(::sysconf(_SC_PAGESIZE));
   const auto at = reinterpret_cast<uintptr_t>(bytes);
@@ -41,7 +42,7 @@ class ModelWriter {
  public:
   explicit ModelWriter(int descriptor) : descriptor_(descriptor) { buffer_.reserve(kBuffered); }
 
-  // Call it at the end. Returns: whether everything could be written.
+  // Flushes at the end. Returns: whether everything could be written.
   bool Finish() {
     Flush();
     return ok_;
@@ -59,7 +60,7 @@ class ModelWriter {
   void Value(Number number) {
     Bytes(&number, sizeof(number));
   }
-  // At most kMostTextBytes of it.
+  // Writes at most kMostTextBytes of it.
   void Text(absl::string_view text) { All(text.substr(0, kMostTextBytes)); }
   template <typename Values>
   void All(Values values) {
@@ -107,7 +108,7 @@ class ModelReader {
     return ok_ ? number : Number{};
   }
   bool Flag() { return Value<uint8_t>() != 0; }
-  // The number of a list's items, of which `most` are possible.
+  // Returns the number of a list's items, of which `most` are possible.
   uint64_t Count(uint64_t most) {
     const auto count = Value<uint64_t>();
     ok_ = ok_ && count <= most;
@@ -116,7 +117,8 @@ class ModelReader {
   template <typename Values>
   void All(Values* values, uint64_t most) {
     const uint64_t count = Count(most);
-    // Untouched memory is only address space, so what a list claims costs nothing until it arrives.
+    // Untouched memory is only address space, so a list's declared length costs nothing until the
+    // items arrive.
     values->reserve(count);
     constexpr size_t kSome = kChunk / sizeof((*values)[0]);
     while (ok_ && values->size() < count) {
@@ -130,7 +132,7 @@ class ModelReader {
     All(&text, kMostTextBytes);
     return text;
   }
-  // An enumeration whose last enumerator is `last`.
+  // Reads an enumeration whose last enumerator is `last`.
   template <typename Enum>
   Enum OneOf(Enum last) {
     const auto number = Value<uint8_t>();
@@ -149,7 +151,7 @@ void WriteStatus(const absl::Status& status, ModelWriter& writer) {
   if (!status.ok()) writer.Text(status.message());
 }
 
-// One of those that readers use.
+// Returns a code that readers use.
 absl::StatusCode CodeOf(uint32_t code) {
   switch (static_cast<absl::StatusCode>(code)) {
     case absl::StatusCode::kNotFound:
@@ -163,7 +165,7 @@ absl::StatusCode CodeOf(uint32_t code) {
   }
 }
 
-// The beginning of an answer: the error that was written, or OK if what was asked for follows.
+// Reads the beginning of an answer: the error that was written, or OK if the result follows.
 absl::Status ReadStatus(const SourceFile& file, ModelReader& reader, absl::Status* written) {
   std::array<char, kMarker.size()> marker = {};
   reader.Bytes(marker.data(), marker.size());

@@ -22,16 +22,19 @@ namespace {
 
 // In ångström.
 constexpr double kFarthestAtom = 1e6;
-constexpr double kBondSlack = 0.45, kNearestAtom = 0.4;  // of the length of a bond
-constexpr double kHydrogen = 0.35;                       // no larger radius is a hydrogen's
+// Maximum excess and minimum of a bond's length.
+constexpr double kBondSlack = 0.45, kNearestAtom = 0.4;
+constexpr double kHydrogen = 0.35;  // larger radii are not hydrogen's
 constexpr double kRodDiameter = 0.3,
                  kBallShare = 0.25;  // a rod's diameter; a ball's share of its atom
-// Atoms in a cell: twenty times as many to a cubic ångström as in a crystal with its hydrogens.
+// The number of atoms per cell, by density: up to twenty times as many per cubic ångström as in a
+// crystal with its hydrogens.
 constexpr double kMostDense = 2.2, kMostSparse = 16;
 
 constexpr double kNoAtomValue = std::numeric_limits<double>::quiet_NaN();
 
-// Finds bonds by distance with a grid whose cells are as large as the longest bond, so that only neighbouring cells are compared.
+// Finds bonds by distance, with a grid whose cells are as large as the longest bond, so that only
+// neighbouring cells are compared.
 class BondSearch {
  public:
   explicit BondSearch(const std::vector<MoleculeAtom>& atoms) : atoms_(atoms) {
@@ -51,7 +54,7 @@ class BondSearch {
             static_cast<int64_t>(std::floor(p.y / side_)),
             static_cast<int64_t>(std::floor(p.z / side_))};
   }
-  // 21 bits an axis are enough for kFarthestAtom.
+  // 21 bits per axis are enough for kFarthestAtom.
   static uint64_t Key(const Cell& cell) {
     constexpr int64_t kMiddle = int64_t{1} << 20;
     uint64_t key = 0;
@@ -95,7 +98,7 @@ absl::Status BondSearch::Run(const SourceFile& file, std::vector<std::array<uint
   }
   for (const auto& [key, range] : cells) {
     const Cell cell = CellOf(atoms_[sorted[range.first].second].at);
-    // Each pair of cells is met once: from the one whose key is lower.
+    // Each pair of cells is visited once: from the cell with the lower key.
     for (int64_t n = 0; n < 27; ++n) {
       const uint64_t other =
           Key({cell[0] + n % 3 - 1, cell[1] + n / 3 % 3 - 1, cell[2] + n / 9 - 1});
@@ -145,7 +148,7 @@ void AddRods(const Molecule& molecule, Model* model) {
   if (!part.positions.empty()) model->parts.push_back(std::move(part));
 }
 
-// Points of one part are equally thick.
+// All points of one part have the same thickness.
 void AddBalls(const Molecule& molecule, MoleculeStyle style, Model* model) {
   std::map<double, Part> parts;
   for (uint32_t i = 0; i < molecule.atoms.size(); ++i) {
@@ -169,7 +172,7 @@ XyzWords XyzWordsOf(absl::string_view line) {
   return absl::StrSplit(line, absl::ByAnyChar(" \t"), absl::SkipEmpty());
 }
 
-// XyzLines without their ends and the blanks around.
+// The lines of a text without line ends and surrounding blanks.
 class XyzLines {
  public:
   explicit XyzLines(absl::string_view text) : rest_(text) {
@@ -207,7 +210,7 @@ std::optional<double> XyzNumber(absl::string_view word) {
   return value;
 }
 
-// Null if `word` is not an element; UnknownElement() for dummy atoms and names that nobody knows.
+// Returns null if `word` is not an element; UnknownElement() for dummy atoms and unknown names.
 const ChemicalElement* XyzElementOf(absl::string_view word) {
   if (const std::optional<uint64_t> number = AtomCountOf(word))
     return *number > 0 && *number <= 118 ? FindElement(static_cast<int>(*number)) : nullptr;
@@ -216,7 +219,7 @@ const ChemicalElement* XyzElementOf(absl::string_view word) {
     ++letters;
   if (letters == 0) return nullptr;
   if (const ChemicalElement* element = FindElement(word.substr(0, letters))) return element;
-  // A name such as OW or CA1: its first letter.
+  // For a name such as OW or CA1, the first letter counts.
   const ChemicalElement* element = FindElement(word.substr(0, 1));
   return element != nullptr ? element : &UnknownElement();
 }
@@ -227,13 +230,14 @@ bool IsXyzAtom(const XyzWords& words, bool by_number) {
          XyzNumber(words[2]) && XyzNumber(words[3]);
 }
 
-// Where the columns of extended XYZ are, by its comment.
+// The columns of extended XYZ, given by its comment.
 struct XyzLayout {
   size_t element = 0, place = 1;
   std::vector<std::pair<size_t, std::string>> others;  // columns of numbers and their names
 };
 
-// Reads Properties=species:S:1:pos:R:3:charge:R:1 of a comment. False if it has none that names an element and a place.
+// Reads a comment such as Properties=species:S:1:pos:R:3:charge:R:1. Returns false if it does not
+// name an element and a position.
 bool ReadXyzProperties(absl::string_view comment, XyzLayout* layout) {
   const size_t begin = comment.find("Properties=");
   if (begin == absl::string_view::npos) return false;
@@ -426,7 +430,8 @@ bool IsXyzMolecule(absl::string_view text) {
   if (!lines.Next(&line)) return false;
   if (IsXyzAtom(XyzWordsOf(line), false)) return true;
   if (is_point) return false;
-  // By atomic numbers: every line has one, so that points with three coordinates and a value are not taken for atoms.
+  // With atomic numbers, every line must begin with one, so that points with three coordinates and
+  // a value are not taken for atoms.
   uint64_t atoms = 0;
   do {
     const XyzWords words = XyzWordsOf(line);

@@ -15,7 +15,7 @@
 
 namespace voxeld::voxelctl {
 
-// A ball and its share of the rods have five vertices where each atom has two bonds.
+// A ball and its share of the rods have five vertices if each atom has two bonds.
 inline constexpr size_t kMostAtoms = kMaxModelVertices / 5;
 
 struct MoleculeAtom {
@@ -25,24 +25,27 @@ struct MoleculeAtom {
 
 struct Molecule {
   std::vector<MoleculeAtom> atoms;
-  std::vector<std::array<uint32_t, 2>> bonds;  // those that the file names
-  std::vector<Attribute> attributes;           // a value for each atom
+  std::vector<std::array<uint32_t, 2>> bonds;  // the bonds that the file names
+  std::vector<Attribute> attributes;           // a value per atom
 };
 
-// Adds to `model` the atoms as thick points in the colours of their elements and, in the style kBalls, the bonds as thick segments,
-// each half in its atom's colour. Atoms are also bonded if their distance is at most the sum of their covalent radii and 0.45 Å.
-// With `attributes`, vertices have those of `molecule` that have any value, and "element", the atomic number.
-// Returns: InvalidArgument if a coordinate is not finite or beyond 1,000,000 Å, if there are too many atoms, or too many in one place.
+// Adds the atoms to `model` as thick points in the colours of their elements and, in the style
+// kBalls, the bonds as thick segments, each half in its atom's colour. Atoms are also bonded if
+// their distance is at most the sum of their covalent radii and 0.45 Å. With `attributes`, vertices
+// get the attributes of `molecule` that have any value, and "element", the atomic number. Returns:
+// InvalidArgument if a coordinate is not finite or beyond 1,000,000 Å, if there are too many atoms,
+// or too many in one place.
 absl::Status DrawMolecule(const SourceFile& file, Molecule molecule, MoleculeStyle style,
                           bool attributes, Model* model);
 
-// Returns true if `text` begins as chemistry's XYZ format does: the number of atoms, a comment, then an element and its coordinates
-// on each line.
+// Returns true if `text` begins like chemistry's XYZ format: the number of atoms, a comment, then
+// an element and its coordinates on each line.
 bool IsXyzMolecule(absl::string_view text);
 
-// Reads the first frame. Elements are symbols, symbols with a label ("C12") or atomic numbers. Columns after the coordinates become
-// attributes: those that the comment names (Properties= of extended XYZ), otherwise "column 5" and so on. Further frames and lines
-// that belong to no frame are counted. InvalidArgument with the line's number.
+// Reads the first frame. Elements are symbols, symbols with a label ("C12") or atomic numbers.
+// Columns after the coordinates become attributes: those that the comment names (Properties= of
+// extended XYZ), otherwise "column 5" and so on. Further frames and lines that belong to no frame
+// are counted. Errors: InvalidArgument with the line's number.
 absl::StatusOr<Model> ReadXyzMolecule(const SourceFile& file, MoleculeStyle style,
                                       bool attributes = false);
 

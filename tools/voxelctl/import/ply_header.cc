@@ -98,7 +98,7 @@ absl::Status ParseProperty(const SourceFile& file, int number, absl::string_view
   return absl::OkStatus();
 }
 
-// The fewest bytes in which one entry can be written.
+// Returns the minimum number of bytes of one entry.
 uint64_t LeastBytes(const PlyHeader& header, const PlyElement& element) {
   uint64_t bytes = 0;
   for (const PlyProperty& property : element.properties) {
@@ -130,7 +130,7 @@ absl::Status CheckVertices(const SourceFile& file, const PlyHeader& header) {
 }
 
 absl::Status CheckCounts(const SourceFile& file, const PlyHeader& header) {
-  // The last line of an ASCII file need not end.
+  // The last line of an ASCII file need not have a line end.
   const uint64_t have = file.bytes.size() - header.body + 1;
   uint64_t need = 0;
   for (const PlyElement& element : header.elements) {
@@ -195,8 +195,8 @@ absl::StatusOr<PlyHeader> ParsePlyHeader(const SourceFile& file, PlyCounts count
   PlyHeader header;
   bool formatted = false;
   size_t at = 0;
-  // The format's first description ends lines by carriage returns alone. Where a file does so, a line feed behind the header may be
-  // its first number.
+  // The format's first description ends lines by carriage returns alone. If a file does so, a line
+  // feed after the header may be its first number.
   const size_t first_end = text.find_first_of("\r\n");
   const bool by_returns = first_end != absl::string_view::npos && text[first_end] == '\r' &&
                           text.substr(first_end, 2) != "\r\n";
@@ -234,7 +234,7 @@ absl::StatusOr<PlyHeader> ParsePlyHeader(const SourceFile& file, PlyCounts count
     } else if (words.size() > 2 && words[0] == "comment" && words[1] == "TextureFile") {
       ++header.pictures;
     }
-    // Anything else is a comment, or a line that an exporter put there without calling it one.
+    // Any other line is a comment, or a line that an exporter added without marking it as one.
     if (!status.ok()) return status;
   }
   if (!formatted)

@@ -18,25 +18,25 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr double kSmoothCosine = 0.642787609686539;  // 50 degrees; sharper edges stay edges
-constexpr size_t kMostFacesAround = 64;  // a vertex of more faces has one normal, the mean of all
+constexpr size_t kMostFacesAround = 64;  // a vertex of more faces gets one normal, the mean of all
 
-// Triangles as they are read: three vertices each, and the color of the face that each is of.
+// Triangles as they are read: three vertices each, and the color of the face to which each belongs.
 struct PlyTriangles {
   std::vector<uint32_t> vertices;
-  std::vector<Rgb> colors;  // or none
+  std::vector<Rgb> colors;  // may be empty
 };
 
-// The lists of vertices of an element, one an entry, with colors.
+// The lists of vertices of an element, one per entry, with colors.
 struct PlyFaces {
   std::vector<uint32_t> vertices;  // of all faces
-  std::vector<uint32_t> sizes;     // of each
-  std::vector<Rgb> colors;         // or none
+  std::vector<uint32_t> sizes;     // per face
+  std::vector<Rgb> colors;         // may be empty
   uint64_t others = 0;             // properties that are neither indices nor colours
 };
 
 constexpr double kMostListed = kMaxModelIndices;  // entries of a list
 
-constexpr uint32_t kRestart = 0xffffffff;  // of a strip
+constexpr uint32_t kRestart = 0xffffffff;  // marks the end of a strip
 
 absl::Status FaceError(const SourceFile& file, const PlyElement& element, uint64_t number,
                        absl::string_view found, absl::string_view expected) {
@@ -62,7 +62,8 @@ absl::Status TooManyIndices(const SourceFile& file) {
                    "so large a model is not read; simplify it first");
 }
 
-// Reads "face" or "tristrips", in which −1 begins a new strip, or its bits as a number without a sign.
+// Reads "face" or "tristrips", in which −1 begins a new strip; −1 may be stored as an unsigned
+// number with the same bits.
 absl::StatusOr<PlyFaces> ReadFaces(const SourceFile& file, const PlyElement& element,
                                    uint64_t vertices, bool strips, PlyValues* values) {
   const std::optional<size_t> list = IndexList(element);
@@ -119,7 +120,7 @@ absl::StatusOr<PlyFaces> ReadFaces(const SourceFile& file, const PlyElement& ele
   return faces;
 }
 
-// Every polygon's triangles.
+// Returns the triangles of all polygons.
 absl::StatusOr<PlyTriangles> Triangulated(const SourceFile& file, const PlyFaces& faces,
                                           const std::vector<Point3>& positions) {
   PlyTriangles triangles;
@@ -142,7 +143,7 @@ absl::StatusOr<PlyTriangles> Triangulated(const SourceFile& file, const PlyFaces
   return triangles;
 }
 
-// Every second triangle of a strip is turned round.
+// Reverses every second triangle of a strip.
 absl::StatusOr<PlyTriangles> Unstripped(const SourceFile& file, const PlyFaces& strips) {
   PlyTriangles triangles;
   size_t first = 0;
@@ -154,7 +155,7 @@ absl::StatusOr<PlyTriangles> Unstripped(const SourceFile& file, const PlyFaces& 
       if (triangles.vertices.size() + 3 > kMaxModelIndices) return TooManyIndices(file);
       const bool turned = (i - begun) % 2 == 1;
       const uint32_t a = strips.vertices[i - 2], b = strips.vertices[i - 1];
-      // A strip bends by naming a vertex twice.
+      // A strip turns by repeating a vertex.
       const uint32_t c = strips.vertices[i];
       if (a == b || b == c || a == c) continue;
       for (const uint32_t v : {turned ? b : a, turned ? a : b, c}) triangles.vertices.push_back(v);
@@ -164,22 +165,22 @@ absl::StatusOr<PlyTriangles> Unstripped(const SourceFile& file, const PlyFaces& 
   return triangles;
 }
 
-// Which vertices lie at one place: the number of the place of each.
+// Returns for each vertex the number of its place; vertices at the same place share one.
 std::vector<uint32_t> Places(const std::vector<Point3>& positions,
                              const std::vector<uint32_t>& triangles) {
   SurfaceBuilder places(false);
   for (const uint32_t v : triangles) places.Add({positions[v], {}, {}});
-  return std::move(places).Finish().indices;  // of each corner
+  return std::move(places).Finish().indices;  // per corner
 }
 
-// Half the size of a point, for there are as many as corners.
+// Half the size of a Point3, because there are as many as corners.
 using SmallVector = std::array<float, 3>;
 
 SmallVector Small(const Point3& v) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
 }
 
-// A normal for each corner of the triangles.
+// Returns a normal for each corner of the triangles.
 std::vector<SmallVector> SmoothNormals(const std::vector<Point3>& positions,
                                        const std::vector<uint32_t>& triangles) {
   const size_t corners = triangles.size();
@@ -191,7 +192,7 @@ std::vector<SmallVector> SmoothNormals(const std::vector<Point3>& positions,
   const std::vector<uint32_t> place = Places(positions, triangles);
   const size_t places =
       place.empty() ? 0 : size_t{*std::max_element(place.begin(), place.end())} + 1;
-  // Corners by their place: those of place p are from first[p] to first[p + 1].
+  // Corners by place: those of place p are from first[p] to first[p + 1].
   std::vector<uint32_t> first(places + 1), order(corners);
   for (const uint32_t p : place) ++first[p + 1];
   for (size_t p = 0; p < places; ++p) first[p + 1] += first[p];
@@ -247,7 +248,7 @@ absl::StatusOr<Part> Surface(const SourceFile& file, const PlyVertices& vertices
   return std::move(surface).Finish();
 }
 
-// Gives each corner of the triangles a vertex of its own, with the attributes of the vertex that it is in the file.
+// Gives each corner of the triangles a vertex of its own, with the attributes of the file's vertex.
 void AddAttributes(const PlyVertices& vertices, const PlyTriangles& triangles, Part* part) {
   if (vertices.attributes.empty()) return;
   Part apart;

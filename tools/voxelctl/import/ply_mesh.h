@@ -1,4 +1,4 @@
-// Surfaces from PLY: files with faces or strips of triangles.
+// Reads surfaces from PLY: files with faces or triangle strips.
 #pragma once
 
 #include "absl/status/statusor.h"
@@ -8,13 +8,14 @@
 
 namespace voxeld::voxelctl {
 
-// Whether `header` announces faces or strips.
+// Returns whether `header` declares faces or strips.
 bool HasPlySurfaces(const PlyHeader& header);
 
-// Requires: `header` is of `file`, and has vertices and surfaces. Elements may come in any order, and other elements are passed over.
-// Polygons become triangles (triangulate.h); a strip's −1 begins a new one. Normals are the file's, or the mean of the faces around
-// a vertex that lie within 50 degrees of each other. A face's color goes before its vertices'.
-// Returns: InvalidArgument with the face or the vertex that is wrong.
+// Reads the surfaces. Requires: `header` is of `file`, and has vertices and surfaces. Elements may
+// come in any order, and other elements are skipped. Polygons become triangles (triangulate.h); a
+// strip's −1 begins a new one. Normals are the file's, or the mean of the faces around a vertex
+// that differ by at most 50 degrees. A face's color overrides those of its vertices. Returns:
+// InvalidArgument with the invalid face or vertex.
 absl::StatusOr<Model> ReadPlyMesh(const SourceFile& file, const PlyHeader& header,
                                   bool attributes = false);
 

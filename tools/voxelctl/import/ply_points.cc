@@ -20,7 +20,7 @@ absl::StatusOr<Model> ReadPlyPoints(const SourceFile& file, const PlyHeader& hea
   absl::StatusOr<PlyVertices> vertices = ReadPlyVertices(file, *vertex, attributes, &values);
   if (!vertices.ok()) return vertices.status();
 
-  // Scanners write NaN for what they have not seen.
+  // Scanners write NaN for points that they did not measure.
   Part part;
   part.kind = Kind::kPoints;
   const size_t count = vertices->positions.size();

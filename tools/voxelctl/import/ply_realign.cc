@@ -12,9 +12,9 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// Beyond this many bytes lost within one vertex nothing can be told any more.
+// If more bytes than this are lost within one vertex, the shift cannot be determined.
 constexpr size_t kMostLost = 5;
-// How many vertices in a row bear witness to a place.
+// The number of consecutive valid vertices that confirm a position.
 constexpr size_t kWitnesses = 4;
 
 // Fixed-size entries with a position and a normal in f32.
@@ -43,7 +43,7 @@ struct Entries {
     return std::abs(square - 1) < 0.02;  // false for NaN
   }
 
-  // Of the entries from `at` on, how many are in place; the very end of the data counts as one.
+  // Returns how many entries from `at` on are in place; the exact end of the data counts as one.
   size_t Witnesses(absl::string_view body, size_t at) const {
     size_t found = 0;
     for (size_t i = 0; i < kWitnesses && at <= body.size(); ++i, at += size) {
@@ -52,7 +52,8 @@ struct Entries {
     return found;
   }
 
-  // One lost byte, put back: a CR before one of the LFs, so that the normal is of unit length.
+  // Restores one lost byte: inserts a CR before one of the LFs such that the normal gets unit
+  // length.
   std::optional<std::string> Mend(absl::string_view damaged) const {
     for (size_t lf = damaged.find('\n'); lf != absl::string_view::npos;
          lf = damaged.find('\n', lf + 1)) {
@@ -64,7 +65,7 @@ struct Entries {
   }
 };
 
-// The box of the positions that are beyond doubt.
+// The box of the certain positions.
 struct Reach {
   double low[3] = {1e300, 1e300, 1e300}, high[3] = {-1e300, -1e300, -1e300};
 

@@ -1,5 +1,5 @@
-// Mends binary PLY clouds that were once copied as text: every CR LF became LF, so each lost byte
-// shifts all that follows it. Such files are in circulation, packaged ones among them.
+// Repairs binary PLY clouds that were once copied as text: every CR LF became LF, so each lost byte
+// shifts everything after it. Such files are in circulation, including packaged ones.
 #pragma once
 
 #include <cstdint>
@@ -11,14 +11,14 @@
 namespace voxeld::voxelctl {
 
 struct RealignedPly {
-  SourceFile file;            // with as many bytes as the header announces
-  uint64_t lost_bytes = 0;    // that the copy had dropped
-  uint64_t lost_entries = 0;  // vertices that could not be made out: each repeats the one before it
+  SourceFile file;            // with as many bytes as the header declares
+  uint64_t lost_bytes = 0;    // dropped by the copy
+  uint64_t lost_entries = 0;  // vertices that could not be recovered: each repeats the previous one
 };
 
-// Nothing unless the file has the marks of such a copy, holds vertices alone, of fixed size and
-// with normals in f32, and every shift can be found: a vertex is taken to be in place if its normal
-// is of unit length, and so are those that follow.
+// Returns nothing unless the file has the signs of such a copy, contains only vertices, of fixed
+// size and with normals in f32, and every shift can be found. A vertex is considered in place if
+// its normal and those of the following vertices have unit length.
 std::optional<RealignedPly> RealignPly(const SourceFile& file, const PlyHeader& header);
 
 }  // namespace voxeld::voxelctl

@@ -32,7 +32,7 @@ int ChannelByName(absl::string_view name) {
   return -1;
 }
 
-// 0 to 2: a coordinate; 3 to 5: one of the normal; −1: neither.
+// Returns 0 to 2 for a coordinate; 3 to 5 for one of the normal; −1 for neither.
 int CoordinateByName(absl::string_view name) {
   static constexpr absl::string_view kCoordinates[6] = {"x", "y", "z", "nx", "ny", "nz"};
   for (int i = 0; i < 6; ++i) {
@@ -69,8 +69,8 @@ uint8_t PlyChannel(double value, double full_scale) {
   return static_cast<uint8_t>(std::isfinite(scaled) ? std::clamp(scaled, 0.0, 255.0) : 0.0);
 }
 
-// Reads one property of one entry. A list is passed over, and its value is its length: a count that is too great ends
-// with the data, after at most a file's length.
+// Reads one property of one entry. A list is skipped, and its value is its length: a count that is
+// too large ends with the data, after at most a file's length.
 bool ReadProperty(const PlyProperty& property, PlyValues* values, double* value) {
   if (!values->Next(property.is_list ? property.count_type : property.type, value)) return false;
   if (!property.is_list) return true;
@@ -221,10 +221,10 @@ absl::StatusOr<PlyVertices> ReadPlyVertices(const SourceFile& file, const PlyEle
   const bool normals = has[3] && has[4] && has[5];
 
   PlyVertices out;
-  std::vector<size_t> numbers;  // the properties that are attributes
+  std::vector<size_t> numbers;  // indices of the properties that are attributes
   for (size_t p = 0; p < count; ++p) {
     const PlyProperty& property = vertex.properties[p];
-    // A lone channel or half a normal is a number like any other.
+    // A single channel or half of a normal is treated as any other number.
     if ((colors.found() && colors.ChannelOf(p) >= 0) ||
         (coordinates[p] >= 0 && (coordinates[p] < 3 || normals))) {
       continue;

@@ -1,4 +1,5 @@
-// The body of a PLY file, value by value, and its vertices, which clouds and meshes share.
+// Reads the body of a PLY file value by value, and its vertices, which clouds and meshes have in
+// common.
 #pragma once
 
 #include <cstddef>
@@ -14,13 +15,14 @@
 
 namespace voxeld::voxelctl {
 
-// Hands out the values of a file's body one by one, whichever way they are written. Views the file.
+// Returns the values of a file's body one by one, whatever their encoding. It is a view of the
+// file.
 class PlyValues {
  public:
   PlyValues(const SourceFile& file, const PlyHeader& header)
       : rest_(absl::string_view(file.bytes).substr(header.body)), format_(header.format) {}
 
-  // Returns: false at the end of the data, or where there is no number.
+  // Returns: false at the end of the data, or without a number.
   bool Next(PlyType type, double* value);
 
  private:
@@ -33,50 +35,52 @@ class PlyValues {
   PlyHeader::Format format_;
 };
 
-// The colors of an element's entries, in properties of any type. Numbers of 8 bits are as bright as can be at their greatest value.
-// The scale of others is that of the greatest number in the whole file: exporters write 0 to 255 in whatever type they have.
+// The colors of an element's entries, in properties of any type. 8-bit values are at full
+// brightness at their maximum. The scale of others depends on the greatest value in the whole file:
+// exporters write 0 to 255 in any type.
 class PlyColors {
  public:
   explicit PlyColors(const PlyElement& element);
-  // Whether there are all three channels.
+  // Returns whether all three channels exist.
   bool found() const { return at_[0] >= 0 && at_[1] >= 0 && at_[2] >= 0; }
-  // 0 to 2; −1: the property is no channel.
+  // Returns 0 to 2; −1 if the property is not a channel.
   int ChannelOf(size_t property) const;
   void Reserve(size_t entries);
-  // Takes the color of the next entry.
+  // Adds the color of the next entry.
   void Add(const double (&channels)[3]);
   // Returns: the colors of all entries.
   std::vector<Rgb> Finish() &&;
 
  private:
-  // Which number is as bright as can be.
+  // Which value means full brightness.
   enum class Scale : uint8_t { kOfType, kWholeNumbers, kFractions };
 
   Rgb ColorOf(const double (&channels)[3]) const;
 
-  int at_[3] = {-1, -1, -1};  // of each channel the property's index
+  int at_[3] = {-1, -1, -1};  // per channel, the property's index
   Scale scales_[3] = {};
   double full_scale_[3] = {1, 1, 1};
-  double most_whole_ = 0, most_fraction_ = 0;  // of all entries
-  bool is_known_ = true;                       // whether all scales are those of their types
+  double most_whole_ = 0, most_fraction_ = 0;  // over all entries
+  bool is_known_ = true;                       // whether all scales are determined by the types
   std::vector<Rgb> colors_;
   std::vector<float> numbers_;  // until the scales are known, instead of `colors_`
 };
 
 struct PlyVertices {
-  std::vector<Point3> positions;      // not all finite
-  std::vector<Point3> normals;        // of unit length, or zero; or none
-  std::vector<Rgb> colors;            // or none
-  std::vector<Attribute> attributes;  // the other properties that are no lists, if they are wanted
-  uint64_t others = 0;                // properties that are not there
+  std::vector<Point3> positions;      // not necessarily finite
+  std::vector<Point3> normals;        // unit vectors, or zero; may be empty
+  std::vector<Rgb> colors;            // may be empty
+  std::vector<Attribute> attributes;  // the other properties that are not lists, if requested
+  uint64_t others = 0;                // properties that are not read
 };
 
-// Reads the entries of "vertex": x, y, z; nx, ny, nz; red, green, blue (also r, g, b and diffuse_…) of any type.
-// Returns: InvalidArgument with the number of the vertex that is cut off or no number.
+// Reads the entries of "vertex": x, y, z; nx, ny, nz; red, green, blue (also r, g, b and diffuse_…)
+// of any type. Returns: InvalidArgument with the number of a vertex that is truncated or not a
+// number.
 absl::StatusOr<PlyVertices> ReadPlyVertices(const SourceFile& file, const PlyElement& vertex,
                                             bool attributes, PlyValues* values);
 
-// Passes over the entries of an element. Returns: InvalidArgument with the entry that is cut off.
+// Skips the entries of an element. Returns: InvalidArgument with the truncated entry.
 absl::Status SkipPlyElement(const SourceFile& file, const PlyElement& element, PlyValues* values);
 
 }  // namespace voxeld::voxelctl

@@ -144,7 +144,7 @@ Model PointTable::Finish(const SourceFile& file, std::string format) && {
       least = std::min(least, intensity);
       greatest = std::max(greatest, intensity);
     }
-    // All alike: white.
+    // If all are equal, they become white.
     const double span = greatest > least ? double{greatest} - double{least} : 0;
     for (const float intensity : intensities_) {
       const bool is_known = std::isfinite(intensity);

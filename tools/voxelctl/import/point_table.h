@@ -1,5 +1,5 @@
-// Points that come as rows of numbers, whatever file they are from: which column is what, and a row
-// after another into a model.
+// Converts points that are rows of numbers, whatever their file: identifies the columns, and adds
+// one row after another to a model.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@
 
 namespace voxeld::voxelctl {
 
-// What a column may be. Its value is its place in a row.
+// The meaning of a column. Its value is the index in a row.
 enum class PointColumn : uint8_t {
   kX,
   kY,
@@ -34,30 +34,32 @@ enum class PointColumn : uint8_t {
 inline constexpr size_t kPointColumns = 10;
 using PointRow = std::array<double, kPointColumns>;
 
-// By the names that files use, in any case: "x", "easting", "nx", "normal_x", "r", "red", "diffuse_red",
-// "i", "intensity", … Nothing: another column.
+// Recognises the names that files use, case-insensitively: "x", "easting", "nx", "normal_x", "r",
+// "red", "diffuse_red", "i", "intensity", … Returns nothing for another column.
 std::optional<PointColumn> PointColumnOf(absl::string_view name);
 
 // Returns: the channel value of full brightness (1, 255 or 65,535), given the greatest in the file.
 double FullScaleOf(double greatest);
 bool IsColor(PointColumn column);
 
-// Rows become points: intensities become greys where there are no colours, stretched from the least to
+// Converts rows to points. Without colours, intensities become greys, stretched from the least to
 // the greatest.
 class PointTable {
  public:
-  // Without x, y and z InvalidArgument. `full_scale`: the value of a colour's channel that is as bright as
-  // can be.
+  // Makes a table. `full_scale` is the channel value of full brightness. Errors: InvalidArgument
+  // without x, y and z.
   static absl::StatusOr<PointTable> Make(const SourceFile& file,
                                          const std::array<bool, kPointColumns>& has,
                                          double full_scale);
 
   void Reserve(uint64_t count);
-  // Names the further numbers that Add gets of each point. Call it before the first Add.
+  // Names the further numbers that Add receives for each point. Requires: called before the first
+  // Add.
   void SetAttributes(std::vector<std::string> names);
-  // A point with a coordinate that is not a number is left out and counted; one whose colour is none is white, and counted too.
-  // InvalidArgument: a coordinate is infinite, or there are more than kMaxModelVertices; `what` names the row, as in "point 3" or
-  // "line 17". `attributes`: one of each name.
+  // Adds a point. One with a coordinate that is not a number is left out and counted; one whose
+  // colour is not a number is white, and counted too. `what` names the row, as in "point 3" or
+  // "line 17"; `attributes` has one value for each name. Errors: InvalidArgument if a coordinate is
+  // infinite, or there are more than kMaxModelVertices.
   absl::Status Add(const SourceFile& file, const PointRow& row, absl::string_view what,
                    std::span<const double> attributes = {});
   size_t size() const { return part_.positions.size(); }
@@ -71,7 +73,7 @@ class PointTable {
   double full_scale_ = 1;
   Part part_;
   std::vector<float> intensities_;
-  uint64_t nowhere_ = 0, uncolored_ = 0;  // points without a place or colour
+  uint64_t nowhere_ = 0, uncolored_ = 0;  // points without a position or colour
 };
 
 }  // namespace voxeld::voxelctl

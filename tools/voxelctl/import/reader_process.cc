@@ -32,12 +32,14 @@ namespace {
 [[maybe_unused]] constexpr rlim_t kMostMemory = rlim_t{4} << 30, kOfFile = 4;
 constexpr rlim_t kMostDescriptors = 64;
 
-// What libraries read from the environment could change what a file looks like, or load code. These are for fonts of the user's own, for
-// programs that find their libraries so, and for sanitizers.
+// Variables that libraries read could change what a file looks like, or load code, so only these
+// are kept: for the user's own fonts, for programs that find their libraries this way, and for
+// sanitizers.
 constexpr const char* kKeptVariables[] = {"HOME", "LD_LIBRARY_PATH", "ASAN_OPTIONS", "LSAN_OPTIONS",
                                           "UBSAN_OPTIONS"};
 
-// The folder below which the reader may open files: that of the file, or the one that is read.
+// Returns the folder below which the reader may open files: that of the file, or the one that is
+// read.
 std::string Readable(const SourceFile& file) {
   if (file.other_files == OtherFiles::kNone) return "";
   if (file.other_files == OtherFiles::kAny) return "/";
@@ -52,8 +54,8 @@ void Limit(int resource, rlim_t most) {
   ::setrlimit(static_cast<__rlimit_resource>(resource), &limit);
 }
 
-// Bytes of address space that this process uses. Builds with a sanitizer do not call it: they have no
-// limit on address space.
+// Returns the address space in bytes that this process uses. Builds with a sanitizer do not call
+// it, because they have no limit on address space.
 [[maybe_unused]] rlim_t AddressSpace() {
   const daemon::Descriptor file(::open("/proc/self/statm", O_RDONLY | O_CLOEXEC));
   char text[64] = {};
@@ -61,7 +63,7 @@ void Limit(int resource, rlim_t most) {
   return std::strtoull(text, nullptr, 10) * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE));
 }
 
-// The whole of a number from a socket. False at its end.
+// Reads a whole number from a socket. Returns false at the end.
 bool ReadNumber(int descriptor, int64_t* number) {
   ssize_t got = 0;
   do {
@@ -73,14 +75,15 @@ bool ReadNumber(int descriptor, int64_t* number) {
 }  // namespace
 
 bool ConfineReader(const SourceFile& file, const std::vector<std::string>& folders) {
-  const Sandbox& sandbox = Sandbox::Get();  // writes a file in memory when it is made
+  const Sandbox& sandbox = Sandbox::Get();  // creates a file in memory when it is made
   Limit(RLIMIT_CORE, 0);
   Limit(RLIMIT_NOFILE, kMostDescriptors);
   Limit(RLIMIT_FSIZE, 0);
 #if !defined(VOXELD_SHADOW_MEMORY)
   Limit(RLIMIT_AS, AddressSpace() + kMostMemory + kOfFile * file.bytes.size());
 #endif
-  // For a file of the user's own the sandbox is a second line: without Landlock the first remains.
+  // For a file of the user's own, the sandbox is a second line of defence: without Landlock the
+  // first remains.
   return sandbox.Enter(Readable(file), folders).ok() || file.other_files != OtherFiles::kNone;
 }
 

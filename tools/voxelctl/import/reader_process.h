@@ -15,33 +15,36 @@
 
 namespace voxeld::voxelctl {
 
-// The descriptor of a reader's socket: it writes its answers there (model_bytes.h), and one that serves frames reads their numbers.
+// The descriptor of a reader's socket. The reader writes its answers there (model_bytes.h), and one
+// that serves frames reads their numbers from it.
 inline constexpr int kAnswerDescriptor = 3;
 
-// Exit statuses of a reader, beside 0 and 1.
+// Exit statuses of a reader, besides 0 and 1.
 inline constexpr int kNotConfined = 2, kNotStarted = 3;
 
 using OpenFrames = std::function<absl::StatusOr<std::unique_ptr<FrameSource>>(SourceFile file)>;
 
-// Confines this process permanently, as ReadContained describes. Those `folders` that exist stay readable, for data that libraries need.
-// Returns: false if files cannot be confined and the file is a stranger's, so that it must not be read.
+// Confines this process permanently, as ReadContained describes. Existing `folders` stay readable,
+// for data that libraries need. Returns: false if files cannot be confined and the file is
+// untrusted, so it must not be read.
 bool ConfineReader(const SourceFile& file, const std::vector<std::string>& folders = {});
 
-// A reader that confines itself and answers with the model that `read` returns. It releases the bytes of `file`, which must outlive the
-// result, before it answers.
+// Returns a reader that confines itself and answers with the model that `read` returns. It releases
+// the bytes of `file`, which must outlive the result, before it answers.
 ReaderMain ReaderOf(SourceFile& file, std::function<absl::StatusOr<Model>()> read);
 
-// A reader that confines itself, opens a source and serves its frames.
+// Returns a reader that confines itself, opens a source and serves its frames.
 ReaderMain FramesOf(SourceFile file, OpenFrames open);
 
-// A reader that is a program, which confines itself and then answers (AnswerModel) or serves (ServeFrames). `command[0]` is its path.
+// Returns a reader that is a program, which confines itself and then answers (AnswerModel) or
+// serves (ServeFrames). `command[0]` is its path.
 ReaderMain ProgramOf(std::vector<std::string> command);
 
-// Reads once, and ends the process.
+// Reads once, answers, and exits the process.
 [[noreturn]] void AnswerModel(const std::function<absl::StatusOr<Model>()>& read);
 
-// Opens the source and answers with the number of its frames, or with the error. Then it answers each frame number that it receives (an
-// i64) with the frame. Exits when the socket is closed.
+// Opens the source and answers with the number of its frames, or with the error. Then it answers
+// each frame number that it receives (an i64) with the frame. Exits when the socket is closed.
 [[noreturn]] void ServeFrames(
     const std::function<absl::StatusOr<std::unique_ptr<FrameSource>>()>& open);
 

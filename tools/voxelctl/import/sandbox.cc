@@ -22,7 +22,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// Rights by the version of Landlock that has them; the headers may be older than the kernel.
+// The rights of each version of Landlock; the headers may be older than the kernel.
 constexpr uint64_t kFirstRights = (LANDLOCK_ACCESS_FS_MAKE_SYM << 1) - 1;
 constexpr uint64_t kRefer = uint64_t{1} << 13, kTruncate = uint64_t{1} << 14,
                    kIoctl = uint64_t{1} << 15;
@@ -36,7 +36,7 @@ absl::Status NoLandlock(int error) {
       "this system cannot confine a process to files (Landlock: ", std::strerror(error), ")"));
 }
 
-// False, with errno, if `path`, or files below it, cannot be allowed.
+// Returns false, with errno, if `path`, or files below it, cannot be allowed.
 bool AllowReading(const daemon::Descriptor& rules, const std::string& path) {
   const daemon::Descriptor folder(::open(path.c_str(), O_PATH | O_CLOEXEC));
   landlock_path_beneath_attr below = {};
@@ -59,7 +59,8 @@ absl::Status ConfineFiles(const std::string& readable, const std::vector<std::st
       static_cast<int>(::syscall(SYS_landlock_create_ruleset, &rights, sizeof(rights), 0)));
   if (!rules.ok()) return NoLandlock(errno);
   if (!readable.empty() && !AllowReading(rules, readable)) return NoLandlock(errno);
-  for (const std::string& path : more) (void)AllowReading(rules, path);  // else it stays closed
+  // On failure it stays inaccessible.
+  for (const std::string& path : more) (void)AllowReading(rules, path);
   if (::syscall(SYS_landlock_restrict_self, rules.get(), 0) != 0) return NoLandlock(errno);
   return absl::OkStatus();
 }
@@ -69,22 +70,22 @@ constexpr int kCalls[] = {
     // Memory.
     SCMP_SYS(brk), SCMP_SYS(madvise), SCMP_SYS(mmap), SCMP_SYS(mprotect), SCMP_SYS(mremap),
     SCMP_SYS(munmap),
-    // Files that are open, and (Landlock says which) files to read.
+    // Open files, and opening files to read (restricted by Landlock).
     SCMP_SYS(access), SCMP_SYS(close), SCMP_SYS(faccessat), SCMP_SYS(faccessat2), SCMP_SYS(fstat),
     SCMP_SYS(fstatfs), SCMP_SYS(getcwd), SCMP_SYS(getdents64), SCMP_SYS(lseek), SCMP_SYS(lstat),
     SCMP_SYS(newfstatat), SCMP_SYS(openat2), SCMP_SYS(pread64), SCMP_SYS(read), SCMP_SYS(readlink),
     SCMP_SYS(readlinkat), SCMP_SYS(readv), SCMP_SYS(stat), SCMP_SYS(statx), SCMP_SYS(write),
     SCMP_SYS(writev),
-    // Time, and waiting.
+    // Time and waiting.
     SCMP_SYS(clock_getres), SCMP_SYS(clock_gettime), SCMP_SYS(clock_nanosleep), SCMP_SYS(futex),
     SCMP_SYS(gettimeofday), SCMP_SYS(nanosleep), SCMP_SYS(sched_yield), SCMP_SYS(time),
-    // Its own end. Without kill and tgkill abort() ends by a fault.
+    // Exiting. Without kill and tgkill, abort() ends by a fault.
     SCMP_SYS(exit), SCMP_SYS(exit_group), SCMP_SYS(restart_syscall), SCMP_SYS(rt_sigaction),
     SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn), SCMP_SYS(sigaltstack),
-    // Questions about itself.
+    // Queries about the process itself.
     SCMP_SYS(getpid), SCMP_SYS(getrandom), SCMP_SYS(getrusage), SCMP_SYS(gettid),
     SCMP_SYS(sched_getaffinity), SCMP_SYS(sysinfo), SCMP_SYS(uname),
-    // Threads (starting one: below).
+    // Threads (for starting one, see below).
     SCMP_SYS(rseq), SCMP_SYS(set_robust_list)};
 
 // Returns: the filter in the kernel's form; empty if it could not be made.
@@ -95,7 +96,7 @@ std::vector<sock_filter> MakeFilter() {
   for (const int call : kCalls) {
     if (error == 0) error = seccomp_rule_add(filter, SCMP_ACT_ALLOW, call, 0);
   }
-  // Files are opened to read alone, also where Landlock is missing (openat2 is then left to it).
+  // Files are opened only for reading, even without Landlock (openat2 is then left to it).
   constexpr scmp_datum_t kWrites = O_ACCMODE | O_CREAT | O_TRUNC;
   if (error == 0) {
     error = seccomp_rule_add(filter, SCMP_ACT_ALLOW, SCMP_SYS(open), 1,
@@ -105,14 +106,14 @@ std::vector<sock_filter> MakeFilter() {
     error = seccomp_rule_add(filter, SCMP_ACT_ALLOW, SCMP_SYS(openat), 1,
                              SCMP_A2(SCMP_CMP_MASKED_EQ, kWrites, O_RDONLY));
   }
-  // Threads, which are as confined as this one, but no processes. The flags of clone3 cannot be looked at; the C library
-  // takes clone where that is missing.
+  // Allows threads, which are as confined as this one, but not processes. The flags of clone3
+  // cannot be inspected; the C library uses clone if clone3 is missing.
   if (error == 0) {
     error = seccomp_rule_add(filter, SCMP_ACT_ALLOW, SCMP_SYS(clone), 1,
                              SCMP_A0(SCMP_CMP_MASKED_EQ, CLONE_THREAD, CLONE_THREAD));
   }
   if (error == 0) error = seccomp_rule_add(filter, SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(clone3), 0);
-  // Not those by which the kernel would signal other processes.
+  // Excludes those with which the kernel would signal other processes.
   for (const scmp_datum_t command : {F_GETFD, F_SETFD, F_GETFL, F_DUPFD_CLOEXEC}) {
     if (error == 0) {
       error = seccomp_rule_add(filter, SCMP_ACT_ALLOW, SCMP_SYS(fcntl), 1,

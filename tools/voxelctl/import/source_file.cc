@@ -23,8 +23,9 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// Opens a regular file relative to `folder`. With `beneath`, the kernel refuses "..", absolute paths and links that lead out of it.
-// First only looks the file up (O_PATH), because opening a device or a FIFO can have side effects.
+// Opens a regular file relative to `folder`. With `beneath`, the kernel refuses "..", absolute
+// paths and links that lead out of it. First only looks the file up (O_PATH), because opening a
+// device or a FIFO can have side effects.
 daemon::Descriptor OpenRegularFile(int folder, const std::string& name, bool beneath) {
   open_how how = {};
   how.flags = O_PATH | O_CLOEXEC;
@@ -165,7 +166,7 @@ absl::string_view TakeLine(absl::string_view* text) {
 }
 
 std::string TextModeHint(absl::string_view bytes) {
-  // In binary data of this size some LF follows a CR by chance.
+  // In binary data of this size, some LF follows a CR by chance.
   constexpr std::ptrdiff_t kTelling = 100;
   if (std::count(bytes.begin(), bytes.end(), '\n') < kTelling || absl::StrContains(bytes, "\r\n"))
     return "";

@@ -26,8 +26,8 @@ static_assert(std::endian::native == std::endian::little, "numbers are copied as
 constexpr uint64_t kBinaryHeader = 84;
 constexpr uint64_t kBinaryFacet = 50;
 constexpr size_t kTitle = 80;           // bytes of the header before the count
-constexpr size_t kAsciiProbe = 1024;    // bytes that a text has no NUL in
-constexpr size_t kMostVertices = 4096;  // of one facet
+constexpr size_t kAsciiProbe = 1024;    // bytes in which a text has no NUL
+constexpr size_t kMostVertices = 4096;  // per facet
 
 bool IsFinite(const Point3& p) {
   return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
@@ -72,7 +72,7 @@ class Facets {
 
 uint8_t FromFiveBits(unsigned value) { return static_cast<uint8_t>((value & 31) * 255 / 31); }
 
-// How the two bytes behind each facet are to be understood.
+// The meaning of the two bytes after each facet.
 class Attributes {
  public:
   explicit Attributes(absl::string_view title) {
@@ -92,7 +92,7 @@ class Attributes {
   }
 
  private:
-  std::optional<Rgb> all_;  // Magics: the color of facets without their own
+  std::optional<Rgb> all_;  // Magics: the color of facets that have none
 };
 
 absl::StatusOr<Model> ReadBinaryStl(const SourceFile& file, uint32_t count) {
@@ -127,10 +127,10 @@ class StlWords {
  public:
   explicit StlWords(absl::string_view text) : rest_(text) {}
 
-  // Empty at the end.
+  // Returns an empty word at the end.
   absl::string_view Next() {
     while (!rest_.empty() && absl::ascii_isspace(static_cast<unsigned char>(rest_.front()))) {
-      // A carriage return ends a line unless a line feed does.
+      // A carriage return ends a line unless a line feed follows.
       const bool ends =
           rest_.front() == '\n' || (rest_.front() == '\r' && !absl::StartsWith(rest_, "\r\n"));
       line_ += ends ? 1 : 0;
@@ -144,7 +144,7 @@ class StlWords {
     return word;
   }
 
-  // The rest of the line is a name, which may hold any word.
+  // Skips the rest of the line, which is a name and may contain any word.
   void PassName() { rest_.remove_prefix(std::min(rest_.find_first_of("\r\n"), rest_.size())); }
 
   uint64_t line() const { return line_; }
@@ -165,7 +165,7 @@ absl::Status NoNumber(const SourceFile& file, const StlWords& words, absl::strin
                    "a vertex is three finite numbers, with points as decimal marks");
 }
 
-// Three coordinates behind "vertex".
+// Reads three coordinates after "vertex".
 absl::StatusOr<Point3> ReadVertex(const SourceFile& file, StlWords* words) {
   Point3 p;
   for (double* coordinate : {&p.x, &p.y, &p.z}) {
@@ -177,7 +177,8 @@ absl::StatusOr<Point3> ReadVertex(const SourceFile& file, StlWords* words) {
   return p;
 }
 
-// What a "facet" holds, up to its "endfacet". Its normal is zero where the file has none that is a number.
+// A "facet" with its contents up to "endfacet". Its normal is zero if the file has none or it is
+// not a number.
 struct AsciiFacet {
   Point3 normal;
   std::vector<Point3> corners;
@@ -241,7 +242,7 @@ absl::StatusOr<Model> ReadAsciiStl(const SourceFile& file, absl::string_view tex
         if (!facets.Add(facet->normal, {c[0], c[i - 1], c[i]}, std::nullopt)) return TooLarge(file);
       }
     }
-    // Any other word is an exporter's own, and has no meaning here.
+    // Other words are specific to an exporter and are ignored.
   }
   if (count == 0) {
     return FileError(file, "is ASCII STL without a facet", "at least one triangle is expected");

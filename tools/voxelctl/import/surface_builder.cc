@@ -11,7 +11,7 @@ namespace {
 constexpr uint32_t kFree = 0xffffffff;
 constexpr size_t kFirstSlots = 1024;
 
-// Adding zero makes 0 of −0, which is the same place.
+// Adding zero turns −0 into 0, which is the same place.
 size_t HashOf(const Corner& c, bool colored) {
   const Rgb color = colored ? c.color : Rgb{};
   return absl::HashOf(c.position.x + 0.0, c.position.y + 0.0, c.position.z + 0.0, c.normal.x + 0.0,
@@ -74,7 +74,8 @@ Point3 UnitOrZero(const Point3& v) {
 Point3 FacetNormal(const Point3& a, const Point3& b, const Point3& c) {
   const Point3 u = {b.x - a.x, b.y - a.y, b.z - a.z}, v = {c.x - a.x, c.y - a.y, c.z - a.z};
   const Point3 n = {u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x};
-  // A small model's triangles have small areas, so the cross product is scaled before its length is judged.
+  // A small model's triangles have small areas, so the cross product is scaled before its length is
+  // tested.
   const double largest = std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)});
   if (!(largest > 0) || !std::isfinite(largest)) return {};
   return UnitOrZero({n.x / largest, n.y / largest, n.z / largest});

@@ -1,4 +1,4 @@
-// Triangles from files, as one part: each distinct corner becomes one vertex.
+// Collects triangles from files into one part: each distinct corner becomes one vertex.
 #pragma once
 
 #include <cstddef>
@@ -12,8 +12,8 @@ namespace voxeld::voxelctl {
 
 struct Corner {
   Point3 position;
-  Point3 normal;  // of unit length, or zero where there is none
-  Rgb color;      // counts only if the builder has colors
+  Point3 normal;  // a unit vector, or zero if missing
+  Rgb color;      // ignored unless the builder has colors
 };
 
 // Not thread-safe.
@@ -21,8 +21,8 @@ class SurfaceBuilder {
  public:
   explicit SurfaceBuilder(bool colored);
 
-  // Adds a corner of the triangle that is being written. Returns: false, and adds nothing, if the part would have more than
-  // kMaxModelVertices vertices or kMaxModelIndices indices.
+  // Adds a corner of the current triangle. Returns: false, and adds nothing, if the part would have
+  // more than kMaxModelVertices vertices or kMaxModelIndices indices.
   bool Add(const Corner& corner);
 
   bool empty() const { return part_.indices.empty(); }
@@ -35,13 +35,13 @@ class SurfaceBuilder {
 
   const bool colored_;
   Part part_;
-  std::vector<uint32_t> slots_;  // vertices by the hash of their corner; kFree where there is none
+  std::vector<uint32_t> slots_;  // vertices by the hash of their corner; kFree if unused
 };
 
-// Of unit length; zero for what has no direction.
+// Returns a unit vector; zero without a direction.
 Point3 UnitOrZero(const Point3& v);
 
-// The unit normal of a triangle by its winding; zero if it has no area.
+// Returns a triangle's unit normal by its winding; zero if it has no area.
 Point3 FacetNormal(const Point3& a, const Point3& b, const Point3& c);
 
 }  // namespace voxeld::voxelctl

@@ -24,13 +24,13 @@ namespace {
 
 struct Column {
   std::optional<PointColumn> known;
-  std::string name;  // as in the file; empty: it has none
+  std::string name;  // as in the file; may be empty
   bool operator==(const Column&) const = default;
 };
 using Columns = std::vector<Column>;
 constexpr size_t kMostColumns = 4096;
 
-// Where a comment begins, outside quotation marks; npos: there is none.
+// Returns where a comment begins, outside quotation marks; npos without one.
 size_t CommentBegin(absl::string_view line) {
   bool quoted = false;
   for (size_t i = 0; i < line.size(); ++i) {
@@ -40,7 +40,7 @@ size_t CommentBegin(absl::string_view line) {
   return absl::string_view::npos;
 }
 
-// Lines without their ends, comments and blanks around. A comment begins with "#" or "//".
+// The lines without line ends, comments and surrounding blanks. A comment begins with "#" or "//".
 class Lines {
  public:
   explicit Lines(absl::string_view text) : rest_(text) {
@@ -48,7 +48,7 @@ class Lines {
     if (absl::StartsWith(rest_, bom)) rest_.remove_prefix(bom.size());
   }
 
-  // False at the end. Empty ones are passed over.
+  // Returns false at the end. Empty lines are skipped.
   bool Next(absl::string_view* line) {
     while (!rest_.empty()) {
       ++number_;
@@ -64,7 +64,7 @@ class Lines {
     return false;
   }
   size_t number() const { return number_; }
-  // The last line that was nothing but a comment.
+  // Returns the last line that consisted only of a comment.
   absl::string_view comment() const { return comment_; }
 
  private:
@@ -81,7 +81,7 @@ std::optional<double> PlainNumber(absl::string_view word) {
   return value;
 }
 
-// With a decimal point or a decimal comma.
+// Parses a number with a decimal point or a decimal comma.
 std::optional<double> Number(absl::string_view word) {
   if (absl::StartsWith(word, "+")) word.remove_prefix(1);
   const std::optional<double> plain = PlainNumber(word);
@@ -92,14 +92,15 @@ std::optional<double> Number(absl::string_view word) {
   return PlainNumber(with_point);
 }
 
-// What tables write where a number is missing.
+// Returns whether the word is one that tables use for a missing number.
 bool IsMissing(absl::string_view word) {
   static constexpr absl::string_view kMissing[] = {"", "na", "n/a", "nan", "null", "none", "-"};
   return std::ranges::any_of(
       kMissing, [word](absl::string_view one) { return absl::EqualsIgnoreCase(word, one); });
 }
 
-// Parts words at a mark, between two of which there may be nothing, or at blanks (' '). A word in quotation marks may contain the mark.
+// Splits words at a mark, which may follow another mark directly, or at blanks (' '). A word in
+// quotation marks may contain the mark.
 Words SplitAt(absl::string_view line, char mark) {
   Words words;
   words.reserve(9);
@@ -110,7 +111,7 @@ Words SplitAt(absl::string_view line, char mark) {
     if (mark == ' ' && line.empty()) break;
     size_t from = 0;
     absl::string_view word;
-    // Two quotation marks in a quoted word are one of its own.
+    // Two quotation marks in a quoted word stand for one.
     size_t close = absl::StartsWith(line, "\"") ? line.find('"', 1) : absl::string_view::npos;
     while (close != absl::string_view::npos && line.substr(close + 1, 1) == "\"")
       close = line.find('"', close + 2);
@@ -139,8 +140,9 @@ bool IsNames(const Words& words) {
          !std::ranges::all_of(words, IsMissing);
 }
 
-// What parts the words of a file: the first of these at which its first line of three numbers or more falls into numbers, so
-// that a comma may also be a decimal one. If there is no such line, the first that is in the first line.
+// Returns the separator of a file's words: the first of these that splits the first line of three
+// or more numbers into numbers, so a comma may also be a decimal one. Without such a line, the
+// first separator that occurs in the first line.
 char MarkOf(absl::string_view text) {
   Lines lines(text);
   absl::string_view line;
@@ -164,13 +166,14 @@ char MarkOf(absl::string_view text) {
   return ' ';
 }
 
-// The words of a line with points. A line with too few at the file's mark is parted at its own.
+// Returns the words of a line with points. A line with too few words by the file's separator is
+// split at its own.
 Words WordsOf(absl::string_view line, char mark, size_t columns) {
   Words words = SplitAt(line, mark);
   return words.size() < columns ? SplitAt(line, MarkOf(line)) : words;
 }
 
-// The greatest and least of the columns from the fourth on, over the whole file.
+// The extremes of the columns from the fourth on, over the whole file.
 struct Ranges {
   double least[6] = {}, greatest[6] = {};
 };
@@ -247,8 +250,8 @@ Columns ByNames(const Words& words) {
   return columns;
 }
 
-// Returns: the columns that a comment names, as CloudCompare writes it. Empty if it does not name x, y, z and as many columns as the
-// points have.
+// Returns: the columns that a comment names, as CloudCompare writes it. Empty unless it names x, y,
+// z and as many columns as the points have.
 Columns ByComment(absl::string_view comment, char mark, size_t count) {
   for (const char at : {mark, ' '}) {
     Columns columns = ByNames(SplitAt(comment, at));
@@ -260,7 +263,8 @@ Columns ByComment(absl::string_view comment, char mark, size_t count) {
   return {};
 }
 
-// What the columns are, having read the lines that are no points yet; the first point's line is in `first`.
+// Determines the columns and reads the lines before the points; the first point's line is stored in
+// `first`.
 absl::StatusOr<Columns> ReadHead(const SourceFile& file, char mark, Lines* lines,
                                  absl::string_view* first) {
   if (!lines->Next(first))
@@ -320,7 +324,7 @@ absl::StatusOr<Model> ReadTextPoints(const SourceFile& file, bool attributes) {
   if (!table.ok()) return table.status();
   if (attributes) table->SetAttributes(std::move(names));
   std::vector<double> values(numbers.size());
-  uint64_t beyond = 0;                          // words
+  uint64_t beyond = 0;                          // number of extra words
   bool has_points = false, has_commas = false;  // decimal points and decimal commas
   do {
     const auto words = WordsOf(line, mark, columns->size());

@@ -44,7 +44,7 @@ class TopoJsonReader {
   MapLines lines_;
   bool quantized_ = false;  // has a transform, so arcs are deltas
   std::array<double, 2> scale_ = {1, 1}, translate_ = {0, 0};
-  std::vector<uint32_t> users_;  // the feature that first refers to each arc, or kNobody
+  std::vector<uint32_t> users_;  // the first feature that refers to each arc, or kNobody
 };
 
 absl::Status TopoJsonReader::ReadPair(const json& value, const std::string& where,
@@ -70,7 +70,7 @@ absl::Status TopoJsonReader::ReadTransform(const json& document) {
 }
 
 // Arcs nest to any depth: a line's are numbers, a polygon's are arrays of them, and so on. ~i is
-// arc i backwards.
+// arc i reversed.
 absl::Status TopoJsonReader::MarkArcs(const json& arcs, const std::string& where,
                                       uint32_t feature) {
   if (arcs.is_array()) {
@@ -93,7 +93,7 @@ absl::Status TopoJsonReader::MarkArcs(const json& arcs, const std::string& where
   return absl::OkStatus();
 }
 
-// One position, or an array of them. Positions are never deltas.
+// Reads one position, or an array of them. Positions are never deltas.
 absl::Status TopoJsonReader::ReadPoints(const json& coordinates, const std::string& where) {
   if (coordinates.is_array() && (coordinates.empty() || coordinates[0].is_array())) {
     if (coordinates.empty()) lines_.LeaveOut(kNoCoordinates);

@@ -11,14 +11,14 @@ constexpr size_t kMostEarCorners = 512;
 
 using Flat = std::array<double, 2>;
 
-// Twice the signed area.
+// Returns twice the signed area.
 double AreaOf(const Flat& a, const Flat& b, const Flat& c) {
   return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
-// Along the axis in which the polygon is flattest, counter-clockwise.
+// Projects the polygon along the axis closest to its normal; the result is counter-clockwise.
 std::vector<Flat> Flatten(std::span<const Point3> corners) {
-  Point3 normal;  // Newell's
+  Point3 normal;  // by Newell's method
   for (size_t i = 0; i < corners.size(); ++i) {
     const Point3 &a = corners[i], &b = corners[(i + 1) % corners.size()];
     normal.x += (a.y - b.y) * (a.z + b.z - 2 * corners[0].z);
@@ -67,7 +67,7 @@ void Triangulator::Append(std::span<const Point3> corners, std::vector<uint32_t>
   const std::vector<Flat> flat = Flatten(corners);
   if (corners.size() > kMostEarCorners || IsConvex(flat)) return fan(left);
 
-  // An ear is a corner whose triangle has no other corner of the polygon in it.
+  // An ear is a corner whose triangle contains no other corner of the polygon.
   const auto is_ear = [&](size_t at) {
     const size_t n = left.size();
     const uint32_t before = left[(at + n - 1) % n], tip = left[at], after = left[(at + 1) % n];
@@ -75,7 +75,7 @@ void Triangulator::Append(std::span<const Point3> corners, std::vector<uint32_t>
     for (const uint32_t other : left) {
       if (other == before || other == tip || other == after) continue;
       const Flat& p = flat[other];
-      // A corner at the place of one of these bounds the polygon there, and is not inside.
+      // A corner at the same place as one of these is on the boundary, and not inside.
       if (p == flat[before] || p == flat[tip] || p == flat[after]) continue;
       if (Holds(flat[before], flat[tip], flat[after], p)) return false;
     }

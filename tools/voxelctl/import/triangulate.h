@@ -1,4 +1,4 @@
-// Polygons as triangles.
+// Splits polygons into triangles.
 #pragma once
 
 #include <cstdint>
@@ -9,12 +9,13 @@
 
 namespace voxeld::voxelctl {
 
-// Cuts polygons into triangles that keep the winding: fans of convex ones, ears of others, which need not be quite plane. Not
-// thread-safe.
+// Splits polygons into triangles that keep the winding: fans for convex ones, ear clipping for
+// others, which may be slightly non-planar. Not thread-safe.
 class Triangulator {
  public:
-  // Appends n − 2 triangles, as indices into `corners`, which are at least 3. What crosses itself, has over 512 corners and is not
-  // convex, or comes after the budget of tests for ears is spent, becomes a fan.
+  // Appends n − 2 triangles, as indices into `corners`. Requires: at least 3 corners. A polygon
+  // becomes a fan if it crosses itself, if it is not convex and has over 512 corners, or if the
+  // budget of tests for ears is spent.
   void Append(std::span<const Point3> corners, std::vector<uint32_t>* triangles);
 
  private:

@@ -22,7 +22,8 @@ constexpr size_t kFileHeader = 8, kChunkHeader = 12;
 constexpr uint32_t kMostSide = 256;
 constexpr size_t kMostNodes = 100'000, kMostGrids = 10'000;
 
-// The bytes of one chunk, taken from the front. Beyond its end nothing is given, and `short_` remembers.
+// Reads the bytes of one chunk from the front. Reading beyond the end returns nothing and sets
+// `short_`.
 class Bytes {
  public:
   explicit Bytes(absl::string_view bytes) : rest_(bytes) {}
@@ -59,8 +60,8 @@ class Bytes {
   bool short_ = false;
 };
 
-// White to black in steps of 0x33, blue before green before red, then ramps of red, green, blue and grey: what
-// the format has where a file brings no palette.
+// White to black in steps of 0x33, blue before green before red, then ramps of red, green, blue and
+// grey: the format's palette for files without one.
 std::array<Rgb, 256> DefaultPalette() {
   std::array<Rgb, 256> out = {};
   size_t at = 1;
@@ -76,7 +77,8 @@ std::array<Rgb, 256> DefaultPalette() {
   return out;
 }
 
-// Two bits for the column of row 0, two for that of row 1, three signs. Nothing: two rows have one column.
+// Two bits for the column of row 0, two for that of row 1, three signs. Returns nothing if two rows
+// have the same column.
 std::optional<VoxTurn> TurnOf(uint32_t bits) {
   VoxTurn turn;
   turn.column[0] = bits & 3;
@@ -111,8 +113,8 @@ bool IsHidden(const std::map<std::string, std::string>& attributes) {
   return hidden != attributes.end() && hidden->second == "1";
 }
 
-// Chunks that tell MagicaVoxel how to show a scene, and nothing of the scene: cameras, rendering, names of colours, the order in which
-// its palette lies on the screen.
+// Returns whether the chunk only controls how MagicaVoxel shows a scene and does not describe the
+// scene: cameras, rendering, names of colours, the order of its palette on the screen.
 bool IsForTheEditor(absl::string_view id) {
   static constexpr absl::string_view kThese[] = {"PACK", "rCAM", "rOBJ", "NOTE", "IMAP"};
   return std::ranges::find(kThese, id) != std::end(kThese);
@@ -178,7 +180,7 @@ class VoxReader {
       const int32_t layer = bytes.Int();
       if (IsHidden(bytes.Dictionary()) && layer >= 0) scene_.hidden_layers.insert(layer);
     } else if (id == "MATL") {
-      bytes.Int();  // the colour that is made of it
+      bytes.Int();  // the resulting colour
       const auto attributes = bytes.Dictionary();
       const auto type = attributes.find("_type");
       if (type != attributes.end() && type->second != "_diffuse") ++scene_.materials;

@@ -1,4 +1,4 @@
-// What a .vox file holds, read and checked; how that becomes a model is vox_model.cc's.
+// Reads and checks the contents of a .vox file; vox_model.cc converts them to a model.
 #pragma once
 
 #include <array>
@@ -23,7 +23,7 @@ struct VoxGrid {
   std::vector<VoxVoxel> voxels;
 };
 
-// A turn by quarters, with mirrors: row r has `sign[r]` in the column `column[r]`.
+// A rotation by quarter turns, with mirroring: row r has `sign[r]` in the column `column[r]`.
 struct VoxTurn {
   std::array<uint8_t, 3> column = {0, 1, 2};
   std::array<int8_t, 3> sign = {1, 1, 1};
@@ -33,21 +33,21 @@ struct VoxNode {
   enum class Kind : uint8_t { kTransform, kGroup, kShape };
   Kind kind = Kind::kGroup;
   bool hidden = false;
-  std::vector<int32_t> children;  // of a shape its grid
-  int32_t layer = -1;             // of a transform; -1: none
+  std::vector<int32_t> children;  // for a shape, its grid
+  int32_t layer = -1;             // for a transform; -1: none
   std::array<int32_t, 3> move = {};
   VoxTurn turn;
 };
 
 struct VoxScene {
   std::vector<VoxGrid> grids;
-  std::array<Rgb, 256> palette = {};  // by a voxel's colour; 0 is none
-  std::map<int32_t, VoxNode> nodes;   // 0 is the root; empty: there are none
+  std::array<Rgb, 256> palette = {};  // by a voxel's colour; 0 means none
+  std::map<int32_t, VoxNode> nodes;   // 0 is the root; may be empty
   std::set<int32_t> hidden_layers;
-  // Left out:
+  // Contents that are left out:
   uint64_t later_frames = 0;    // key frames after the first of each node
-  uint64_t materials = 0;       // of glass, metal, light and the like: all but diffuse ones
-  uint64_t unknown_chunks = 0;  // that neither MagicaVoxel's description nor this reader knows
+  uint64_t materials = 0;       // glass, metal, light and the like: all but diffuse
+  uint64_t unknown_chunks = 0;  // unknown to MagicaVoxel's description and this reader
 };
 
 absl::StatusOr<VoxScene> ReadVoxChunks(const SourceFile& file);

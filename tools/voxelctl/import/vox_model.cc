@@ -15,11 +15,11 @@ namespace {
 
 constexpr int kMostGroupDepth = 64;
 constexpr uint64_t kMostGroupVisits = 1'000'000;
-constexpr size_t kSparse = 64;  // cells for each voxel
+constexpr size_t kSparse = 64;  // cells per voxel
 
 using VoxCell = std::array<int64_t, 3>;
 
-// Where a grid's cells go: first turned, then moved.
+// Where a grid's cells are placed: first rotated, then moved.
 struct Place {
   VoxTurn turn;
   VoxCell move = {};
@@ -29,7 +29,7 @@ struct Place {
     for (int r = 0; r < 3; ++r) out[r] = turn.sign[r] * v[turn.column[r]];
     return out;
   }
-  // What is put at `inner`, which is put here.
+  // Returns the placement of `inner` within this one.
   Place operator*(const VoxNode& inner) const {
     Place out;
     for (int r = 0; r < 3; ++r) {
@@ -111,7 +111,8 @@ class Builder {
     const auto index = [&grid](uint32_t x, uint32_t y, uint32_t z) {
       return (size_t{z} * grid.size[1] + y) * grid.size[0] + x;
     };
-    // Few voxels in many cells must not cost what the cells do: a model may be shown many times.
+    // The cost of few voxels in many cells must not depend on the cells: a model may be shown many
+    // times.
     const size_t cells = index(0, 0, grid.size[2]);
     const bool dense = grid.voxels.size() >= cells / kSparse;
     std::vector<bool> all(dense ? cells : 0);
@@ -129,7 +130,7 @@ class Builder {
       for (int axis = 0; axis < 3; ++axis) {
         for (const int side : {0, 1}) {
           std::array<uint32_t, 3> next = cell;
-          next[axis] += side == 1 ? 1 : -1;  // wraps beyond the first, and is beyond the last then
+          next[axis] += side == 1 ? 1 : -1;  // wraps below the first, and is then beyond the last
           if (next[axis] < grid.size[axis] && is_filled(index(next[0], next[1], next[2]))) continue;
           if (absl::Status status = AddFace(grid, cell, axis, side, place, scene_.palette[v.color]);
               !status.ok()) {
@@ -151,7 +152,7 @@ class Builder {
     }
     const int u = (axis + 1) % 3, w = (axis + 2) % 3;
     for (const auto& [du, dw] : {std::pair(0, 0), {1, 0}, {1, 1}, {0, 1}}) {
-      // Grids are turned about the corner of cells that is their middle.
+      // Grids are rotated about the corner of cells that is at their centre.
       VoxCell corner;
       for (int a = 0; a < 3; ++a) corner[a] = int64_t{cell[a]} - grid.size[a] / 2;
       corner[axis] += side;

@@ -1,4 +1,5 @@
-// MagicaVoxel's scenes (.vox; the format is its author's "MagicaVoxel-file-format-vox", with its extension).
+// Reads MagicaVoxel's scenes (.vox; the format is described by its author in
+// "MagicaVoxel-file-format-vox", with its extension).
 #pragma once
 
 #include "absl/status/statusor.h"
@@ -7,9 +8,10 @@
 
 namespace voxeld::voxelctl {
 
-// Voxels as cubes of length 1, of which the faces that no other voxel of their model hides are triangles in the
-// palette's colours; models where the scene's nodes put and turn them, the first frame of each; hidden nodes are left out. A
-// file without nodes has its models at one place. InvalidArgument names the chunk that is wrong.
+// Reads voxels as cubes of length 1. The faces that no other voxel of their model hides become
+// triangles in the palette's colours. Models are placed and rotated by the scene's nodes, in the
+// first frame of each; hidden nodes are left out. In a file without nodes, all models are at the
+// same place. Errors: InvalidArgument with the invalid chunk.
 absl::StatusOr<Model> ReadVoxModel(const SourceFile& file);
 
 }  // namespace voxeld::voxelctl
