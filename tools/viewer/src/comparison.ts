@@ -132,7 +132,7 @@ export class Comparison {
     return true;
   }
 
-  // Updates the known layers: a layer that was removed is no longer left out.
+  // Updates the known layers: a removed layer is not left out any longer.
   know(layers: LayerInfo[]): void {
     const there = new Set(layers.map(layerKey));
     for (const key of this.hidden.keys()) if (!there.has(key)) this.hidden.delete(key);

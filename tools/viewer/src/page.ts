@@ -120,7 +120,7 @@ class Page {
 
   private wantsAll = new URLSearchParams(location.hash.slice(1)).get("display") === "";
 
-  // The display stopped, or its bytes could not be read: the picture is no longer what it shows.
+  // The display stopped, or its bytes could not be read: the picture is outdated.
   private ended(id: number, why: string): void {
     const view = this.views.get(id);
     if (view === undefined) return;

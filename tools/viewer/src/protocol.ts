@@ -76,11 +76,11 @@ export interface Watching {
   high_mm: [number, number, number];
   pitch_mm: number;
   display: DisplayDescription;
-  // What the camera looks at; otherwise all places.
+  // The camera's target; otherwise all places.
   around?: { low_mm: [number, number, number]; high_mm: [number, number, number] };
 }
 
-// A comparison of what a display shows with what was sent to it, or why there is none.
+// A comparison of what a display shows with what was sent to it, or the reason for its absence.
 export interface Compared {
   id: number;
   why?: string;
