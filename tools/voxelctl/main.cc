@@ -28,7 +28,7 @@ std::string EnvironmentVariable(const char* name) {
 int main(int argc, char** argv) {
   using namespace voxeld::voxelctl;  // NOLINT(google-build-using-namespace)
   try {
-    // A reader that goes away is an error of the write, not the end of the process.
+    // A closed reader becomes an error of the write and does not terminate the process.
     std::signal(SIGPIPE, SIG_IGN);
     QuietGrpc();
     const ParsedCommandLine parsed =

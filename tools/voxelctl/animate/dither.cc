@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kUnrest = 0.1;
 
-// Bayer's matrix: 0 to 63, each once, neighbours far apart.
+// Returns an element of Bayer's matrix: 0 to 63, each once, neighbours far apart.
 constexpr int Threshold(int x, int y) {
   int value = 0;
   for (int bit = 0; bit < 3; ++bit) {
@@ -54,7 +54,7 @@ OrderedDither::Mix OrderedDither::MixOf(const Color8& color) const {
     }
     if (along <= 0) continue;
     const double share = std::min(1.0, static_cast<double>(along) / length);
-    // How far the mean is off, and, for less, how much the pixels differ from it.
+    // The error of the mean, and with less weight the deviation of the pixels from it.
     const double cost = static_cast<double>(off) - 2 * share * along + share * share * length +
                         kUnrest * share * (1 - share) * length;
     if (cost >= least) continue;

@@ -1,4 +1,4 @@
-// True colours by those of a palette.
+// Approximates true colours with those of a palette.
 #pragma once
 
 #include <vector>
@@ -8,27 +8,28 @@
 
 namespace voxeld::voxelctl {
 
-// Where a colour is not of the palette, a pixel takes the nearest or the one on the other side of it, by a fixed
-// pattern of 8·8 thresholds: each as often as brings their mean nearest. What does not change from picture to picture keeps
-// its pixels. Not thread-safe.
+// Applies an ordered dither. If a colour is not in the palette, a pixel gets either the nearest
+// palette colour or the one on the other side of it, by a fixed pattern of 8·8 thresholds. Each is
+// used as often as brings their mean nearest. Pixels that do not change between pictures keep their
+// colours. Not thread-safe.
 class OrderedDither {
  public:
-  // 1 to 256 colours.
+  // Requires: 1 to 256 colours.
   explicit OrderedDither(std::vector<Color8> palette) : palette_(std::move(palette)) {}
 
-  // A place in the palette for each pixel.
+  // Returns the palette index of each pixel.
   std::vector<uint8_t> Apply(const Image& image);
 
  private:
   struct Mix {
     uint8_t near = 0, far = 0;
-    uint8_t share = 0;  // of `far`, in 1/64
+    uint8_t share = 0;  // share of `far`, in 1/64
   };
   uint8_t Nearest(const std::array<int, 3>& color) const;
   Mix MixOf(const Color8& color) const;
 
   const std::vector<Color8> palette_;
-  absl::flat_hash_map<uint32_t, Mix> mixes_;  // found once
+  absl::flat_hash_map<uint32_t, Mix> mixes_;  // each computed once
 };
 
 }  // namespace voxeld::voxelctl

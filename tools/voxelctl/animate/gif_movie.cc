@@ -1,4 +1,4 @@
-// The one file that knows giflib.
+// The only file that uses giflib.
 #include <gif_lib.h>
 #include <zlib.h>
 
@@ -19,14 +19,14 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr int kGifColors = 255;      // one of 256 is for pixels that stay as they were
-constexpr int kGifMostSide = 65535;  // of the format
+constexpr int kGifColors = 255;      // one of 256 marks pixels that do not change
+constexpr int kGifMostSide = 65535;  // the format's limit
 
 struct Rows {
-  int top = 0, bottom = 0, left = 0, right = 0;  // the ends are beyond the last
+  int top = 0, bottom = 0, left = 0, right = 0;  // the ends are exclusive
 };
 
-// The least rectangle that holds all that differs; of one pixel where nothing does.
+// Returns the smallest rectangle that contains all differences; one pixel if there are none.
 Rows Changed(const std::vector<uint8_t>& before, const std::vector<uint8_t>& now, int width,
              int height) {
   Rows rows{height, 0, width, 0};
@@ -111,7 +111,7 @@ class Gif : public MovingPicture {
   absl::Status WriteAll(GifFileType* gif, ColorMapObject* map, std::vector<Color8> palette) {
     ::EGifSetGifVersion(gif, true);
     if (::EGifPutScreenDesc(gif, width_, height_, 8, 0, map) != GIF_OK) return GifError(gif->Error);
-    // Again and again: an extension of Netscape's, which all have.
+    // Repeats for ever: an extension of Netscape's that every program supports.
     const GifByteType loop[3] = {1, 0, 0};
     if (::EGifPutExtensionLeader(gif, APPLICATION_EXT_FUNC_CODE) != GIF_OK ||
         ::EGifPutExtensionBlock(gif, 11, "NETSCAPE2.0") != GIF_OK ||
@@ -137,7 +137,8 @@ class Gif : public MovingPicture {
     return absl::OkStatus();
   }
 
-  // When picture `i` begins, in hundredths of a second: none is late by more than half of one.
+  // Returns when picture `i` begins, in hundredths of a second; rounding moves no picture by more
+  // than half of one.
   int Time(size_t i) const {
     return static_cast<int>(std::lround(static_cast<double>(i) * 100 / fps_));
   }
@@ -170,7 +171,7 @@ class Gif : public MovingPicture {
   const std::string path_;
   const double fps_;
   const std::unique_ptr<WholeFile> file_;
-  absl::Status written_;  // of what giflib hands out
+  absl::Status written_;  // the status of giflib's output
   int width_ = 0, height_ = 0;
   ColorCount colors_;
   std::vector<std::string> packed_;

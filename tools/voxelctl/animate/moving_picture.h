@@ -1,4 +1,4 @@
-// Pictures one after another, as a file or as files.
+// Sequences of pictures, written to one file or to several.
 #pragma once
 
 #include <memory>
@@ -10,8 +10,9 @@
 
 namespace voxeld::voxelctl {
 
-// Takes pictures of one size. Nothing is at its place before Finish() unless it says so; without Finish() nothing stays.
-// Messages of errors begin with the file's name, made fit for a terminal. Not thread-safe.
+// Accepts pictures of one size. The output does not exist before Finish() unless stated otherwise;
+// without Finish() nothing remains. Error messages begin with the file's name, escaped for a
+// terminal. Not thread-safe.
 class MovingPicture {
  public:
   virtual ~MovingPicture() = default;
@@ -19,20 +20,21 @@ class MovingPicture {
   virtual absl::Status Finish() = 0;
 };
 
-// Digits in place of the first run of "#"s of the file's name (not of its folder's), as many as there are "#"s at
-// least; the pattern itself if there are none.
+// Replaces the first run of "#" in the file's name (not in its folder's) by the number, with at
+// least as many digits; returns the pattern unchanged if there is no "#".
 std::string NumberedName(const std::string& pattern, int number);
 
-// A PNG each, which is at its place as soon as it is whole. Numbers from 1.
+// Writes PNG files, numbered from 1; each appears as soon as it is complete.
 std::unique_ptr<MovingPicture> PngFrames(const std::string& pattern);
 
-// A GIF that begins again at its end, `fps` 1 to 50. All its pictures share one palette, so they are kept, packed,
-// until Finish(); colours that the palette lacks are put together from two, in an ordered dither, which stays where it
-// is while the picture moves.
+// Writes a GIF that repeats, with `fps` from 1 to 50. All pictures share one palette, so they are
+// stored, packed, until Finish(). Colours that the palette lacks are composed from two by an
+// ordered dither, which stays in place while the picture moves.
 absl::StatusOr<std::unique_ptr<MovingPicture>> GifMovie(const std::string& path, double fps);
 
-// An MP4 (H.264, yuv420p), made by the program ffmpeg, which gets raw pictures through a pipe: FailedPrecondition, with
-// how to get it, where it is not. `width` and `height` are even.
+// Writes an MP4 (H.264, yuv420p) with the program ffmpeg, which receives raw pictures through a
+// pipe. Requires: `width` and `height` are even. Errors: FailedPrecondition, with how to install
+// it, if ffmpeg is missing.
 absl::StatusOr<std::unique_ptr<MovingPicture>> Mp4Movie(const std::string& path, double fps,
                                                         int width, int height);
 

@@ -22,7 +22,8 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// ffmpeg's pipe is a socket: what is sent to an ffmpeg that has ended is an error, never a signal.
+// The pipe to ffmpeg is a socket, so sending to an ffmpeg that has exited is an error and never a
+// signal.
 class Mp4 : public MovingPicture {
  public:
   Mp4(std::string path, std::unique_ptr<WholeFile> file)
@@ -65,7 +66,7 @@ class Mp4 : public MovingPicture {
     sigfillset(&all);
     ::posix_spawnattr_setsigmask(&attributes, &none);
     ::posix_spawnattr_setsigdefault(&attributes, &all);
-    // Ctrl-C at the terminal is for this program, which then ends that one.
+    // Ctrl-C at the terminal reaches only this program, which then ends ffmpeg.
     ::posix_spawnattr_setpgroup(&attributes, 0);
     ::posix_spawnattr_setflags(
         &attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
@@ -102,7 +103,7 @@ class Mp4 : public MovingPicture {
         absl::StrCat(EscapeForTerminal(path_), ": ", what, ": ", std::strerror(errno)));
   }
 
-  // Waits for its end; its status as of wait.
+  // Waits for ffmpeg to exit. Returns its status as wait does.
   int End() {
     if (pipe_ >= 0) ::close(std::exchange(pipe_, -1));
     if (pid_ > 0) {
@@ -113,7 +114,7 @@ class Mp4 : public MovingPicture {
     return status_;
   }
 
-  // It ended, or is about to; its last line says why.
+  // Returns the error of an ffmpeg that has exited or is about to; its last line gives the reason.
   absl::Status Ended() {
     (void)End();
     std::string text(4096, '\0');

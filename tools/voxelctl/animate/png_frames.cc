@@ -25,7 +25,7 @@ class Frames : public MovingPicture {
 }  // namespace
 
 std::string NumberedName(const std::string& pattern, int number) {
-  // Of the file's own name; that of its folder stays.
+  // The number goes into the file's own name; the folder's name stays unchanged.
   const size_t slash = pattern.rfind('/');
   const size_t begin = pattern.find('#', slash == std::string::npos ? 0 : slash);
   if (begin == std::string::npos) return pattern;

@@ -14,7 +14,7 @@ namespace voxeld::voxelctl {
 
 std::string Asker::Ask(const std::string& question, const std::string& fallback,
                        const Understand& understand) {
-  // The default stands behind the question's first line.
+  // The default is shown after the question's first line.
   std::string shown = question;
   if (!fallback.empty()) {
     shown.insert(std::min(shown.find('\n'), shown.size()), absl::StrCat(" [", fallback, "]"));

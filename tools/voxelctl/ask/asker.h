@@ -1,4 +1,4 @@
-// Questions to a person: on the console, and answers a line each.
+// Asks a person questions on the console; each answer is one line.
 #pragma once
 
 #include <functional>
@@ -11,26 +11,27 @@
 
 namespace voxeld::voxelctl {
 
-// What an answer comes to, or what would be right.
+// Converts an answer to a value, or returns an error that says what would be valid.
 using Understand = std::function<absl::StatusOr<std::string>(const std::string& answer)>;
 
 struct Choice {
-  std::string word;   // what is typed, or its beginning
+  std::string word;   // what is typed, or its prefix
   std::string about;  // what it means
 };
 
-// What an answer cannot be is said, and asked again.
+// Reports an invalid answer and asks again.
 class Asker {
  public:
   Asker(std::istream& in, Console& console) : in_(in), console_(console) {}
 
-  // The answers have ended: what comes back from here on means nothing.
+  // Returns whether the input has ended; results after that are meaningless.
   bool ended() const { return ended_; }
 
-  // An empty answer is `fallback`.
+  // Asks a question. An empty answer means `fallback`.
   std::string Ask(const std::string& question, const std::string& fallback,
                   const Understand& understand);
-  // One of `choices`, by a beginning that no other has; its word. The first is the fallback.
+  // Asks for one of `choices`, by an unambiguous prefix. Returns its word. The first choice is the
+  // fallback.
   std::string Choose(const std::string& question, const std::vector<Choice>& choices);
   std::string Number(const std::string& question, const std::string& fallback, double least,
                      double most, bool whole);

@@ -34,7 +34,7 @@ using OptionMap = std::map<std::string, std::string>;
 
 constexpr sync::TimeNs kShowLimit = 10 * sync::kSecond;
 
-// A flag, or one for each panel, the other way round.
+// Inverts a flag, or a flag per panel.
 void Flip(OptionMap& options, const std::string& key) {
   std::string& value = options[key];
   std::vector<std::string> flags = absl::StrSplit(value.empty() ? "false" : value, ';');
@@ -42,7 +42,7 @@ void Flip(OptionMap& options, const std::string& key) {
   value = absl::StrJoin(flags, ";");
 }
 
-// The numbers of a list option, so many of them.
+// Returns the `count` numbers of a list option.
 std::vector<double> Numbers(const OptionMap& options, const std::string& key, size_t count) {
   std::vector<double> numbers;
   if (const auto it = options.find(key); it != options.end()) {
@@ -81,9 +81,9 @@ class Walk {
   bool changed() const { return changed_; }
 
  private:
-  // Shows the display as its options are now.
+  // Shows the display with its current options.
   absl::Status Try(TestPattern pattern) {
-    trial_ = nullptr;  // a device has one host
+    trial_ = nullptr;  // a device has only one host
     absl::StatusOr<std::unique_ptr<Trial>> trial =
         Trial::Start(display_, {clock_, [this] { return Usb(); }}, pattern, kShowLimit);
     if (!trial.ok()) return trial.status();
@@ -91,7 +91,8 @@ class Walk {
     return absl::OkStatus();
   }
 
-  // The options as `change` makes them, shown; as they were, and why, if no display can be made of them.
+  // Changes the options and shows the result. If no display can be made of them, restores them and
+  // returns the reason.
   absl::Status Change(TestPattern pattern, const OptionMap& changed) {
     const OptionMap before = std::exchange(display_.options, changed);
     const absl::Status status = Try(pattern);
@@ -118,11 +119,11 @@ class Walk {
     return std::get_if<Shape>(&trial_->info().geometry.shape);
   }
 
-  // What can be turned round, and which option does it.
+  // Returns what can be flipped or rotated, and which option does it.
   std::vector<Choice> Turns() const {
     std::vector<Choice> turns = {{"ok", "that is what is seen"}};
     if (As<display::Lattice>() != nullptr) {
-      // Others' lights are where their list says.
+      // The positions of other displays' lights come from their list.
       if (display_.driver != "fadecandy" && display_.driver != "network") return turns;
       for (const char* axis : {"x", "y", "z"}) {
         turns.push_back({absl::StrCat("flip-", axis), absl::StrCat("the other way along ", axis)});
@@ -281,7 +282,7 @@ class Walk {
   Asker asker_;
   Console& console_;
   sync::SystemClock clock_;
-  std::unique_ptr<display::LibusbBus> usb_;  // outlives the trial, whose display may be on it
+  std::unique_ptr<display::LibusbBus> usb_;  // outlives the trial, whose display may use it
   std::unique_ptr<Trial> trial_;
   bool changed_ = false;
 };
@@ -295,14 +296,14 @@ std::string Quoted(const std::string& text) {
   return quoted + "\"";
 }
 
-// The display's own profile's options and those that were given, in one.
+// Returns the options of the display's profile merged with the given ones.
 absl::StatusOr<daemon::DisplayConfig> ReadDisplay(const std::string& text,
                                                   display::Profile* profile) {
   const std::string first = text.substr(0, text.find(','));
   absl::StatusOr<daemon::DisplayConfig> display = daemon::ParseDisplayOption(
       absl::StrContains(first, '=') ? text : absl::StrCat(first, "=", text));
   if (!display.ok()) return display;
-  // As the daemon would: whether profile and driver go together, among all else.
+  // Checks it as the daemon does, including whether profile and driver match.
   if (const auto split = daemon::SplitDisplayOptions(*display); !split.ok()) return split.status();
   if (const auto named = display->options.extract("profile")) {
     absl::StatusOr<display::Profile> loaded = display::LoadProfile(named.mapped());
@@ -330,7 +331,7 @@ absl::Status Calibrate(const CalibrateOptions& options, std::istream& in, Consol
   absl::StatusOr<daemon::DisplayConfig> display = ReadDisplay(options.display, &profile);
   if (!display.ok()) return display.status();
   const std::string driver = display->driver, name = display->name;
-  // From here on what the device says of how it was put together does not count.
+  // From here on, the device's own calibration is ignored.
   if (driver == "voxlink") display->options["calibrated"] = "true";
   Walk walk(*std::move(display), in, console);
   if (absl::Status status = walk.Run(); !status.ok()) return status;

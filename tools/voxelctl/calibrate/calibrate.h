@@ -1,4 +1,5 @@
-// voxelctl calibrate: walks a person through how a display was put together, on the display itself, and writes its profile.
+// voxelctl calibrate: asks a person how a display is assembled, with test patterns on the display
+// itself, and writes its profile.
 #pragma once
 
 #include <istream>
@@ -9,9 +10,10 @@
 
 namespace voxeld::voxelctl {
 
-// Questions go to the console, answers come from `in`, a line each. Each change is shown on the display before the next question.
-// InvalidArgument: the display's text is wrong; Unavailable: the display cannot be opened; AlreadyExists: the file is there;
-// FailedPrecondition: the answers ended before the questions, and nothing was written.
+// Questions go to the console, and answers come from `in`, one per line. Each change is shown on
+// the display before the next question. Errors: InvalidArgument if the display's text is wrong;
+// Unavailable if the display cannot be opened; AlreadyExists if the file exists; FailedPrecondition
+// if the answers ended early, in which case nothing was written.
 absl::Status Calibrate(const CalibrateOptions& options, std::istream& in, Console& console);
 
 }  // namespace voxeld::voxelctl

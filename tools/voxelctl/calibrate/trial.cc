@@ -13,7 +13,7 @@ namespace {
 
 constexpr sync::TimeNs kStopLimit = 2 * sync::kSecond;
 
-// The answer to a call of the core's.
+// Waits for the reply to a call of the core.
 template <typename T, typename Call>
 absl::StatusOr<T> Await(const Call& call) {
   auto promise = std::make_shared<std::promise<absl::StatusOr<T>>>();
@@ -46,7 +46,7 @@ absl::StatusOr<std::unique_ptr<Trial>> Trial::Start(const daemon::DisplayConfig&
   }
   if (absl::Status status = trial->core_.Start(); !status.ok()) return status;
   if (absl::Status status = trial->Show(pattern); !status.ok()) return status;
-  // The next volume that is shown has the pattern.
+  // The next volume that is shown contains the pattern.
   const absl::StatusOr<display::DecodedVolume> shown = Await<display::DecodedVolume>(
       [&](auto reply) { trial->core_.Capture("", limit, 0, std::move(reply)); });
   if (!shown.ok()) {

@@ -1,4 +1,4 @@
-// A display as its options are at the moment, with a test pattern on it.
+// A display with its current options, which shows a test pattern.
 #pragma once
 
 #include <memory>
@@ -15,8 +15,8 @@ namespace voxeld::voxelctl {
 
 class Trial {
  public:
-  // Opens the display and shows the pattern. InvalidArgument: no display can be made of the options; Unavailable: it does
-  // not show within `limit`, with the reason.
+  // Opens the display and shows the pattern. Errors: InvalidArgument if the options do not describe
+  // a display; Unavailable with the reason if it does not show the pattern within `limit`.
   static absl::StatusOr<std::unique_ptr<Trial>> Start(const daemon::DisplayConfig& display,
                                                       const display::DriverContext& context,
                                                       daemon::TestPattern pattern,

@@ -1,4 +1,4 @@
-// What --help says of voxelctl and of those commands that take more than a line.
+// The help texts of voxelctl, and of those commands whose texts are longer than a line.
 #pragma once
 
 namespace voxeld::voxelctl {

@@ -1,4 +1,4 @@
-// What arguments of the command line may be. Within this folder wrong ones are thrown.
+// Checks of command-line arguments. Within this folder, errors are thrown.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -33,17 +33,17 @@ T Choose(const char* option, const std::string& value, const Choices<T>& choices
 
 void CheckRange(const char* option, double value, double least, double most);
 
-// Has CLI11 refuse, before it converts, a text that is no number from `least` to `most`.
+// Makes CLI11 refuse, before the conversion, a text that is not a number from `least` to `most`.
 void WantNumber(CLI::Option* option, double least, double most);
 
-// A number and its range; what it holds now is the default.
+// Adds a number with its range; its current value is the default.
 void AddNumber(CLI::App* command, const char* name, double* value, double least, double most,
                const char* about, const char* unit);
 
-// --layer and --owner; the number of an owner is checked.
+// Adds --layer and --owner; the number of an owner is checked.
 void AddFilter(CLI::App* command, std::string* layer, uint64_t* owner);
 
-// A name that promises another format than PNG would be a lie.
+// Refuses a name whose extension promises a format other than PNG.
 void CheckPictureName(const std::string& file);
 
 }  // namespace voxeld::voxelctl

@@ -1,4 +1,4 @@
-// Commands that are about the program itself: how shells complete it, and its manual.
+// Commands about the program itself: shell completion and the manual.
 #pragma once
 
 #include <string>
@@ -11,17 +11,17 @@ class App;
 
 namespace voxeld::voxelctl {
 
-// What is given lives as long as the app.
+// References passed in live as long as the app.
 class CompletionArguments {
  public:
-  // `completion`, which is for people; two that are hidden: `__complete KIND [BEGINNING]`, which scripts call, and `__manual DIR`, which
-  // the build calls.
+  // Adds `completion`, which is for people, and two hidden commands: `__complete KIND [BEGINNING]`,
+  // which scripts call, and `__manual DIR`, which the build calls.
   void Add(CLI::App* completion, CLI::App* complete, CLI::App* manual);
 
-  // The script that `completion` prints. Wrong arguments are thrown (UsageError).
+  // Returns the script that `completion` prints. Throws UsageError for wrong arguments.
   std::string Script(const CLI::App& app) const;
   CompleteOptions ReadComplete() const { return complete_; }
-  // Pages of the program and of each command, by their files' names.
+  // Returns the pages of the program and of each command, by their file names.
   ManualOptions ReadManual(const CLI::App& app) const;
 
  private:

@@ -1,4 +1,4 @@
-// The arguments of demo, and what these may be. Within this folder wrong ones are thrown (UsageError).
+// The arguments of demo and their checks. Within this folder, errors are thrown (UsageError).
 #pragma once
 
 #include <string>
@@ -12,9 +12,9 @@ class App;
 
 namespace voxeld::voxelctl {
 
-// What is given lives as long as the app.
+// References passed in live as long as the app.
 void AddDemoOptions(CLI::App* command, DemoOptions* options);
-// `plain`: scenes that stand behind --.
+// `plain` are the scenes after "--".
 DemoOptions ReadDemoOptions(DemoOptions options, const std::vector<std::string>& plain);
 
 }  // namespace voxeld::voxelctl

@@ -13,14 +13,14 @@ namespace {
 namespace network = display::network;
 using network::Protocol;
 
-constexpr int kMostAlong = 4096;  // lights of a box along an axis
+constexpr int kMostAlong = 4096;  // maximum lights of a box along an axis
 
 const Choices<Protocol> kProtocols = {{"opc", Protocol::kOpc},
                                       {"ddp", Protocol::kDdp},
                                       {"e131", Protocol::kE131},
                                       {"artnet", Protocol::kArtNet}};
 
-// A number and its range, which the text about it says, with what holds without it.
+// Adds a number with its range; its help text includes the range and the default.
 void AddPlainNumber(CLI::App* command, const char* name, double* value, double least, double most,
                     const char* about, const char* unit) {
   WantNumber(command->add_option(name, *value, about)->type_name(unit), least, most);

@@ -1,5 +1,5 @@
-// Arguments of the commands that light lights by their numbers, and what they may be. Within this folder wrong ones are
-// thrown (UsageError).
+// Arguments of the commands that set lights by number, and their checks. Within this folder, errors
+// are thrown (UsageError).
 #pragma once
 
 #include <string>
@@ -12,7 +12,7 @@ class App;
 
 namespace voxeld::voxelctl {
 
-// What is given lives as long as the app.
+// References passed in live as long as the app.
 class LightArguments {
  public:
   void Add(CLI::App* command);

@@ -28,7 +28,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// The command line as declared, and the values that it fills in.
+// The declaration of the command line, and the values that it fills in.
 class Parser {
  public:
   Parser() : app_(kAbout, "voxelctl") {
@@ -78,8 +78,7 @@ class Parser {
     ParsedCommandLine result;
     try {
       CheckCommand(arguments);
-      // What follows -- is no option whatever it looks like;
-      // CLI11 would hand it to the parent command.
+      // Arguments after -- are never options; CLI11 would pass them to the parent command.
       const auto end = std::find(arguments.begin(), arguments.end(), "--");
       if (end != arguments.end()) plain_.assign(end + 1, arguments.end());
       // CLI11 takes them from the back.
@@ -109,7 +108,7 @@ class Parser {
   }
 
  private:
-  // Not for people, so it is not named to them.
+  // A hidden command is for programs, so it is not shown to people.
   CLI::App* AddHidden(const char* name) {
     CLI::App* command = Add(name, "");
     names_.pop_back();
@@ -191,7 +190,7 @@ class Parser {
     c->add_option("PROFILE", profile_.profile, "Of check: a path, or the name of one installed");
   }
 
-  // CLI11 says nothing useful about a command that is not there.
+  // CLI11's message for an unknown command is not useful.
   void CheckCommand(const std::vector<std::string>& arguments) const {
     if (arguments.empty())
       throw UsageError{absl::StrCat("a command is expected: ", absl::StrJoin(names_, ", "))};
@@ -211,7 +210,8 @@ class Parser {
     }
   }
 
-  // An option before the command is one of all commands: what is not may take the next word, or not.
+  // An option before the command must be a global one: for any other it is unknown whether it takes
+  // the next word.
   void CheckBefore(const std::string& word) const {
     const std::string name = word.substr(0, word.find('='));
     if (app_.get_option_no_throw(name) != nullptr) return;
@@ -328,7 +328,7 @@ class Parser {
     options_.command = options;
   }
 
-  // The only positional argument of a command, null if it has none.
+  // Stores the only positional argument of a command; null if it has none.
   void TakePlain(std::string* argument) {
     if (plain_.empty()) return;
     if (argument == nullptr || !argument->empty() || plain_.size() > 1) {
@@ -396,7 +396,7 @@ class Parser {
   CLI::App app_;
   std::vector<std::string> names_, hidden_;
   std::vector<std::string> plain_;  // arguments after --
-  std::string printed_;             // what the command prints at once, if it does
+  std::string printed_;             // text that the command prints immediately, if any
   Options options_;
   DemoOptions demo_;
   DrawOptions draw_;

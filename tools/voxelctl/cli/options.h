@@ -1,4 +1,4 @@
-// What the command line says.
+// The contents of the command line.
 #pragma once
 
 #include <array>
@@ -21,41 +21,40 @@ namespace voxeld::voxelctl {
 
 struct PlayOptions {
   std::vector<std::string> files;  // at least one
-  std::vector<std::string>
-      given;  // the options that only some files have a use for, as they are typed
+  std::vector<std::string> given;  // options that apply to some files only, as typed
   bool spin = false;
-  bool clear = false;  // takes it down at the end
+  bool clear = false;  // removes the layer at the end
   bool globe = false;
   bool flat = false;
   bool each = false;
   Up up = Up::kAuto;
   FillStyle fill = FillStyle::kSurface;
-  double fps = 20;  // 0.1 to 240: of spins, sequences and animations
+  double fps = 20;  // 0.1 to 240: for spins, sequences and animations
   std::optional<double> duration_s;
-  std::string display;  // whose space is filled; empty: all of them fit
+  std::string display;  // whose space is filled; empty: all displays fit
   std::optional<RawLayout> raw;
-  VolumeLook volume;     // its colour map also of color_by
-  std::string color_by;  // the numbers that points and meshes are coloured by; empty: none
-  std::optional<std::array<double, 2>> range;  // of those; the first less than the second
+  VolumeLook volume;     // its colour map also applies to color_by
+  std::string color_by;  // the attribute that colours points and meshes; empty: none
+  std::optional<std::array<double, 2>> range;  // of the attribute; ascending
   MoleculeStyle style = MoleculeStyle::kBalls;
-  OtherFiles other_files = OtherFiles::kBelow;  // the files that they name
-  bool sequence = false;                        // the files one after another, at `fps`
-  std::optional<uint32_t> animation;            // from 1 on: of the only file
+  OtherFiles other_files = OtherFiles::kBelow;  // which files they may refer to
+  bool sequence = false;                        // shows the files one after another, at `fps`
+  std::optional<uint32_t> animation;            // of the only file, from 1
   bool loop = false;                            // repeats a sequence or an animation
 };
 
 struct DemoOptions {
-  std::vector<std::string> scenes;  // of kSceneNames; empty: all
-  bool list = false;                // only says which there are
-  bool once = false;                // ends after the last
-  double seconds = 20;              // of each
-  std::string display;              // whose space is filled; empty: all of them fit
-  std::string data;                 // a folder that is looked at first; empty: none
+  std::vector<std::string> scenes;  // from kSceneNames; empty: all
+  bool list = false;                // only lists the scenes
+  bool once = false;                // ends after the last scene
+  double seconds = 20;              // per scene
+  std::string display;              // whose space is filled; empty: all displays fit
+  std::string data;                 // a folder that is searched first; empty: none
 };
 
 struct DrawOptions {
-  std::vector<std::string> shapes;  // at least one, as shape/shape_text.h has them
-  bool add = false;                 // to what voxelctl put up before
+  std::vector<std::string> shapes;  // at least one, as in shape/shape_text.h
+  bool add = false;                 // adds to what voxelctl drew before
 };
 
 struct SnapshotOptions {
@@ -70,14 +69,14 @@ struct SnapshotOptions {
 enum class PictureFormat : uint8_t { kGif, kMp4, kPng };
 
 struct TurntableOptions {
-  std::string file;  // PNGs: with a run of "#"s, or one frame
+  std::string file;  // PNGs: with a run of "#", or one frame
   PictureFormat format = PictureFormat::kGif;
   std::string display;  // empty: the first
   int frames = 72;
   double fps = 24;
-  int width = 720, height = 600;  // of an MP4 even
+  int width = 720, height = 600;  // even for an MP4
   double azimuth_degrees = 24, elevation_degrees = 20;
-  double turns = 1;  // in all frames; the last is a step before the first
+  double turns = 1;  // over all frames; the last is a step before the first
   bool live = false;
   double timeout_s = 5;
 };
@@ -107,7 +106,7 @@ struct StatsOptions {
 struct TopOptions {
   bool once = false;
   double interval_s = 1;
-  std::string display;  // that is looked at first; empty: the first
+  std::string display;  // shown first; empty: the first
 };
 
 struct EntitiesOptions {
@@ -116,9 +115,9 @@ struct EntitiesOptions {
 };
 
 struct WhyOptions {
-  std::string id;       // an entity's
-  std::string layer;    // empty: the only one that has it
-  uint64_t owner = 0;   // 0: the only one that has it
+  std::string id;       // id of an entity
+  std::string layer;    // empty: the only layer that has it
+  uint64_t owner = 0;   // 0: the only owner that has it
   std::string display;  // empty: the first
 };
 
@@ -128,7 +127,7 @@ struct WatchOptions {
 };
 
 struct ClearOptions {
-  std::string layer;  // empty: what voxelctl put up
+  std::string layer;  // empty: what voxelctl drew
   bool all = false;
 };
 
@@ -146,45 +145,45 @@ struct SetOptions {
 
 struct CalibrateOptions {
   std::string display;  // "[NAME=]DRIVER[,KEY=VALUE…]"
-  std::string file;     // where the profile goes: must not be there yet
+  std::string file;     // output file of the profile; must not exist yet
 };
 
 struct VerifyOptions {
   std::string display;  // "[NAME=]DRIVER[,KEY=VALUE…]"
-  std::string filter;   // of cases' ids, as file names are matched; empty: all
-  std::string junit;    // a file to write, or nothing
+  std::string filter;   // of case ids, matched like file names; empty: all
+  std::string junit;    // output file; empty: none
   bool list = false;
   uint64_t seed = 1;
-  double wait_s = 0;  // for the device to be attached
+  double wait_s = 0;  // seconds to wait for the device to be attached
 };
 
 struct ProfileOptions {
-  bool list = false;    // else check
+  bool list = false;    // list profiles; otherwise check one
   std::string profile;  // a name or a path
 };
 
 struct DoctorOptions {};
 
 struct InitOptions {
-  std::string file;  // where the profile goes: must not be there yet
+  std::string file;  // output file of the profile; must not exist yet
 };
 
 struct TokenOptions {
   std::string name;                  // the principal
-  std::string scopes = "view,draw";  // as the grants file has them
+  std::string scopes = "view,draw";  // as in the grants file
   double days = 0;                   // until it expires; 0: never
-  std::string grants;                // the file that gets the entry; empty: none
+  std::string grants;                // the file to append the entry to; empty: none
 };
 
 struct RecordOptions {
-  std::string file;       // must not be there yet
-  double duration_s = 0;  // 0: until an interrupt
-  bool still = false;     // the scene as it is, and no more
+  std::string file;       // must not exist yet
+  double duration_s = 0;  // 0: until interrupted
+  bool still = false;     // records only the current scene
 };
 
 struct PlaylistOptions {
   std::string file;
-  bool check = false;  // only say what is in it
+  bool check = false;  // only reports what it contains
 };
 
 struct ReplayOptions {
@@ -193,11 +192,12 @@ struct ReplayOptions {
   bool loop = false, step = false, keep = false;
 };
 
-// Which lights, and the layer that they are put into.
+// The lights, and the layer that shows them.
 struct LightsOptions {
-  std::optional<std::array<int, 3>> size;  // a box of them; else
-  std::string layout;                      // a layout of Open Pixel Control; else the display's own
-  std::string display;                     // empty: the first
+  std::optional<std::array<int, 3>> size;  // a box of lights; otherwise
+  // An Open Pixel Control layout; otherwise the display's own.
+  std::string layout;
+  std::string display;  // empty: the first
   std::string layer = "lights";
 };
 
@@ -206,38 +206,38 @@ struct InputOptions {
   LightsOptions lights;
   std::string listen;               // HOST:PORT
   int32_t first_universe = 1;       // E1.31, Art-Net
-  int32_t universe_channels = 510;  // of each that are lights'; as above
-  int32_t a_channel = 0;  // lights of a channel of Open Pixel Control; 0: as many as there are
+  int32_t universe_channels = 510;  // of each universe that belong to lights; as above
+  int32_t a_channel = 0;            // lights per channel of Open Pixel Control; 0: all
   double gather_ms = 4;
   bool multicast = false;  // E1.31
 };
 
 struct MarkersOptions {
   std::string url;                  // ws://HOST:PORT
-  std::vector<std::string> topics;  // empty: all that have a scene
+  std::vector<std::string> topics;  // empty: all scene topics
   std::string layer = "markers";
 };
 
 struct AssetsOptions {
-  std::vector<std::string> files;  // to upload; empty: what is there is listed
+  std::vector<std::string> files;  // to upload; empty: list the existing assets
 };
 
 struct PipeOptions {
   LightsOptions lights;
-  double fps = 0;  // 0: as they come
+  double fps = 0;  // 0: as received
   bool keep = false;
 };
 
-// Names that begin so, for a shell that completes one.
+// Completes a prefix to names for a shell.
 struct CompleteOptions {
   std::string kind;
   std::string beginning;
 };
 
-// Manual pages, made by the parser, which knows what they are about.
+// Manual pages, generated by the parser from its own declarations.
 struct ManualOptions {
   std::string folder;
-  std::vector<std::pair<std::string, std::string>> pages;  // names of files, and what is in them
+  std::vector<std::pair<std::string, std::string>> pages;  // file names and contents
 };
 
 struct Options {
@@ -258,18 +258,18 @@ struct Options {
 inline constexpr int kExitOk = 0;
 inline constexpr int kExitFailure = 1;
 inline constexpr int kExitUsage = 2;
-inline constexpr int kExitNoDevice = 3;  // of verify: nothing was verified
+inline constexpr int kExitNoDevice = 3;  // verify: nothing was verified
 inline constexpr int kExitInterrupted = 130;
 
-// Either what to do, or what to print and the code to end with (help, version, a usage error).
+// Either the options, or a text to print with the exit code (help, version, a usage error).
 struct ParsedCommandLine {
   std::optional<Options> options;
   int exit_code = kExitOk;
   std::string out, err;
 };
 
-// `arguments` without the program's name. Global options may stand before the command or after it.
-// A usage error says what was not understood, the nearest that would have been, and where help is.
+// `arguments` excludes the program's name. Global options may be before or after the command. A
+// usage error says what was not understood, the nearest valid word, and where to find help.
 ParsedCommandLine ParseCommandLine(const std::vector<std::string>& arguments);
 
 }  // namespace voxeld::voxelctl

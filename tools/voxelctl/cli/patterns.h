@@ -1,4 +1,4 @@
-// Test patterns by the names that they have on the command line.
+// Test patterns by their names on the command line.
 #pragma once
 
 #include <string>
@@ -9,10 +9,10 @@
 
 namespace voxeld::voxelctl {
 
-// With none, the scene again.
+// Includes none, which shows the scene again.
 const Choices<v1::TestPattern>& Patterns();
 
-// "axes", "corners", …: without none.
+// Returns "axes", "corners", …, without none.
 std::vector<std::string> PatternNames();
 
 }  // namespace voxeld::voxelctl

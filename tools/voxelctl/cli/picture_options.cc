@@ -47,7 +47,7 @@ void ReadSize(const std::string& text, int* width, int* height) {
   CheckRange("the height in --size", *height, 64, 8192);
 }
 
-// By the end of the name.
+// Selects the format by the file's extension.
 template <typename T>
 T FormatOf(const std::string& file, const char* command, const char* example,
            const Choices<T>& formats) {

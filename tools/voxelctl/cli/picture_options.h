@@ -1,5 +1,5 @@
-// Arguments of the commands that make pictures and files of what a display shows, and what they may be. Within this
-// folder wrong ones are thrown (UsageError).
+// Arguments of the commands that make pictures and files of what a display shows, and their checks.
+// Within this folder, errors are thrown (UsageError).
 #pragma once
 
 #include <string>
@@ -12,11 +12,11 @@ class App;
 
 namespace voxeld::voxelctl {
 
-// What is given lives as long as the app.
+// References passed in live as long as the app.
 class SnapshotArguments {
  public:
   void Add(CLI::App* command);
-  // `file` is what stood behind "--", if anything.
+  // `file` is the argument after "--", if there is one.
   SnapshotOptions Read(const CLI::App& command) const;
   std::string* file() { return &options_.file; }
 

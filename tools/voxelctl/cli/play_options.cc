@@ -25,7 +25,7 @@ const Choices<SampleType> kTypes = {{"u8", SampleType::kU8},   {"i8", SampleType
                                     {"u32", SampleType::kU32}, {"i32", SampleType::kI32},
                                     {"f32", SampleType::kF32}, {"f64", SampleType::kF64}};
 
-// Two numbers, the first less than the second.
+// Reads two numbers in ascending order.
 std::array<double, 2> ReadRange(absl::string_view option, const std::string& text) {
   const std::pair<std::string, std::string> ends = absl::StrSplit(text, absl::MaxSplits(':', 1));
   std::array<double, 2> range;
@@ -118,7 +118,7 @@ void PlayArguments::ReadAnimation() {
     uint32_t number = 0;
     if (word.empty()) continue;
     if (!absl::SimpleAtoi(word, &number)) {
-      // --animate walk.glb
+      // For example --animate walk.glb.
       options_.files.push_back(word);
     } else if (number < 1) {
       throw UsageError{

@@ -1,4 +1,4 @@
-// The arguments of play, and what these may be. Within this folder wrong ones are thrown (UsageError).
+// The arguments of play and their checks. Within this folder, errors are thrown (UsageError).
 #pragma once
 
 #include <cmath>
@@ -16,9 +16,9 @@ namespace voxeld::voxelctl {
 
 class PlayArguments {
  public:
-  // The app must not outlive it.
+  // The app must not outlive this object.
   void Add(CLI::App* command);
-  // `plain`: files that stand behind --.
+  // `plain` are the files after "--".
   PlayOptions Read(const std::vector<std::string>& plain);
 
  private:
@@ -28,7 +28,7 @@ class PlayArguments {
   PlayOptions options_;
   std::string up_ = "auto", fill_ = "surface", style_ = "balls", other_files_ = "below";
   std::string size_, type_, range_, window_;
-  std::vector<std::string> animate_;  // with nothing, or a number, or what is a file
+  std::vector<std::string> animate_;  // nothing, a number, or what is really a file
   CLI::Option* animate_option_ = nullptr;
   CLI::App* command_ = nullptr;
   bool big_endian_ = false;

@@ -1,4 +1,4 @@
-// The options that say where the server is and who the caller is.
+// The options for the server's address and the caller's identity.
 #pragma once
 
 #include <string>
@@ -12,13 +12,13 @@ class App;
 
 namespace voxeld::voxelctl {
 
-// All but --server go above the environment's. They live as long as the app.
+// All except --server override the environment. References passed in live as long as the app.
 void AddServerOptions(CLI::App& app, std::string* server, client::Credentials* credentials);
 
-// Whether the word is such an option, which takes the next word.
+// Returns whether the word is such an option, which takes the next word.
 bool IsServerOption(std::string_view word);
 
-// `given` over what the environment says.
+// Returns `given`, completed from the environment.
 client::Credentials ChooseCredentials(client::Credentials given,
                                       const client::Environment& environment);
 

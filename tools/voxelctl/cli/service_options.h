@@ -1,5 +1,5 @@
-// Commands for those who run a daemon and test devices: their arguments, and what these may be. Within this folder wrong ones
-// are thrown (UsageError).
+// Commands for people who run a daemon and test devices: arguments and their checks. Within this
+// folder, errors are thrown (UsageError).
 #pragma once
 
 #include "tools/voxelctl/cli/options.h"
@@ -10,7 +10,7 @@ class App;
 
 namespace voxeld::voxelctl {
 
-// What is given lives as long as the app.
+// References passed in live as long as the app.
 void AddTopOptions(CLI::App* command, TopOptions* options);
 
 void AddTokenOptions(CLI::App* command, TokenOptions* options);

@@ -14,7 +14,8 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// The number of the scene's newest snapshot. A watch of an owner that nobody is begins with it alone.
+// Returns the number of the scene's newest snapshot. Watches an owner that does not exist, because
+// such a watch begins with the snapshot only.
 absl::StatusOr<uint64_t> NewestSnapshot(Connection& connection) {
   v1::WatchSceneRequest request;
   request.set_owner(std::numeric_limits<uint64_t>::max());

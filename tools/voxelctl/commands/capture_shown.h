@@ -1,4 +1,4 @@
-// What a display shows, asked for by a command that wants to see it.
+// Captures what a display shows, for commands that need it.
 #pragma once
 
 #include <string>
@@ -12,25 +12,27 @@ namespace voxeld::voxelctl {
 
 struct ShownVolume {
   Volume volume;
-  bool up_to_date = false;  // it shows all that was up when it was asked for
-  bool decoded = false;     // from the bytes sent; else reported by the device
+  bool up_to_date = false;  // shows everything that was in the scene at the call
+  bool decoded = false;     // from the sent bytes; otherwise reported by the device
 };
 
-// Of `display` (empty: the first), waiting up to `timeout_s` for a volume that shows all that is up. Where none comes, or the
-// newest is not known, an older one is taken, and the console told.
+// Captures from `display` (empty: the first), waiting up to `timeout_s` for a volume that shows
+// everything in the scene. If none comes, or the newest snapshot is unknown, uses an older volume
+// and reports it on the console.
 absl::StatusOr<ShownVolume> CaptureShown(const std::string& display, double timeout_s,
                                          Connection& connection, Console& console);
 
-// Whatever it shows now.
+// Captures whatever it shows now.
 absl::StatusOr<ShownVolume> CaptureNow(const std::string& display, Connection& connection);
 
-// Slice pixels that are not black.
+// Returns the number of slice pixels that are not black.
 uint64_t LitPixels(const Volume& volume);
 
-// "volume 7 of display stack, 123 slice pixels lit, decoded from the bytes sent", fit for a terminal.
+// Returns "volume 7 of display stack, 123 slice pixels lit, decoded from the bytes sent", escaped
+// for a terminal.
 std::string ShownText(const ShownVolume& shown);
 
-// What to say where nothing is lit.
+// The message if nothing is lit.
 inline constexpr const char* kNothingLit =
     "no pixel is lit: see `voxelctl entities` for what is up, `voxelctl stats` for where it went";
 

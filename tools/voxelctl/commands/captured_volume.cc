@@ -15,8 +15,8 @@ absl::Status CapturedVolume::Begin(const v1::VolumeHeader& header) {
   absl::StatusOr<display::Geometry> geometry = daemon::wire::FromWire(header.geometry());
   if (!geometry.ok()) return geometry.status();
   const v1::FrameLayout& layout = header.layout();
-  // Each is at most 2¹⁴ by the displays' own limits, with room for panels;
-  // the product fits 64 bits.
+  // Each extent is at most 2¹⁴ by the displays' own limits, with allowance for panels; the product
+  // fits into 64 bits.
   for (const int32_t extent : {layout.slices(), layout.width(), layout.height()}) {
     if (extent < 1 || extent > 1 << 20) {
       return absl::InvalidArgumentError(absl::StrCat("the server sent a volume of ",

@@ -1,4 +1,4 @@
-// A volume put together from the chunks of CaptureVolume.
+// Assembles a volume from the chunks of CaptureVolume.
 #pragma once
 
 #include <string>
@@ -10,15 +10,15 @@
 
 namespace voxeld::voxelctl {
 
-// A header first, then slices in any order, each once or more. Not thread-safe.
+// Accepts a header first, then slices in any order, each once or more. Not thread-safe.
 class CapturedVolume {
  public:
   static constexpr uint64_t kMostBytes = uint64_t{4} << 30;
 
-  // InvalidArgument if the chunk does not fit what came before.
+  // Errors: InvalidArgument if the chunk does not fit the earlier ones.
   absl::Status Add(const v1::VolumeChunk& chunk);
 
-  // All slices must have come; the geometry must fit them.
+  // Requires: all slices were added, and the geometry fits them.
   absl::StatusOr<Volume> Finish() &&;
 
   const v1::VolumeHeader& header() const { return header_; }

@@ -14,7 +14,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// What all of `displays` show; the first one's, if they show nothing in common.
+// Returns the space that all of `displays` show, or the first one's if they have none in common.
 absl::StatusOr<Room> CommonRoom(std::span<const v1::DisplayDescription* const> displays) {
   std::optional<DisplaySpace> common;
   int least_side = INT_MAX;

@@ -1,4 +1,4 @@
-// What room there is for a scene.
+// Determines the space for a scene.
 #pragma once
 
 #include <array>
@@ -15,13 +15,14 @@ namespace voxeld::voxelctl {
 struct Room {
   DisplaySpace space;
   std::array<uint32_t, 2> voxels = {
-      512, 512};  // across and up, of the display that has the most; without a display as it stands
+      512, 512};  // across and up, of the display with the most; this default without a display
   int least_side =
-      128;  // voxels, of the display that has the fewest along an axis; without a display as it stands
+      128;  // voxels of the smallest axis of any display; this default without a display
 };
 
-// What the display `name` shows, or all of the server's if it is empty: what is common to them, or the first one's if nothing
-// is. A server without displays is told. NotFound names those that there are.
+// Returns the space of display `name`. If it is empty, returns the common space of all the server's
+// displays, or the first one's if there is no common space. Reports a server without displays on
+// the console. Errors: NotFound with the existing names.
 absl::StatusOr<Room> ChooseSpace(Connection& connection, const std::string& name, Console& console);
 
 }  // namespace voxeld::voxelctl

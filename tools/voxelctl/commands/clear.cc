@@ -17,7 +17,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// Everything that is the caller's, or everybody's if it may.
+// Clears everything that is the caller's, or everybody's if it has the scope.
 absl::StatusOr<TakenDown> ClearAll(Connection& connection) {
   const absl::StatusOr<v1::ClearLayerResponse> cleared = connection.ClearLayer({});
   TakenDown taken;
@@ -33,8 +33,8 @@ absl::StatusOr<TakenDown> ClearAll(Connection& connection) {
   for (const v1::LayerInfo& layer : left->layers())
     layers.push_back({layer.owner(), layer.layer()});
   if (layers.empty()) return taken;
-  // Others', or put up meanwhile by a client that runs. One is asked for, which tells: each refusal is a line in the
-  // server's audit log.
+  // These layers are other owners', or were added meanwhile by a running client. Only one is tried,
+  // which shows whether it is allowed, because each refusal is a line in the server's audit log.
   const absl::StatusOr<TakenDown> one = TakeDown({layers.front()}, connection);
   if (!one.ok()) return one.status();
   if (!one->stay.empty()) taken.stay = std::move(layers);

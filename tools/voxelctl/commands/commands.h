@@ -1,5 +1,5 @@
-// What voxelctl does. Each command writes its data and words to the console and returns a status
-// whose message is for people; Cancelled means that an interrupt ended it before its end.
+// The commands of voxelctl. Each writes its data and messages to the console and returns a status
+// whose message is for people; Cancelled means that an interrupt ended it early.
 #pragma once
 
 #include <functional>
@@ -15,30 +15,31 @@
 
 namespace voxeld::voxelctl {
 
-// Reads the files before it connects: nothing is put up unless all of them can be.
+// Reads the files before it connects: nothing is shown unless all of them can be.
 absl::Status Play(const PlayOptions& options, const Connector& connect, Interrupt& interrupt,
                   Console& console);
-// Reads what it plays while it plays what is before it; all that it put up is gone at its end.
+// Reads the next scene while the previous one plays. Removes everything that it showed at the end.
 absl::Status Demo(const DemoOptions& options, const Connector& connect, Interrupt& interrupt,
                   Console& console);
-// Nothing is put up unless all shapes are understood, and taken by the server.
+// Draws nothing unless all shapes are valid and accepted by the server.
 absl::Status Draw(const DrawOptions& options, const Connector& connect, Console& console);
-// Every shape by itself, as the display shows it, in one picture; the layer is empty afterwards.
+// Draws every shape alone, as the display shows it, into one picture; the layer is empty
+// afterwards.
 absl::Status Gallery(const GalleryOptions& options, Connection& connection, Interrupt& interrupt,
                      Console& console);
-// Of a volume that shows all that was up when it was called; of an older one, which is told, if none
-// comes in the options' time.
+// Captures a volume that shows everything that was in the scene at the call. If none comes in the
+// options' time, uses an older one and reports it.
 absl::Status Snapshot(const SnapshotOptions& options, Connection& connection, Console& console);
-// A turntable of what a display shows; nothing is left of one that an interrupt ends, but PNGs that were whole.
+// Renders a turntable of what a display shows. An interrupt leaves nothing except completed PNGs.
 absl::Status Render(const TurntableOptions& options, Connection& connection, Interrupt& interrupt,
                     Console& console);
-// The volume as it is shown, in a file for other programs.
+// Writes the shown volume to a file for other programs.
 absl::Status Export(const ExportOptions& options, Connection& connection, Console& console);
 absl::Status Displays(Connection& connection, Console& console);
 absl::Status ShowStats(const StatsOptions& options, Connection& connection, Interrupt& interrupt,
                        Console& console);
 absl::Status Entities(const EntitiesOptions& options, Connection& connection, Console& console);
-// What the server says of an entity's visibility.
+// Prints the server's explanation of an entity's visibility.
 absl::Status Assets(const AssetsOptions& options, Connection& connection, Interrupt& interrupt,
                     Console& console);
 absl::Status Why(const WhyOptions& options, Connection& connection, Console& console);
@@ -48,12 +49,13 @@ absl::Status Clear(const ClearOptions& options, Connection& connection, Console&
 absl::Status Pattern(const PatternOptions& options, Connection& connection, Console& console);
 absl::Status Set(const SetOptions& options, Connection& connection, Console& console);
 void ListPatterns(Console& console);
-// Names for a shell, a line each; none, and no word, where the server does not answer at once.
+// Prints names for a shell, one per line; nothing, without a message, if the server does not answer
+// promptly.
 absl::Status Complete(const CompleteOptions& options, const Connector& connect,
                       Interrupt& interrupt, Console& console);
 absl::Status WriteManual(const ManualOptions& options);
 
-// Connects if the command needs it, runs it, says what went wrong; the exit code.
+// Connects if the command needs it, runs it, and reports errors. Returns: the exit code.
 int Run(const Options& options, const Environment& environment, Interrupt& interrupt,
         Console& console);
 

@@ -33,7 +33,7 @@ std::set<std::string> Live(const CompleteOptions& options, Connection& connectio
   if (options.kind == "entities") {
     request.set_id_prefix(options.beginning);
   } else {
-    request.set_page_size(1);  // what is asked for is in the layers
+    request.set_page_size(1);  // only the layers are needed
   }
   const absl::StatusOr<v1::ListEntitiesResponse> response =
       connection.ListEntities(std::move(request), /*first_page_only=*/true);
@@ -56,7 +56,7 @@ absl::Status Complete(const CompleteOptions& options, const Connector& connect,
   if (options.kind == "profiles") {
     for (const std::string& name : ProfileNames()) names.insert(name);
   } else {
-    // Whoever waits has a key down: late is as good as nothing.
+    // The user is waiting at a prompt, so a late answer is useless.
     Interrupt answered(Interrupt::Watch::kNothing);
     std::thread timer([&] {
       sync::SystemClock clock;
@@ -71,7 +71,7 @@ absl::Status Complete(const CompleteOptions& options, const Connector& connect,
   }
   std::string out;
   for (const std::string& name : names) {
-    // A name that a terminal would not show as it is, is not put into a command line either.
+    // A name that a terminal would not show unchanged is not put into a command line either.
     const bool plain = !name.empty() && EscapeForTerminal(name) == name;
     if (plain && absl::StartsWith(name, options.beginning)) absl::StrAppend(&out, name, "\n");
   }

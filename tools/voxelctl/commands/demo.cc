@@ -65,7 +65,7 @@ absl::Status ListScenes(const DemoOptions& options, Console& console) {
   return absl::OkStatus();
 }
 
-// Of a status of a scene: what the scene is to blame for, and not the connection.
+// Returns whether a status of a scene is caused by the scene and not by the connection.
 bool IsOfTheScene(const absl::Status& status) {
   return absl::IsInvalidArgument(status) || absl::IsFailedPrecondition(status) ||
          absl::IsResourceExhausted(status) || absl::IsNotFound(status) ||
@@ -82,7 +82,7 @@ void PassOver(const SceneAbout& about, const absl::Status& why, Console& console
   }
 }
 
-// Its data are not on this machine, which is no fault.
+// Skips a scene whose data are not on this machine, which is not an error.
 void LeaveOut(const SceneAbout& about, const std::vector<std::string>& roots,
               const absl::Status& why, Console& console) {
   if (console.json()) return PassOver(about, why, console);
@@ -133,7 +133,7 @@ class DemoPlayer {
     return absl::OkStatus();
   }
 
-  // The next one is made while one is up.
+  // The next scene is made while one is shown.
   std::future<Made> Make(const Playable& scene) const {
     SceneSettings settings{room_.space, room_.least_side, scene.files};
     return std::async(std::launch::async, scene.about->make, std::move(settings));
@@ -168,7 +168,7 @@ class DemoPlayer {
     return absl::OkStatus();
   }
 
-  // In place of what was up, whose objects end when nothing draws them any more.
+  // Replaces the previous scene. Its objects are removed when nothing draws them.
   absl::Status PutUp(const Playable& playable, Scene& scene) {
     auto stage =
         std::make_unique<Stage>(*session_, session_->client().GetLayer(kLayer),
@@ -254,9 +254,9 @@ class DemoPlayer {
   sync::SystemClock clock_;
   Room room_;
   std::unique_ptr<SceneSession> session_;
-  std::unique_ptr<Stage> stage_;  // of the scene that is up
-  uint64_t number_ = 0;           // of scenes that were put up
-  uint64_t refused_before_ = 0;   // commits, of scenes that were passed over
+  std::unique_ptr<Stage> stage_;  // of the current scene
+  uint64_t number_ = 0;           // of scenes that were shown
+  uint64_t refused_before_ = 0;   // commits that were refused, of skipped scenes
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Which displays a command means.
+// Selects the displays of a command.
 #pragma once
 
 #include <string>
@@ -9,7 +9,8 @@
 
 namespace voxeld::voxelctl {
 
-// The one named, or all of the server's if `wanted` is empty: FailedPrecondition if it has none.
+// Returns the named display, or all of the server's if `wanted` is empty. Errors:
+// FailedPrecondition if it has none.
 absl::StatusOr<std::vector<std::string>> DisplayNames(const std::string& wanted,
                                                       Connection& connection);
 

@@ -10,7 +10,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// "DISPLAY_STATE_SHOWING" as "showing".
+// Converts "DISPLAY_STATE_SHOWING" to "showing".
 std::string Word(const std::string& name, absl::string_view prefix) {
   return absl::AsciiStrToLower(absl::StripPrefix(name, prefix));
 }

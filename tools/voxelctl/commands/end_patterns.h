@@ -1,4 +1,4 @@
-// Test patterns give way to the scene.
+// Ends test patterns, so that displays show the scene.
 #pragma once
 
 #include <string>
@@ -10,15 +10,15 @@
 namespace voxeld::voxelctl {
 
 struct EndedPatterns {
-  std::vector<std::string> ended;  // displays
-  std::vector<std::string> stay;   // displays whose pattern the caller has not the scope to end
+  std::vector<std::string> ended;        // displays
+  std::vector<std::string> stay;         // displays whose pattern the caller lacks the scope to end
   std::vector<std::string> not_showing;  // sentences, as NotShowing returns them
 };
 
 // Ends the test pattern of every display that shows one.
 absl::StatusOr<EndedPatterns> EndPatterns(Connection& connection);
 
-// A sentence about patterns that stay; nothing where none does. Fit for a terminal.
+// Returns a sentence about patterns that stay; empty if none does. Escaped for a terminal.
 std::string PatternsStay(const EndedPatterns& patterns);
 
 }  // namespace voxeld::voxelctl

@@ -35,7 +35,7 @@ constexpr double kLetters = 13;
 constexpr int kEachWidth = 240, kEachHeight = 200, kEachColors = 64;
 constexpr ViewAngles kAngles = {24, 20};
 
-// The first volume that shows this snapshot, or any.
+// Captures the first volume that shows this snapshot, or any.
 absl::StatusOr<Volume> Capture(const GalleryOptions& options, uint64_t snapshot,
                                Connection& connection) {
   v1::CaptureVolumeRequest request;
@@ -49,14 +49,14 @@ absl::StatusOr<Volume> Capture(const GalleryOptions& options, uint64_t snapshot,
   return std::move(captured).Finish();
 }
 
-// Takes away what earlier commands have drawn, as far as the caller may.
+// Removes what earlier commands have drawn, as far as the caller may.
 absl::Status Empty(Connection& connection) {
   const absl::StatusOr<std::vector<OwnedLayer>> layers = DrawnBefore(connection);
   if (!layers.ok()) return layers.status();
   return TakeDown(*layers, connection).status();
 }
 
-// Layers that are up beside what is drawn, and so are in every picture.
+// Returns the other layers in the scene, which therefore appear in every picture.
 absl::StatusOr<std::vector<std::string>> Beside(Connection& connection) {
   const absl::StatusOr<v1::ListEntitiesResponse> all =
       connection.ListEntities({}, /*first_page_only=*/true);
@@ -79,7 +79,7 @@ std::string BesideForTerminal(std::vector<std::string> layers) {
                       "; without it: voxelctl clear --all, which takes the scope control");
 }
 
-// As files are called: "points, soft" is points-soft.png.
+// Converts a name to a file name: "points, soft" is points-soft.png.
 std::string FileName(absl::string_view name) {
   std::string out;
   for (const char c : name) {
@@ -92,7 +92,7 @@ std::string FileName(absl::string_view name) {
   return out + ".png";
 }
 
-// A shape by itself, without a label.
+// Writes the picture of one shape, without a label.
 absl::Status WriteEach(const std::string& folder, const char* name, const Volume& volume) {
   const Image image =
       RenderVolume(volume, {.width = kEachWidth, .height = kEachHeight, .angles = kAngles});
@@ -100,7 +100,7 @@ absl::Status WriteEach(const std::string& folder, const char* name, const Volume
                          ReduceColors(image, kEachColors));
 }
 
-// With the tile's ground.
+// Fills the sheet with the tile's background.
 void Cover(const Image& tile, Image& sheet) {
   for (size_t i = 0; i < sheet.rgb.size(); ++i) sheet.rgb[i] = tile.rgb[i % 3];
 }

@@ -1,4 +1,4 @@
-// The layers that play and draw put everything into: what earlier commands left there.
+// Finds what earlier commands left in the layers that play and draw use.
 #pragma once
 
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace voxeld::voxelctl {
 
-// kLayer and kMaskLayer, of all owners that have them.
+// Returns kLayer and kMaskLayer, for all owners that have them.
 absl::StatusOr<std::vector<OwnedLayer>> DrawnBefore(Connection& connection);
 
 }  // namespace voxeld::voxelctl

@@ -32,17 +32,17 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr double kSecondsPerTurn = 8;
-constexpr sync::TimeNs kAnswerTime = 30 * sync::kSecond;   // for the scene to be taken in
-constexpr sync::TimeNs kOutcomeTime = 10 * sync::kSecond;  // for a still scene to be shown
+constexpr sync::TimeNs kAnswerTime = 30 * sync::kSecond;   // for the scene to be accepted
+constexpr sync::TimeNs kOutcomeTime = 10 * sync::kSecond;  // for a static scene to be shown
 constexpr sync::TimeNs kLastOutcomeTime = 2 * sync::kSecond;
 constexpr sync::TimeNs kLiveLineTime = 200 * sync::kMillisecond;
 constexpr uint64_t kStagedBytes = 8 << 20;
-constexpr uint64_t kDefinitionBytes = 256;  // of a definition, beside its vertices, about
+constexpr uint64_t kDefinitionBytes = 256;  // approximate size of a definition without its vertices
 constexpr size_t kLabelBytes = 200;
-constexpr size_t kSwatches = 32;         // of a legend
-constexpr int64_t kMeasuredFrames = 16;  // of a sequence, for its place
+constexpr size_t kSwatches = 32;         // in a legend
+constexpr int64_t kMeasuredFrames = 16;  // of a sequence, to determine its placement
 
-// At most kLabelBytes of what a person calls the file; no code point is cut.
+// Returns the file's readable name, of at most kLabelBytes, cut between code points.
 std::string Label(const std::string& path) {
   std::string label = EscapeForTerminal(std::filesystem::path(path).filename().string());
   if (label.size() <= kLabelBytes) return label;
@@ -67,14 +67,15 @@ class Player {
     ApplyLook(models, {.fill = options_.fill, .flat = options_.flat});
     if (absl::Status status = Open(); !status.ok()) return status;
     absl::Status status = PutUp(std::move(models));
-    // After the new scene is in: for a moment both may be up, but never neither.
+    // Removes the old scene after the new one was added: for a moment both may be visible, but
+    // never neither.
     if (status.ok()) status = TakeBeforeDown();
     if (!status.ok()) return status;
     Announce();
     return Finish(Stay());
   }
 
-  // One after another, each at its time; those that come too late are left out.
+  // Shows frames one after another at their times; late ones are skipped.
   absl::Status Run(FrameSource& source) {
     FramePlacement placement(options_.up);
     const int64_t last = source.count() - 1;
@@ -96,7 +97,7 @@ class Player {
   }
 
  private:
-  // Colours by an attribute, if that is wanted. The range of the first models is that of all that follow.
+  // Colours by an attribute if requested. The range of the first models is used for all later ones.
   absl::Status Color(std::span<Model> models) {
     if (options_.color_by.empty()) return absl::OkStatus();
     ColorBy wanted{.attribute = options_.color_by,
@@ -110,7 +111,8 @@ class Player {
     return absl::OkStatus();
   }
 
-  // Waits for the displays and prints which of them show the files, the legend, and the parts that are not shown.
+  // Waits for the displays and prints which of them show the files, the legend, and the parts that
+  // are not shown.
   void Announce() {
     const bool moving = options_.spin || summary_.frames > 0;
     const absl::Status settled = session_->WaitSettled(moving ? kLastOutcomeTime : kOutcomeTime);
@@ -138,14 +140,14 @@ class Player {
       if (!file.note.empty()) console_.Say(EscapeForTerminal(file.note));
     }
     for (const std::string& sentence : later_) console_.Say(sentence);
-    if (moving) return;  // what is asked about would be another frame
+    if (moving) return;  // an answer would concern a later frame
     std::vector<std::string> ids;
     for (size_t i = 0; i < files.size(); ++i) ids.push_back(Id(i));
     for (const std::string& sentence : Unseen(summary_.owner, kLayer, ids, connection_))
       console_.Say(sentence);
   }
 
-  // Of a kind, as many as the frame with the most of it leaves out.
+  // Counts left-out content of each kind as its maximum over all frames.
   void CountLeftOut(const Model& model) {
     std::vector<LeftOut>& known = summary_.files[0].left_out;
     for (const LeftOut& one : model.left_out) {
@@ -161,7 +163,8 @@ class Player {
     }
   }
 
-  // A frame replaces the layer whole, but not how a command before, of the same owner, had it look.
+  // Resets the layer's style. A frame replaces the contents of the layer completely, but not the
+  // style that an earlier command of the same owner set.
   absl::Status LookPlain() {
     if (!had_layer_) return absl::OkStatus();
     return layer_->Set({.clip = std::vector<client::ClipPart>(), .mask = ""});
@@ -169,7 +172,7 @@ class Player {
 
   absl::Status TakeBeforeDown() {
     const uint64_t own = session_->server().owner;
-    // The layer was replaced whole; masks are never this command's.
+    // The layer was replaced completely; masks never belong to this command.
     std::erase_if(before_, [own](const OwnedLayer& layer) {
       return layer.owner == own && layer.layer == kLayer;
     });
@@ -220,7 +223,7 @@ class Player {
     return session_->CommitAndWait(kAnswerTime);
   }
 
-  // Definitions draw nothing, so they may be committed in as many steps as the limits want.
+  // Definitions draw nothing, so they may be committed in as many steps as the limits require.
   absl::Status Stage(const std::string& object, std::vector<client::Part> parts, uint64_t bytes) {
     const client::Limits& limits = session_->server().limits;
     uint64_t most_bytes = kStagedBytes;
@@ -265,7 +268,7 @@ class Player {
       if (!packed.ok()) return About(models[i], packed.status());
       Describe(models[i], *packed);
       paths_.push_back(models[i].path);
-      models[i] = {};  // the server has it
+      models[i] = {};  // the server has it now
     }
     if (staged_operations_ > 0) {
       absl::Status status = CommitAndWait();
@@ -280,7 +283,7 @@ class Player {
     return status.ok() ? CommitAndWait() : status;
   }
 
-  // Samples that are more than a message takes.
+  // Uploads samples that do not fit into a message.
   absl::StatusOr<client::Asset> Upload(const std::string& path, absl::string_view bytes) {
     return connection_.UploadAsset(bytes, [&](uint64_t stored, uint64_t size) {
       console_.ProgressBar(EscapeForTerminal(path),
@@ -290,7 +293,7 @@ class Player {
     });
   }
 
-  // What is wrong with a model, not with the connection.
+  // Adds the model to an error that is caused by the model and not by the connection.
   static absl::Status About(const Model& model, const absl::Status& status) {
     if (!absl::IsInvalidArgument(status)) return status;
     return absl::InvalidArgumentError(absl::StrCat(model.path, ": ", status.message()));
@@ -321,7 +324,7 @@ class Player {
       if (frame > 0 && due(frame) >= end) break;
       const auto now = static_cast<int64_t>(static_cast<double>(clock_.Now() - began) / period_ns);
       int64_t next = std::max(frame + 1, now);
-      // The last one is never left out.
+      // The last frame is never skipped.
       if (!options_.loop) next = frame == count - 1 ? -1 : std::min(next, count - 1);
       if (next > frame) {
         summary_.frames_skipped += static_cast<uint64_t>(next - frame - 1);
@@ -355,7 +358,7 @@ class Player {
     return absl::OkStatus();
   }
 
-  // Frames are two objects in turn: one is defined anew while the other is up.
+  // Frames alternate between two objects: one is redefined while the other is shown.
   absl::Status PutFrame(Model model, const FramePlacement& placement, double turns) {
     const bool first = summary_.frames == 0;
     if (first) {
@@ -364,7 +367,7 @@ class Player {
     if (absl::Status status = Color({&model, 1}); !status.ok()) return status;
     placement.Place(&model);
     ApplyLook({&model, 1}, {.fill = options_.fill, .flat = options_.flat});
-    // The first frame's window is that of all, or they would flicker.
+    // The first frame's window is used for all frames; otherwise they would flicker.
     if (first) frame_look_ = options_.volume;
     if (first && !model.volumes.empty() && !frame_look_.window)
       frame_look_.window = WindowOf(model.volumes[0]);
@@ -397,7 +400,8 @@ class Player {
     return status;
   }
 
-  // Removes pieces that the object had more of in the frame before last: `before` and `now` count it and its pieces.
+  // Removes pieces that the object no longer has: `before` and `now` count the object and its
+  // pieces in the frame before the previous one and in this one.
   absl::Status RemoveRest(const std::string& object, uint64_t before, uint64_t now) {
     absl::Status status;
     for (uint64_t piece = now - 1; status.ok() && piece + 1 < before; ++piece)
@@ -411,7 +415,8 @@ class Player {
                 {.transform = ToClient(InstanceTransform(space_, turns)), .label = Label(path)});
   }
 
-  // A pattern would hide the scene. When it has gone the scene's commit is not "hidden" any more.
+  // A pattern would hide the scene. Once it has ended, the scene's commit is not "hidden" any
+  // longer.
   absl::Status TakePatternsDown() {
     const absl::StatusOr<EndedPatterns> patterns = EndPatterns(connection_);
     if (!patterns.ok()) return patterns.status();
@@ -422,8 +427,7 @@ class Player {
     return absl::OkStatus();
   }
 
-  // "play 1", as draw's are "draw 1".
-  // "play 1", as draw's are "draw 1".
+  // "play 1", in the same way as draw's "draw 1".
   static std::string Id(size_t file) { return absl::StrCat("play ", file + 1); }
   static std::string Object(size_t file) { return absl::StrCat("voxelctl/", file + 1); }
 
@@ -435,7 +439,7 @@ class Player {
 
   sync::TimeNs End() const {
     if (options_.duration_s) return up_since_ + std::llround(*options_.duration_s * 1e9);
-    // What is taken down at the end must have been up for someone.
+    // Contents that are removed at the end must have been visible to someone.
     return options_.spin || options_.clear ? sync::kNever : up_since_;
   }
 
@@ -467,7 +471,7 @@ class Player {
       }
       if (interrupt_.WaitUntil(clock_, due)) return absl::OkStatus();
       const sync::TimeNs now = clock_.Now();
-      // Frames whose time has passed are not made up for.
+      // Frames whose time has passed are skipped.
       frame =
           std::max(frame, static_cast<int64_t>(static_cast<double>(now - began) / period_ns)) + 1;
       if (!session_->client().HasRoom()) {
@@ -524,13 +528,13 @@ class Player {
   sync::TimeNs start_ = 0;
   sync::TimeNs up_since_ = 0;  // when all displays had answered
   uint64_t staged_bytes_ = 0, staged_operations_ = 0, sent_bytes_ = 0;
-  std::vector<OwnedLayer> before_;       // what an earlier command left
-  std::vector<std::string> paths_;       // of the files that are up
-  std::array<uint64_t, 2> halves_ = {};  // objects of each frame that is defined
+  std::vector<OwnedLayer> before_;       // layers that an earlier command left
+  std::vector<std::string> paths_;       // of the files that are shown
+  std::array<uint64_t, 2> halves_ = {};  // number of defined objects of each alternating frame
   VolumeLook frame_look_;
-  std::vector<std::string> later_;  // sentences that follow the first line
+  std::vector<std::string> later_;  // sentences after the first line
   bool taken_down_ = false;
-  bool had_layer_ = false;  // of a command before, of the same owner: who has a token has one owner
+  bool had_layer_ = false;  // an earlier command of the same owner made it: a token has one owner
   PlaySummary summary_;
 };
 

@@ -16,7 +16,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// The share of a display that placement fills. A drawing gets one pixel per voxel of it.
+// The share of a display that placement fills. A drawing gets one pixel per voxel in it.
 constexpr double kFilled = 0.97;
 
 ImportOptions OptionsOf(const PlayOptions& options, const Room& room) {

@@ -1,4 +1,4 @@
-// What play is given, as models or as frames.
+// Reads the files of play, as models or as frames.
 #pragma once
 
 #include <memory>
@@ -15,14 +15,16 @@
 
 namespace voxeld::voxelctl {
 
-// Of all files, for a display with such room. InvalidArgument names all files that are wrong, or an option that none of them has a use for.
+// Reads all files, for a display with that room. Errors: InvalidArgument with all invalid files, or
+// with an option that applies to none of them.
 absl::StatusOr<std::vector<Model>> ReadFiles(const PlayOptions& options, const Room& room,
                                              Interrupt& interrupt, Console& console);
 
-// Returns: InvalidArgument if an option was given (PlayOptions::given) that none of the models has a use for.
+// Returns: InvalidArgument if an option was given (PlayOptions::given) that applies to none of the
+// models.
 absl::Status CheckOptions(const PlayOptions& options, std::span<const Model> models);
 
-// Of a sequence or an animation. Null if all that there is stays as it is.
+// Opens a sequence or an animation. Returns null if the files are static.
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenFrameSource(const PlayOptions& options,
                                                              const Room& room,
                                                              Interrupt& interrupt);

@@ -28,7 +28,8 @@ struct Quantiles {
 Quantiles Measure(std::vector<int64_t> values) {
   if (values.empty()) return {};
   std::sort(values.begin(), values.end());
-  // The smallest value that so many are at most: nearest rank.
+  // The nearest-rank percentile: the smallest value that at least that share of the values do not
+  // exceed.
   const auto rank = [&](size_t percent) {
     return values[(values.size() * percent + 99) / 100 - 1];
   };
@@ -145,7 +146,7 @@ void Report(PlaySummary summary, Console& console) {
   for (const client::Issue& issue : summary.tally.issues)
     console.Say(absl::StrCat(issue.applied ? "note: " : "issue: ", IssueForTerminal(issue)));
   if (summary.still_up) {
-    const size_t files = summary.files.size();  // each is called by its number
+    const size_t files = summary.files.size();  // several files are referred to by number
     console.Say(absl::StrCat("it stays up in the layer ", summary.layer, ", called \"play 1\"",
                              files > 1 ? absl::StrCat(" to \"play ", files, "\"") : "",
                              ", until `voxelctl clear`"));

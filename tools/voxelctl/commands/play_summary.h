@@ -1,4 +1,4 @@
-// What play says at its end.
+// The final report of play.
 #pragma once
 
 #include <cstdint>
@@ -26,13 +26,13 @@ struct PlaySummary {
   std::optional<Legend> legend;
   std::vector<PlayedFile> files;
   int64_t duration_ns = 0;
-  uint64_t frames = 0, frames_skipped = 0;  // of a spin; skipped while the displays were behind
+  uint64_t frames = 0, frames_skipped = 0;  // of a spin; skipped while the displays were late
   bool still_up = false;
   client::Tally tally;
   std::vector<int64_t> latencies_ns;
 };
 
-// JSON to the data, or lines of words.
+// Writes JSON as data, or lines of text.
 void Report(PlaySummary summary, Console& console);
 
 }  // namespace voxeld::voxelctl

@@ -15,8 +15,8 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// The same, so that nothing of a layer that the caller has already is left: who has a token has the layer of the
-// command before.
+// Returns the same request with the caller's existing layer replaced: with a token, the caller has
+// the layer of the previous command.
 v1::ApplyUpdateRequest InPlace(const v1::ApplyUpdateRequest& request) {
   v1::ApplyUpdateRequest whole;
   *whole.mutable_open() = request.open();
@@ -67,7 +67,7 @@ absl::StatusOr<ShapesPut> PutShapes(const v1::ApplyUpdateRequest& request, bool 
   });
   const absl::StatusOr<TakenDown> taken = TakeDown(*before, connection);
   if (!taken.ok()) return taken.status();
-  // A test pattern would hide them.
+  // A test pattern would hide the shapes.
   const absl::StatusOr<EndedPatterns> patterns = EndPatterns(connection);
   if (!patterns.ok()) return patterns.status();
   ShapesPut put{.snapshot = applied->snapshot(), .owner = applied->owner()};

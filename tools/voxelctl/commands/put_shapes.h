@@ -1,4 +1,4 @@
-// Shapes into the layer of voxelctl.
+// Draws shapes into the layer of voxelctl.
 #pragma once
 
 #include <cstdint>
@@ -13,13 +13,15 @@ namespace voxeld::voxelctl {
 struct ShapesPut {
   uint64_t snapshot = 0;
   uint64_t owner = 0;
-  std::vector<std::string> notes;  // of shapes that are drawn otherwise than asked; for a terminal
-  std::vector<std::string> stay;   // of what others have up that was not to be; for a terminal
-  std::vector<std::string> not_showing;  // of displays that show nothing now; for a terminal
+  // About shapes that are drawn differently than requested; for a terminal.
+  std::vector<std::string> notes;
+  // About others' layers that should have been removed; for a terminal.
+  std::vector<std::string> stay;
+  std::vector<std::string> not_showing;  // about displays that show nothing now; for a terminal
 };
 
-// All of them or none; with `add` beside what is in the layer, else in its place. What others have in a layer of that
-// name goes too, if the caller may take it away.
+// Draws all shapes or none. With `add` they are added to the layer, otherwise they replace its
+// contents. Layers of that name of other owners are removed too if the caller has the scope.
 absl::StatusOr<ShapesPut> PutShapes(const v1::ApplyUpdateRequest& request, bool add,
                                     Connection& connection);
 

@@ -34,7 +34,8 @@ absl::StatusOr<std::unique_ptr<MovingPicture>> Begin(const TurntableOptions& opt
   return PngFrames(options.file);
 }
 
-// Pictures that are drawn at the same time: one a core, as far as memory goes. Each takes some 200 bytes a pixel while it is drawn.
+// Returns how many pictures are drawn at the same time: one per core, as far as memory allows. Each
+// needs about 200 bytes per pixel.
 int AtOnce(const TurntableOptions& options) {
   constexpr int64_t kMostBytes = int64_t{1} << 30;
   const int64_t each = int64_t{200} * options.width * options.height;
@@ -42,7 +43,7 @@ int AtOnce(const TurntableOptions& options) {
   return static_cast<int>(std::clamp<int64_t>(std::min(cores, kMostBytes / each), 1, 16));
 }
 
-// `count` pictures from number `first` on.
+// Draws `count` pictures from number `first` on.
 std::vector<Image> Draw(const Volume& volume, const TurntableOptions& options, int first,
                         int count) {
   std::vector<Image> images(static_cast<size_t>(count));
@@ -63,7 +64,7 @@ std::vector<Image> Draw(const Volume& volume, const TurntableOptions& options, i
   return images;
 }
 
-// Of all files that were made.
+// Returns the total size of all files that were made.
 uint64_t Size(const TurntableOptions& options) {
   uint64_t bytes = 0;
   const int files = options.format == PictureFormat::kPng ? options.frames : 1;
@@ -115,7 +116,7 @@ void Tell(const TurntableOptions& options, const ShownVolume& first, const Shown
 
 absl::Status Render(const TurntableOptions& options, Connection& connection, Interrupt& interrupt,
                     Console& console) {
-  // What cannot be written is told before the display is waited for.
+  // An unwritable file is reported before the display is waited for.
   absl::StatusOr<std::unique_ptr<MovingPicture>> movie = Begin(options);
   if (!movie.ok()) return movie.status();
   absl::StatusOr<ShownVolume> shown =
@@ -125,7 +126,8 @@ absl::Status Render(const TurntableOptions& options, Connection& connection, Int
   first.volume.number = shown->volume.number;
   first.up_to_date = shown->up_to_date;
   if (!console.live() && !console.json() && options.frames > 1) {
-    console.Say(absl::StrCat("drawing ", options.frames, " pictures …"));  // no bar can be drawn
+    // A progress bar cannot be drawn.
+    console.Say(absl::StrCat("drawing ", options.frames, " pictures …"));
   }
   sync::SystemClock clock;
   const sync::TimeNs began = clock.Now();

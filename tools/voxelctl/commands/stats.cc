@@ -155,7 +155,7 @@ absl::Status ShowStats(const StatsOptions& options, Connection& connection, Inte
     return console.Data(options.watch ? absl::StrCat(Brief(stats), "\n") : Full(stats)) &&
            options.watch;
   });
-  // Ctrl-C is how a watch ends.
+  // Ctrl-C is the normal end of a watch.
   if (options.watch && any && interrupt.requested()) return absl::OkStatus();
   return status;
 }

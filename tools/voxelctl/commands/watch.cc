@@ -12,10 +12,10 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// Change sets as lines: "+" came, "~" changed, "-" went; an owner, a layer, an entity.
+// Formats change sets as lines: "+" added, "~" changed, "-" removed; an owner, a layer, an entity.
 class Lines {
  public:
-  // In the order in which a message applies.
+  // Lists changes in the order in which a message applies.
   std::string Of(const v1::WatchSceneResponse& message) {
     std::string text;
     for (const v1::LayerKey& layer : message.removed_layers()) {
@@ -85,7 +85,7 @@ absl::Status Watch(const WatchOptions& options, Connection& connection, Interrup
     if (first) console.Say("that is all there is; what follows is news (Ctrl-C ends)");
     return read;
   });
-  // Ctrl-C is how a watch ends.
+  // Ctrl-C is the normal end of a watch.
   if (in_sync && interrupt.requested()) return absl::OkStatus();
   return status;
 }

@@ -14,7 +14,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr size_t kFew = 12;  // are listed
+constexpr size_t kFew = 12;  // maximum number listed
 
 std::string Quoted(const std::string& name) {
   return absl::StrCat("\"", EscapeForTerminal(name), "\"");
@@ -25,7 +25,7 @@ std::string Name(const v1::EntityKey& key) {
                       key.owner());
 }
 
-// The one entity that is meant.
+// Returns the one entity that the options select.
 absl::StatusOr<v1::EntityKey> Find(const WhyOptions& options, Connection& connection) {
   v1::ListEntitiesRequest request;
   request.set_owner(options.owner);

@@ -5,7 +5,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// What the script's functions say of a place: a line that _voxelctl understands.
+// Returns what the script's functions print for a place: a line that _voxelctl understands.
 std::string Answer(const Values& values) {
   switch (values.kind) {
     case Values::Kind::kWords:
@@ -44,7 +44,8 @@ std::string ValueCases(const std::string& command, const std::vector<usage::Opti
   return out;
 }
 
-// The place of an argument from 0; the last one's is any from there on where it is repeated.
+// Returns the cases for positional arguments, counted from 0; if the last one repeats, it covers
+// all later places.
 std::string PlaceCases(const usage::CommandEntry& command) {
   std::string out;
   for (size_t i = 0; i < command.arguments.size(); ++i) {

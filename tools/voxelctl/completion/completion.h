@@ -1,4 +1,4 @@
-// Scripts by which shells complete the command line, from what it has.
+// Generates scripts with which shells complete the command line.
 #pragma once
 
 #include <string>
@@ -9,8 +9,9 @@ namespace voxeld::voxelctl {
 
 enum class Shell : uint8_t { kBash, kZsh, kFish };
 
-// Knows all commands, options and what values may be; asks `voxelctl __complete KIND` for what is only known when
-// it is asked: displays, layers, entities, owners, profiles. To be sourced, or to lie where the shell looks for it.
+// Returns the script. It contains all commands, options and fixed values, and calls `voxelctl
+// __complete KIND` for values that are known only at run time: displays, layers, entities, owners,
+// profiles. It is meant to be sourced, or installed where the shell looks for it.
 std::string CompletionScript(Shell shell, const usage::CommandEntry& program);
 
 }  // namespace voxeld::voxelctl

@@ -11,7 +11,7 @@ std::string Quoted(const std::string& text) {
   return absl::StrCat("'", absl::StrReplaceAll(text, {{"\\", "\\\\"}, {"'", "\\'"}}), "'");
 }
 
-// What is offered; -f and -F say whether files are.
+// Returns the completions of a place; -f and -F say whether files are offered.
 std::string Offer(const Values& values) {
   switch (values.kind) {
     case Values::Kind::kWords:

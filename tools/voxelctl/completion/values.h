@@ -1,4 +1,4 @@
-// What may stand in a place of the command line.
+// The values that are possible in a place of the command line.
 #pragma once
 
 #include <string>
@@ -12,16 +12,16 @@ struct Values {
   enum class Kind : uint8_t { kAny, kWords, kLive, kFiles, kFolders };
   Kind kind = Kind::kAny;
   std::vector<std::string> words;  // kWords: all of them
-  std::string of;  // kLive: what __complete is asked; kFiles: ".mcap", or empty: all
+  std::string of;  // kLive: the kind for __complete; kFiles: ".mcap", or empty for all
 };
 
-// Of an option's value or an argument; `command` is empty for options of all commands.
+// Returns the values of an option or an argument; `command` is empty for global options.
 Values ValuesOf(const std::string& command, const usage::OptionEntry& option);
 
-// In single quotes for bash and zsh.
+// Quotes text with single quotes for bash and zsh.
 std::string ShellQuoted(const std::string& text);
 
-// The first line of what is said about an option; the first sentence of what is said of a command.
+// Return the first line of an option's help text, and the first sentence of a command's.
 std::string Brief(const std::string& about);
 std::string FirstSentence(const std::string& about);
 

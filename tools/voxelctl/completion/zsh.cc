@@ -6,7 +6,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// Of a text within [brackets] or before a colon of a specification.
+// Escapes a text within [brackets] or before a colon of a specification.
 std::string Escaped(const std::string& text) {
   return absl::StrReplaceAll(text, {{"\\", "\\\\"}, {"[", "\\["}, {"]", "\\]"}, {":", "\\:"}});
 }
@@ -16,7 +16,7 @@ std::string Action(const Values& values) {
     case Values::Kind::kWords:
       return absl::StrCat("(", absl::StrJoin(values.words, " "), ")");
     case Values::Kind::kLive:
-      // With the space, what _arguments would add for others is left out.
+      // The space suppresses what _arguments would add for others.
       return absl::StrCat(" _voxelctl_live ", values.of);
     case Values::Kind::kFiles:
       return values.of.empty() ? "_files" : absl::StrCat("_files -g \"*", values.of, "\"");

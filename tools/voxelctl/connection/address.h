@@ -1,4 +1,4 @@
-// Which server is meant.
+// Selects the server.
 #pragma once
 
 #include <string>
@@ -10,11 +10,11 @@ namespace voxeld::voxelctl {
 
 using client::Environment;
 
-// `option` if it is not empty, else what every client takes.
+// Returns `option` if it is not empty, otherwise the address that every client uses.
 std::string ChooseServer(const std::string& option, const Environment& environment);
 
-// HOST:PORT or unix:PATH as gRPC writes it; InvalidArgument with the text, fit for a terminal, and
-// what would be right.
+// Converts HOST:PORT or unix:PATH to gRPC's notation. Errors: InvalidArgument with the text,
+// escaped for a terminal, and what would be valid.
 absl::StatusOr<std::string> ServerTarget(const std::string& address);
 
 }  // namespace voxeld::voxelctl

@@ -25,10 +25,11 @@ constexpr milliseconds kConnectTime(5000);
 constexpr milliseconds kConnectStep(100);
 constexpr milliseconds kLastErrorTime(1000);
 constexpr milliseconds kCallTime(15000);
-constexpr milliseconds kDrawnTime(300000);   // of an answer for which the server draws the scene
-constexpr int kMostMessageBytes = 64 << 20;  // a slice of 16384² pixels would not come in less
+constexpr milliseconds kDrawnTime(300000);   // for answers that require the server to draw
+constexpr int kMostMessageBytes = 64 << 20;  // a slice of 16384² pixels must fit into one message
 
-// Why the channel has no connection, in gRPC's words, which only a call is told.
+// Returns why the channel has no connection, in gRPC's words, which are only available through a
+// call.
 std::string LastError(const std::shared_ptr<grpc::Channel>& channel) {
   grpc::ClientContext context;
   context.set_deadline(system_clock::now() + kLastErrorTime);
@@ -84,7 +85,7 @@ class Connection::Impl {
     return response;
   }
 
-  // Calls `each` with every answer until that returns false, or the stream ends.
+  // Calls `each` with every response until it returns false, or the stream ends.
   template <typename Response, typename Call>
   absl::Status Watch(milliseconds limit, const std::function<bool(const Response&)>& each,
                      Call call) {
@@ -134,7 +135,7 @@ absl::StatusOr<std::unique_ptr<Connection>> Connection::Connect(
     const std::string& address, const client::Credentials& credentials, Interrupt& interrupt) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMostMessageBytes);
-  // The server is near; what a web proxy is set for is not meant for it.
+  // The server is local or nearby, so a configured web proxy must not be used.
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   absl::StatusOr<std::shared_ptr<grpc::Channel>> made =
       client::MakeChannel(address, credentials, arguments);
@@ -254,7 +255,7 @@ absl::Status Connection::CaptureVolume(
     const v1::CaptureVolumeRequest& request,
     const std::function<absl::Status(const v1::VolumeChunk&)>& each) {
   absl::Status refused;
-  // The server's own limit comes first; this one is for a server that hangs.
+  // The server's own limit applies first; this one is for a server that hangs.
   const milliseconds limit = kCallTime + milliseconds(request.timeout_ns() / 1'000'000);
   absl::Status status = impl_->Invoke(limit, [&](grpc::ClientContext* context) {
     auto reader = impl_->displays().CaptureVolume(context, request);

@@ -1,4 +1,4 @@
-// The calls that voxelctl makes. This folder alone knows gRPC; its headers do not.
+// The calls that voxelctl makes. Only this folder uses gRPC; its headers do not expose it.
 #pragma once
 
 #include <chrono>
@@ -21,13 +21,13 @@
 
 namespace voxeld::voxelctl {
 
-// One channel. Calls block until their answer, a deadline of seconds, or an interrupt: then
-// Cancelled. Statuses are the server's, their messages made fit for a terminal; Unavailable names
-// the address and what to do about it. Thread-safe.
+// One channel. Calls block until their response, a deadline of seconds, or an interrupt
+// (Cancelled). Statuses are the server's, with messages escaped for a terminal; Unavailable names
+// the address and a remedy. Thread-safe.
 class Connection {
  public:
-  // `interrupt` must outlive it. Unavailable if the server does not answer in time.
-  // Statuses of the credentials' files are as they are.
+  // Connects to the server. `interrupt` must outlive the connection. Errors: Unavailable if the
+  // server does not answer in time; errors of the credentials' files are passed on.
   static absl::StatusOr<std::unique_ptr<Connection>> Connect(const std::string& address,
                                                              const client::Credentials& credentials,
                                                              Interrupt& interrupt);
@@ -37,22 +37,23 @@ class Connection {
 
   absl::StatusOr<v1::ListDisplaysResponse> ListDisplays();
   absl::StatusOr<v1::DisplayDescription> UpdateDisplay(const v1::UpdateDisplayRequest& request);
-  // All pages in one answer, or the first alone, which has all layers.
+  // Returns all pages as one response, or only the first, which has all layers.
   absl::StatusOr<v1::ListEntitiesResponse> ListEntities(v1::ListEntitiesRequest request,
                                                         bool first_page_only = false);
-  // DeadlineExceeded if it takes longer than `limit`, or without one as long as a drawing may take.
+  // Errors: DeadlineExceeded if it takes longer than `limit`; without a limit, longer than a
+  // drawing may take.
   absl::StatusOr<v1::ExplainEntityResponse> ExplainEntity(
       const v1::ExplainEntityRequest& request,
       std::optional<std::chrono::milliseconds> limit = std::nullopt);
   absl::StatusOr<v1::ClearLayerResponse> ClearLayer(const v1::ClearLayerRequest& request);
   absl::StatusOr<v1::ListAssetsResponse> ListAssets();
   absl::StatusOr<v1::ListOwnersResponse> ListOwners();
-  // `progress` as of client::UploadOptions; what breaks off goes on.
+  // `progress` as in client::UploadOptions; an interrupted upload is resumed.
   absl::StatusOr<client::Asset> UploadAsset(
       absl::string_view bytes, std::function<bool(uint64_t stored, uint64_t size)> progress);
   absl::StatusOr<v1::ApplyUpdateResponse> ApplyUpdate(const v1::ApplyUpdateRequest& request);
 
-  // Calls `each` with every answer until that returns false, or the stream ends.
+  // Calls `each` with every response until it returns false, or the stream ends.
   absl::Status WatchStats(const v1::WatchStatsRequest& request,
                           const std::function<bool(const v1::Stats&)>& each);
   absl::Status WatchScene(const v1::WatchSceneRequest& request,
@@ -60,12 +61,13 @@ class Connection {
   absl::Status CaptureVolume(const v1::CaptureVolumeRequest& request,
                              const std::function<absl::Status(const v1::VolumeChunk&)>& each);
 
-  // A stream of the wire's own requests, over this connection.
+  // Opens a stream of raw requests over this connection.
   absl::StatusOr<std::unique_ptr<RawStream>> OpenRawStream(v1::Open open);
 
-  // A session with this server, over a connection of its own.
+  // Opens a session with this server over a separate connection.
   absl::StatusOr<std::unique_ptr<SceneSession>> OpenSession(client::Options options);
-  // The client's own, which opens a lost connection again; it begins to connect. For commands that stay.
+  // Returns the client's own session, which reconnects; it is still connecting on return. For
+  // commands that run for a long time.
   absl::StatusOr<std::unique_ptr<client::Session>> OpenLastingSession(client::Options options);
 
  private:

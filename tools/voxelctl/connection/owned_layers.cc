@@ -11,7 +11,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr absl::string_view kCommands = "voxelctl ";  // begins the name of each command's session
+constexpr absl::string_view kCommands = "voxelctl ";  // prefix of each command's session name
 constexpr size_t kMostNamed = 3;
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Layers by their owners: what earlier commands left, and taking it away as far as the caller may.
+// Layers by owner: finds what earlier commands left, and removes it as far as the caller may.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace voxeld::voxelctl {
 
-// A layer of the scene, and whose it is.
+// A layer of the scene, and its owner.
 struct OwnedLayer {
   uint64_t owner = 0;
   std::string layer;
@@ -20,22 +20,24 @@ struct OwnedLayer {
 
 struct TakenDown {
   uint64_t entities = 0, layers = 0;
-  std::vector<OwnedLayer> stay;  // others' layers, which the caller has not the scope to take down
+  std::vector<OwnedLayer> stay;  // others' layers that the caller lacks the scope to remove
 };
 
-// Whether the layer was left by a command of voxelctl that has ended: what replay and pipe keep has any name.
+// Returns whether the layer was left by a voxelctl command that has ended. Layers that replay and
+// pipe keep may have any name.
 bool IsLeftByVoxelctl(const v1::LayerInfo& layer);
-// Those that were left by commands whose session was called `client_name`.
+// Returns the layers that were left by commands whose session was called `client_name`.
 absl::StatusOr<std::vector<OwnedLayer>> LayersLeftBy(absl::string_view client_name,
                                                      Connection& connection);
 
-// Takes these away; one that has gone already is as good as taken. Owner 0 is left out: it would stand for all.
+// Removes these layers; one that no longer exists counts as removed. Owner 0 is skipped, because it
+// would mean all owners.
 absl::StatusOr<TakenDown> TakeDown(const std::vector<OwnedLayer>& layers, Connection& connection);
 
-// A sentence about layers that stay; nothing where none does. Fit for a terminal.
+// Returns a sentence about layers that stay; empty if none does. Escaped for a terminal.
 std::string OthersStay(const std::vector<OwnedLayer>& stay);
 
-// Whether the call was refused for want of the scope control alone.
+// Returns whether the call was refused only because the caller lacks the scope control.
 bool TakesControl(const absl::Status& status);
 
 }  // namespace voxeld::voxelctl

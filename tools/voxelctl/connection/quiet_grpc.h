@@ -1,10 +1,10 @@
-// gRPC's own lines on standard error say again, in its words, what the error of a call says in ours.
+// Silences gRPC's own messages on standard error, which repeat the errors of calls in gRPC's words.
 #pragma once
 
 namespace voxeld::voxelctl {
 
-// From now on they are left out, but for the assertion that ends the process. Who wants them sets GRPC_VERBOSITY. To be
-// called before gRPC is used.
+// Suppresses these messages from now on, except for assertions that terminate the process. Set
+// GRPC_VERBOSITY to see them. Requires: called before gRPC is used.
 void QuietGrpc();
 
 }  // namespace voxeld::voxelctl

@@ -50,7 +50,7 @@ class RawStream::Impl {
           absl::StrCat("a message would have ", size, " bytes, and the server takes ", most,
                        ": raise limits.max_message_bytes in its configuration"));
     }
-    // One message may go beyond; the next waits until it is applied.
+    // One message may exceed the credit; the next waits until it is applied.
     while (credit_ != 0 && sent_ >= credit_) {
       if (absl::Status status = Read(); !status.ok()) return status;
     }

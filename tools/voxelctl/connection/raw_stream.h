@@ -1,4 +1,5 @@
-// A stream of the wire's own requests: for what is put up as it was told, primitive by primitive.
+// A stream of raw requests, for scenes that are restored primitive by primitive as they were
+// received.
 #pragma once
 
 #include <cstdint>
@@ -17,11 +18,11 @@ class Channel;
 
 namespace voxeld::voxelctl {
 
-// Every call blocks until it is through, the stream ends or an interrupt comes (Cancelled). Statuses are the
-// server's, their messages made fit for a terminal. Not thread-safe.
+// Every call blocks until it is done, the stream ends or an interrupt comes (Cancelled). Statuses
+// are the server's, with messages escaped for a terminal. Not thread-safe.
 class RawStream {
  public:
-  // Outcomes are not asked for. `interrupt` outlives it.
+  // Outcomes are not requested. `interrupt` must outlive the stream.
   static absl::StatusOr<std::unique_ptr<RawStream>> Open(std::shared_ptr<grpc::Channel> channel,
                                                          const std::string& address, v1::Open open,
                                                          Interrupt& interrupt);
@@ -31,14 +32,15 @@ class RawStream {
 
   uint64_t owner() const;
 
-  // Waits for credit.
+  // Waits for credit, then sends.
   absl::Status Send(const v1::StreamRequest& request);
-  // Of all that was sent since the last one; answers what it came to. FailedPrecondition if it was refused.
+  // Commits everything since the last commit. Returns: the acceptance. Errors: FailedPrecondition
+  // if it was refused.
   absl::StatusOr<v1::Accepted> Commit();
-  // That came since they were taken last, the first kMostIssues of them.
+  // Returns the issues since the previous call, at most the first kMostIssues.
   static constexpr size_t kMostIssues = 100;
   std::vector<v1::Issue> TakeIssues();
-  // Ends the session; what becomes of its layers is Open's.
+  // Ends the session. Its Open message determines what happens to its layers.
   absl::Status Close();
 
  private:

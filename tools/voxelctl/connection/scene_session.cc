@@ -21,7 +21,7 @@ absl::Status Escaped(const absl::Status& status) {
 
 absl::StatusOr<std::unique_ptr<SceneSession>> SceneSession::Open(client::Options options,
                                                                  Interrupt& interrupt) {
-  // What the tool says at its end is of one stream.
+  // The tool's final report covers a single stream.
   options.reconnect = false;
   options.restore = false;
   options.ping_interval = client::Duration(0);
@@ -55,7 +55,7 @@ absl::Status SceneSession::CommitAndWait(sync::TimeNs timeout) {
       absl::StrCat("the server refused the scene: ", EscapeForTerminal(receipt->message));
   const client::Tally tally = client_->GetTally();
   for (const client::Issue& issue : tally.issues) {
-    // The message has the first.
+    // The message already contains the first issue.
     if (absl::StrContains(receipt->message, client::DescribeIssue(issue))) continue;
     absl::StrAppend(&text, "\n  ", IssueForTerminal(issue));
   }

@@ -1,5 +1,5 @@
-// The client's session as a command-line tool wants it: Ctrl-C ends its waits, a lost connection ends
-// it, and its words are fit for a terminal.
+// The client's session adapted to a command-line tool: Ctrl-C ends its waits, a lost connection
+// ends it, and its messages are escaped for a terminal.
 #pragma once
 
 #include <memory>
@@ -15,7 +15,7 @@ namespace voxeld::voxelctl {
 
 class SceneSession {
  public:
-  // Returns when the server has answered. `interrupt` must outlive it.
+  // Returns when the server has answered. `interrupt` must outlive the session.
   static absl::StatusOr<std::unique_ptr<SceneSession>> Open(client::Options options,
                                                             Interrupt& interrupt);
   ~SceneSession();
@@ -25,8 +25,8 @@ class SceneSession {
   client::Session& client() { return *client_; }
   const client::ServerInfo& server() const { return server_; }
 
-  // Commits what is staged and waits for the answer. FailedPrecondition with the server's words and
-  // the session's first issues if it is refused.
+  // Commits what is staged and waits for the answer. Errors: if it is refused, FailedPrecondition
+  // with the server's message and the session's first issues.
   absl::Status CommitAndWait(sync::TimeNs timeout);
   absl::Status Commit();
   absl::Status WaitSettled(sync::TimeNs timeout);
@@ -40,7 +40,7 @@ class SceneSession {
   const int listener_;
 };
 
-// "layer/id, field: what was wrong", for people.
+// Returns "layer/id, field: what was wrong", for people.
 std::string IssueForTerminal(const client::Issue& issue);
 
 }  // namespace voxeld::voxelctl

@@ -1,4 +1,4 @@
-// How a lasting session ended, as its own thread tells it.
+// Records how a lasting session ended, as reported on its own thread.
 #pragma once
 
 #include <atomic>
@@ -12,7 +12,7 @@ namespace voxeld::voxelctl {
 // Thread-safe.
 class SessionEnd {
  public:
-  // For client::Options::on_connection.
+  // Handles client::Options::on_connection.
   void Told(const client::ConnectionChange& change) {
     if (change.kind != client::ConnectionChange::Kind::kEnded) return;
     const sync::MutexLock lock(mutex_);
@@ -21,7 +21,7 @@ class SessionEnd {
     ended_.store(true);
   }
   bool ended() const { return ended_.load(); }
-  // Why; OK while it has not.
+  // Returns the reason; OK as long as the session has not ended.
   absl::Status status() const {
     const sync::MutexLock lock(mutex_);
     return status_;

@@ -1,4 +1,4 @@
-// gRPC's statuses as ours.
+// Converts gRPC's statuses.
 #pragma once
 
 #include <string>
@@ -13,14 +13,14 @@ class Status;
 
 namespace voxeld::voxelctl {
 
-// The server's words are escaped; an Unavailable names `address`.
+// Escapes the server's message; an Unavailable names `address`.
 absl::Status FromGrpc(const grpc::Status& status, const std::string& address);
 
-// Why there is no connection to `address`, from what gRPC says of it.
+// Returns why `address` cannot be reached, derived from gRPC's message.
 std::string WhyUnreachable(absl::string_view grpc_says, const std::string& address,
                            const client::Credentials& credentials);
 
-// "cannot reach voxeld at ADDRESS (WHY); start it …".
+// Returns "cannot reach voxeld at ADDRESS (WHY); start it …".
 absl::Status Unreachable(const std::string& address, const std::string& why);
 
 }  // namespace voxeld::voxelctl

@@ -12,7 +12,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr double kHigh = 0.62;  // of the ring's radius: how far all reaches up and down
+constexpr double kHigh = 0.62;  // of the ring's radius: the scene's extent up and down
 constexpr double kRing = 0.86, kTube = 0.025;
 constexpr double kLetters = 0.32;
 constexpr double kLine = 0.42;  // from the first base line to the second
@@ -25,7 +25,7 @@ std::string TextNow() {
   return ClockText(local);
 }
 
-// About the origin; its radius with the hours' marks is 1.
+// Returns the ring about the origin; its radius including the hour marks is 1.
 std::vector<client::Part> RingParts() {
   std::vector<client::Part> parts;
   parts.push_back({.shape = client::Torus{.radius = kRing, .tube_radius = kTube},

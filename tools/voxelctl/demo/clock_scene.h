@@ -1,4 +1,4 @@
-// The local time as text, in a ring of hours that turns.
+// The local time as text, in a rotating ring of hours.
 #pragma once
 
 #include <ctime>
@@ -10,7 +10,7 @@
 
 namespace voxeld::voxelctl {
 
-// Hours and minutes in a line, seconds below: "09:05\n07".
+// Returns hours and minutes on one line, seconds below: "09:05\n07".
 std::string ClockText(const std::tm& time);
 
 absl::StatusOr<std::unique_ptr<Scene>> MakeClock(const SceneSettings& settings);

@@ -25,7 +25,7 @@ constexpr std::array<ColorStop, 5> kDepthColors = {{{0, {255, 230, 70}},
                                                     {300, {210, 60, 255}},
                                                     {650, {70, 110, 255}}}};
 
-// From a magnitude on, how thick, in Earth radii.
+// The thickness in Earth radii from a magnitude on.
 struct Size {
   double magnitude, thickness;
 };

@@ -1,4 +1,4 @@
-// Earthquakes as the United States Geological Survey lists them, each where it was inside the Earth.
+// Earthquakes as listed by the United States Geological Survey, each at its place inside the Earth.
 #pragma once
 
 #include <vector>
@@ -15,17 +15,20 @@ struct Earthquake {
   double magnitude = 0;
 };
 
-// Of GeoJSON whose points have a third coordinate, the depth in kilometres, and a property "mag". Those without a magnitude
-// are left out. InvalidArgument names the first that is wrong.
+// Reads GeoJSON whose points have the depth in kilometres as their third coordinate, and a property
+// "mag". Earthquakes without a magnitude are left out. Errors: InvalidArgument with the first
+// invalid one.
 absl::StatusOr<std::vector<Earthquake>> ReadEarthquakes(const SourceFile& file);
 
-// In Earth radii (6371 km), as MapLines has a globe: poles on ±z, longitude 0 in front (−y), east to the right.
+// Returns the position in Earth radii (6371 km), oriented like MapLines' globe: poles on ±z,
+// longitude 0 in front (−y), east to the right.
 Point3 Hypocentre(const Earthquake& quake);
 
-// By depth: yellow at the surface, red where slabs go down (100 km), violet and blue deepest (650 km).
+// Returns the colour for a depth: yellow at the surface, red where slabs descend (100 km), violet
+// and blue deepest (650 km).
 Rgb DepthColor(double depth_km);
 
-// Balls, the thicker the stronger, on the globe that MapLines makes.
+// Returns balls, thicker for stronger earthquakes, on the globe that MapLines makes.
 Model EarthquakeModel(const std::vector<Earthquake>& quakes);
 
 }  // namespace voxeld::voxelctl

@@ -8,12 +8,12 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// The standard's distributions are each library's own; its generators are not.
+// The standard's distributions differ between libraries; its generators do not.
 class Chance {
  public:
   explicit Chance(uint64_t seed) : bits_(seed) {}
   double Uniform() { return static_cast<double>(bits_() >> 11) * 0x1p-53; }
-  // About normal, within ±3: twelve uniform ones have a variance of one.
+  // Approximately normal, within ±3: the sum of twelve uniform numbers has a variance of one.
   double Normal() {
     double sum = -6;
     for (int i = 0; i < 12; ++i) sum += Uniform();
@@ -24,8 +24,8 @@ class Chance {
   std::mt19937_64 bits_;
 };
 
-constexpr double kPitch = 0.3;       // of the arms, tangent
-constexpr double kInnermost = 0.12;  // where they begin
+constexpr double kPitch = 0.3;       // tangent of the arms' pitch
+constexpr double kInnermost = 0.12;  // where the arms begin
 
 Rgb Dimmed(const Rgb& c, double light) {
   const auto dim = [&](uint8_t v) { return static_cast<uint8_t>(v * light); };
@@ -50,7 +50,7 @@ Model GalaxyModel(uint64_t seed, uint32_t stars) {
       p = {r * chance.Normal(), r * chance.Normal(), 0.8 * r * chance.Normal()};
       color = {255, 205, 130};
     } else if (share < 0.85) {
-      // More of them near the middle; each arm as wide as it is far out.
+      // Stars are denser near the centre, and each arm is wider farther out.
       const double r = kInnermost + (0.95 - kInnermost) * std::pow(chance.Uniform(), 0.8);
       const double arm = chance.Uniform() < 0.5 ? 0 : std::numbers::pi;
       const double angle = arm + std::log(r / kInnermost) / kPitch + 0.13 * chance.Normal();
@@ -63,7 +63,7 @@ Model GalaxyModel(uint64_t seed, uint32_t stars) {
       color = {255, 235, 200};
     }
     const double light = 0.3 + 0.7 * std::pow(chance.Uniform(), 2);
-    // Of a galaxy's edge nothing is missed.
+    // Stars beyond the edge are moved to the centre, where this is not noticeable.
     if (std::hypot(p.x, p.y) > 1) p = {0, 0, 0};
     part.positions.push_back(p);
     part.colors.push_back(Dimmed(color, light));

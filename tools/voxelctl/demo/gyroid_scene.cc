@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kBreath_s = 8;
 constexpr double kRadius = 2.5 * std::numbers::pi;  // two and a half cells across
-// Of coarse displays one cell, or its walls would be everywhere.
+// On displays with fewer voxels, one cell is shown; otherwise its walls would be everywhere.
 constexpr int kFewVoxels = 32;
 
 class GyroidScene final : public Scene {
@@ -37,7 +37,7 @@ class GyroidScene final : public Scene {
   client::Implicit Shape(double seconds) const {
     client::Implicit shape;
     shape.surface = "sin(x)*cos(y) + sin(y)*cos(z) + sin(z)*cos(x) = level";
-    // A ball where there is room for it, else what of it the display is high enough for.
+    // The bound is a ball if the display is high enough, otherwise the part of it that fits.
     shape.bound =
         absl::StrFormat("x^2 + y^2 + z^2 <= %.17g and abs(z) <= %.17g", radius_ * radius_, height_);
     shape.parameters = {{"level", GyroidLevel(seconds)}};

@@ -1,4 +1,4 @@
-// A gyroid by its expression, whose level goes up and down.
+// A gyroid given by its expression, whose level rises and falls.
 #pragma once
 
 #include <memory>
@@ -8,7 +8,8 @@
 
 namespace voxeld::voxelctl {
 
-// The level at a time: between −1 and 1, where the surface has not come apart yet (that is at √2).
+// Returns the level at a time: between −1 and 1, where the surface is still connected (it separates
+// at √2).
 double GyroidLevel(double seconds);
 
 absl::StatusOr<std::unique_ptr<Scene>> MakeGyroid(const SceneSettings& settings);

@@ -28,7 +28,7 @@ void Life::Sow(uint64_t seed) {
   std::fill(cells_.begin(), cells_.end(), kEmpty);
   std::mt19937_64 chance(seed);
   const int half = std::max(side_ / 4, 2);
-  const int low = (side_ - 1) / 2, high = side_ / 2;  // the same where the side is odd
+  const int low = (side_ - 1) / 2, high = side_ / 2;  // equal if the side is odd
   for (int z = 0; z < half; ++z) {
     for (int y = 0; y < half; ++y) {
       for (int x = 0; x < half; ++x) {

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kStepsPerSecond = 7;
 constexpr int kVoxelsPerCell = 5, kLeastSide = 16, kMostSide = 26;
-// Where cells are as large as voxels, what is turned is a blur.
+// If cells are as large as voxels, a rotated cube is blurred.
 constexpr int kTurnedFrom = 48;
 
 constexpr std::array<std::array<uint8_t, 3>, 5> kStateColors = {
@@ -28,7 +28,8 @@ class LifeScene final : public Scene {
         life_(std::clamp(settings.least_side / kVoxelsPerCell, kLeastSide, kMostSide)) {
     motion_.turn_s = settings.least_side < kTurnedFrom ? 0 : 30;
     const bool round = space_.round || motion_.turn_s > 0;
-    const double across = round ? std::numbers::sqrt2 : 1;  // half a cube's diagonal, in half sides
+    // Half of a cube's diagonal, in half sides.
+    const double across = round ? std::numbers::sqrt2 : 1;
     const double half =
         FitRadius({.half = {space_.half.x / across, space_.half.y / across, space_.half.z}}, 1);
     const double middle = -life_.side() / 2.0;
@@ -47,7 +48,7 @@ class LifeScene final : public Scene {
   absl::Status Move(Stage& stage, double seconds) override {
     const auto due = static_cast<int64_t>(seconds * kStepsPerSecond);
     if (due > steps_) {
-      steps_ = due;  // steps whose time has passed are not made up for
+      steps_ = due;  // missed steps are skipped
       life_.Step();
       if (watch_.IsOver(life_)) {
         life_.Sow(++seed_);

@@ -1,4 +1,4 @@
-// Life on the stage: cells that live bright, those that fade darker and darker.
+// Shows Life on the stage: live cells are bright, and fading ones get darker.
 #pragma once
 
 #include <memory>
@@ -8,7 +8,7 @@
 
 namespace voxeld::voxelctl {
 
-// A life that is over is followed by the next one, of the next seed.
+// Follows a life that has ended with another one, of the next seed.
 absl::StatusOr<std::unique_ptr<Scene>> MakeLife(const SceneSettings& settings);
 
 }  // namespace voxeld::voxelctl

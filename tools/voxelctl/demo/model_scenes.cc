@@ -21,7 +21,7 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr double kEarthTilt = 23.4;
-constexpr int kLeastWithBorders = 100;  // a display of fewer voxels has no room for every border
+constexpr int kLeastWithBorders = 100;  // a display with fewer voxels has no space for every border
 constexpr uint64_t kGalaxySeed = 20;
 constexpr Rgb kCoastColor = {70, 215, 190}, kDimCoastColor = {18, 75, 85};
 constexpr Rgb kGraticuleColor = {8, 24, 60};
@@ -61,7 +61,7 @@ class ModelScene final : public Scene {
 
  private:
   const DisplaySpace space_;
-  std::vector<Model> models_;  // until they are put up
+  std::vector<Model> models_;  // until they are sent
   const Motion motion_;
   const VolumeLook look_;
 };
@@ -70,7 +70,7 @@ void Paint(const Rgb& color, Model* model) {
   for (Part& part : model->parts) part.colors.assign(part.positions.size(), color);
 }
 
-// How far a model reaches from the origin along each axis.
+// Returns how far a model extends from the origin along each axis.
 Point3 ReachOf(const Model& model) {
   Point3 reach;
   const auto add = [&](const Point3& p, double r) {
@@ -87,7 +87,7 @@ Point3 ReachOf(const Model& model) {
   return reach;
 }
 
-// Every 30 degrees a line on the unit sphere.
+// Returns lines every 30 degrees on the unit sphere.
 Model Graticule() {
   Model model;
   model.format = "graticule";
@@ -121,7 +121,7 @@ Model Graticule() {
   return model;
 }
 
-// Coasts and borders, or coasts alone from the file beside it where the display is coarse.
+// Reads coasts and borders, or only coasts from the file beside it if the display is coarse.
 absl::StatusOr<Model> ReadAtlas(const SceneSettings& settings) {
   std::string path = settings.files[0];
   if (settings.least_side < kLeastWithBorders) {
@@ -174,7 +174,7 @@ absl::StatusOr<std::unique_ptr<Scene>> MakeHouse(const SceneSettings& settings) 
   PlaceModels(models, settings.space, {.spin = true});
   ApplyLook(models, {});
   const double reach = ReachOf(models[0]).y * 1.01;
-  // From the front as far as behind the middle.
+  // The cut goes from the front to behind the middle.
   const Motion motion = {
       .turn_s = 24, .cut = Cut{.toward = {0, -1, 0}, .deepest = -0.25 * reach, .outermost = reach}};
   return std::make_unique<ModelScene>(settings, std::move(models), motion);
@@ -200,7 +200,8 @@ absl::StatusOr<std::unique_ptr<Scene>> MakeBrain(const SceneSettings& settings) 
   std::vector<Model> models;
   models.push_back(*std::move(brain));
   PlaceModels(models, settings.space, {.spin = true});
-  // A brain is as round as an ellipsoid: the corners of its box, which are empty, may reach beyond the display.
+  // A brain is about ellipsoidal: the corners of its box, which are empty, may lie outside the
+  // display.
   const Point3 reach = ReachOf(models[0]);
   const double radius = FitRadius(settings.space, 1e-9) / std::max(reach.x, reach.y);
   const double grow = std::min(
@@ -227,7 +228,7 @@ absl::StatusOr<std::unique_ptr<Scene>> MakeGalaxy(const SceneSettings& settings)
   const auto side = static_cast<uint32_t>(std::max(settings.least_side, 1));
   std::vector<Model> models;
   models.push_back(GalaxyModel(kGalaxySeed, std::clamp(side * side, 300u, 24000u)));
-  // What is tilted reaches higher.
+  // A tilted model is higher.
   const double sine = std::sin(kTilt * std::numbers::pi / 180),
                cosine = std::cos(kTilt * std::numbers::pi / 180);
   const double radius = FitRadius(settings.space, sine + kGalaxyHeight * cosine) /

@@ -1,4 +1,4 @@
-// Scenes of models that move as a whole: files, and what code makes once.
+// Scenes of models that move as a whole: files, and models that are generated once.
 #pragma once
 
 #include <memory>
@@ -17,7 +17,8 @@ absl::StatusOr<std::unique_ptr<Scene>> MakeBrain(const SceneSettings& settings);
 absl::StatusOr<std::unique_ptr<Scene>> MakeMolecule(const SceneSettings& settings);
 absl::StatusOr<std::unique_ptr<Scene>> MakeGalaxy(const SceneSettings& settings);
 
-// What of a volume is above `low`, and nothing around it. All of it if nothing is.
+// Returns the part of a volume that is above `low`, without its surroundings; the whole volume if
+// nothing is above `low`.
 SampledVolume Cropped(const SampledVolume& volume, double low);
 
 }  // namespace voxeld::voxelctl

@@ -32,7 +32,7 @@ std::optional<client::HalfSpace> CutAt(const Motion& motion, const DisplaySpace&
   const Point3& t = cut.toward;
   const Point3 n = {m[0] * t.x + m[1] * t.y + m[2] * t.z, m[4] * t.x + m[5] * t.y + m[6] * t.z,
                     m[8] * t.x + m[9] * t.y + m[10] * t.z};
-  // n · (p − centre) ≤ distance.
+  // The half-space is n · (p − centre) ≤ distance.
   return client::HalfSpace{
       -n.x, -n.y, -n.z,
       distance + n.x * space.center.x + n.y * space.center.y + n.z * space.center.z};

@@ -1,4 +1,4 @@
-// How a scene moves: by maps and planes alone, so that nothing is sent again.
+// The motion of a scene, by maps and planes alone, so nothing is sent again.
 #pragma once
 
 #include <optional>
@@ -9,30 +9,32 @@
 
 namespace voxeld::voxelctl {
 
-// A plane that comes in from one side, goes back, and comes again.
+// A plane that moves in from one side, returns, and repeats.
 struct Cut {
-  Point3 toward;         // of unit length, in the scene's own axes: what lies on this side goes
+  Point3 toward;         // unit vector in the scene's own axes: this side is removed
   double deepest = 0;    // where the plane turns back, along `toward` from the centre
-  double outermost = 1;  // where nothing is cut
-  double period_s = 10;  // there and back
+  double outermost = 1;  // where nothing is removed
+  double period_s = 10;  // one way and back
 };
 
 struct Motion {
   double turn_s =
-      12;  // a turn about the scene's own upright axis, counter-clockwise from above; 0: none
-  double tilt_degrees = 0;  // of that axis, to the right; it stays so
+      12;  // per turn about the scene's own upright axis, counter-clockwise from above; 0: none
+  double tilt_degrees = 0;  // of that axis, to the right; constant
   std::optional<Cut> cut;
 };
 
-// From the scene's own axes, about the origin, into the display, `seconds` after its beginning.
+// Returns the map from the scene's own axes, about the origin, into the display, `seconds` after
+// the beginning.
 client::Affine PoseAt(const Motion& motion, const DisplaySpace& space, double seconds);
 
-// What of the scene is left, turned with it; begins with all. Without a cut everything is.
+// Returns the half-space that is kept, rotated with the scene; nothing is removed at the beginning.
+// Without a cut the result is empty and everything is kept.
 std::optional<client::HalfSpace> CutAt(const Motion& motion, const DisplaySpace& space,
                                        double seconds);
 
-// The largest radius about the upright axis at which something as high as `height` radii to either side of its middle fits,
-// however it is turned about that axis.
+// Returns the largest radius about the upright axis at which an object that extends `height` radii
+// to either side of its middle fits, at any rotation about that axis.
 double FitRadius(const DisplaySpace& space, double height);
 
 }  // namespace voxeld::voxelctl

@@ -1,4 +1,4 @@
-// What the demo plays: scenes, made of files or by code.
+// The scenes of the demo, made from files or by code.
 #pragma once
 
 #include <cstdint>
@@ -15,37 +15,38 @@
 
 namespace voxeld::voxelctl {
 
-// One that can be put up. Used by one thread at a time.
+// A scene that can be shown. Used by one thread at a time.
 class Scene {
  public:
   virtual ~Scene() = default;
-  // Stages all of it, as it is at its beginning, in place of what was on the stage.
+  // Stages the whole scene in its initial state, replacing what was on the stage.
   virtual absl::Status Begin(Stage& stage) = 0;
-  // Stages what has changed `seconds` after the beginning; more than 20 times a second where the displays keep up.
+  // Stages what has changed `seconds` after the beginning. Called more than 20 times a second if
+  // the displays keep up.
   virtual absl::Status Move(Stage& stage, double seconds) = 0;
 };
 
 struct SceneSettings {
-  DisplaySpace space;              // what is to hold it
-  int least_side = 128;            // voxels, of the display that has the fewest along an axis
-  std::vector<std::string> files;  // of SceneAbout::needs, in that order
+  DisplaySpace space;              // the space for it
+  int least_side = 128;            // number of voxels of the display's shortest axis
+  std::vector<std::string> files;  // the files of SceneAbout::needs, in that order
 };
 
 struct SceneAbout {
   const char* name;
-  const char* seen;    // what is seen
-  const char* source;  // where its data are from
+  const char* seen;    // description of the scene
+  const char* source;  // origin of its data
   std::vector<SceneFile> needs;
   bool needs_importers;  // reads a format that VOXELD_IMPORTERS adds
-  // Reads and computes all that takes time; for any thread. An error is of the files.
+  // Reads and computes everything that takes time; may run on any thread. Errors concern the files.
   absl::StatusOr<std::unique_ptr<Scene>> (*make)(const SceneSettings& settings);
 };
 
-// In the order of kSceneNames, by these names.
+// Returns the scenes in the order and with the names of kSceneNames.
 std::span<const SceneAbout> Scenes();
 
-// Returns: the files of SceneAbout::needs; Unimplemented with the option that adds what the scene needs, where this build lacks it;
-// NotFound with what brings the first missing file.
+// Returns: the files of SceneAbout::needs. Errors: Unimplemented with the option that adds what the
+// scene needs, if this build lacks it; NotFound with how to get the first missing file.
 absl::StatusOr<std::vector<std::string>> FindWhatSceneNeeds(const SceneAbout& scene,
                                                             const std::vector<std::string>& roots);
 

@@ -1,4 +1,4 @@
-// Where scenes are put up: one layer of a session, and the objects that are drawn in it.
+// The stage of a scene: one layer of a session, and the objects that are drawn in it.
 #pragma once
 
 #include <string>
@@ -14,19 +14,20 @@ namespace voxeld::voxelctl {
 
 class Stage {
  public:
-  // `session` must outlive it. Objects' names begin with `prefix`.
+  // `session` must outlive the stage. Objects' names begin with `prefix`.
   Stage(SceneSession& session, client::Layer layer, std::string prefix)
       : session_(session), layer_(std::move(layer)), prefix_(std::move(prefix)) {}
 
   const client::Layer& layer() const { return layer_; }
 
-  // Defines an object, which is an instance's by ObjectName(name). A model is placed and coloured. What the limits want in
-  // several commits is committed on the way; nothing is seen of it yet.
+  // Defines an object, which instances refer to by ObjectName(name). A model must be placed and
+  // coloured. If the limits require several commits, earlier ones are committed here; nothing is
+  // visible yet.
   absl::Status Define(const std::string& name, const Model& model, const VolumeLook& look = {});
   absl::Status Define(const std::string& name, std::vector<client::Part> parts);
   std::string ObjectName(const std::string& name) const;
 
-  // Stages the end of all objects that were defined here, the last first.
+  // Stages the removal of all objects that were defined here, the last first.
   absl::Status RemoveObjects();
 
  private:

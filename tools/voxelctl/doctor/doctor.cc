@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 using State = Finding::State;
 
 constexpr char kRules[] = "70-voxeld.rules";
-// Of volumes in flight: a large one and the next.
+// Space for the volumes in flight: a large one and the next.
 constexpr int kUsbfsMb = 64;
 
 std::string ReadLine(const fs::path& path) {
@@ -59,7 +59,7 @@ Finding OfRules(const Machine& machine) {
                        "trigger --subsystem-match=usb")};
 }
 
-// What voxeld would drive; empty: none of its.
+// Returns which device voxeld would drive; empty if it is none of these.
 std::string KindOf(const fs::path& device) {
   if (ReadLine(device / "idVendor") == "1d50" && ReadLine(device / "idProduct") == "607a") {
     return "Fadecandy";
@@ -89,7 +89,7 @@ std::vector<Finding> OfDevices(const Machine& machine) {
       findings.push_back({"usb", State::kGood, absl::StrCat(name, " can be opened"), ""});
       continue;
     }
-    // The rules act when a device comes, or is triggered.
+    // The udev rules take effect when a device is attached, or when they are triggered.
     findings.push_back(
         {"usb", State::kBad, absl::StrCat(name, " cannot be opened: it is not yours to write"),
          HasRules(machine)
@@ -122,7 +122,7 @@ Finding OfUsbfs(const Machine& machine) {
 bool HasNvidiaCard(const Machine& machine) {
   const auto cards = EntriesOf(fs::path(machine.sys) / "bus/pci/devices");
   return std::any_of(cards.begin(), cards.end(), [](const fs::path& card) {
-    // NVIDIA; a display controller.
+    // The card is NVIDIA's, and a display controller.
     return ReadLine(card / "vendor") == "0x10de" &&
            absl::StartsWith(ReadLine(card / "class"), "0x03");
   });
@@ -147,7 +147,7 @@ Finding OfCuda(const Machine& machine) {
   return {"cuda", State::kGood, absl::StrJoin(cuda.devices, ", "), ""};
 }
 
-// `own`: who answers there when voxeld runs.
+// `own` is the state of the port while voxeld runs.
 Finding OfPort(const Machine& machine, uint16_t port, PortState own, const std::string& elsewhere) {
   const auto use_of = [](PortState state) {
     return state == PortState::kHttp ? "health and metrics" : "clients";

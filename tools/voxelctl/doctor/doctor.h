@@ -1,4 +1,5 @@
-// voxelctl doctor: what of this machine keeps voxeld from its work, and the command that mends it. Needs no daemon.
+// voxelctl doctor: checks this machine for problems that affect voxeld, and prints the command that
+// fixes each. Needs no daemon.
 #pragma once
 
 #include <cstdint>
@@ -14,19 +15,20 @@ namespace voxeld::voxelctl {
 struct Finding {
   enum class State : uint8_t {
     kGood,
-    kNote,  // works, though not as well as it might
+    kNote,  // works, but could work better
     kBad,   // something will not work
   };
   std::string what;  // "usb", "udev", "usbfs", "cuda", "port"
   State state = State::kGood;
-  std::string text;  // what there is; of devices what they say of themselves, not escaped
-  std::string fix;   // a command; empty: nothing to mend
+  std::string text;  // the finding; text that comes from devices is not escaped
+  std::string fix;   // a command; empty: nothing to fix
 };
 
 std::vector<Finding> Examine(const Machine& machine);
 
-// `server`: the address that was asked for, a TCP port of this machine; empty: the usual one.
-// FailedPrecondition if something is bad, after all has been told; InvalidArgument: `server` is elsewhere.
+// `server` is the given address, a TCP port of this machine; empty: the default one. Errors:
+// FailedPrecondition if something is bad, after everything was reported; InvalidArgument if
+// `server` is another machine.
 absl::Status Doctor(Machine machine, const std::string& server, Console& console);
 
 }  // namespace voxeld::voxelctl

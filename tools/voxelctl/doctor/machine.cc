@@ -40,7 +40,7 @@ CudaState LookAtCuda() {
     state.error = name(text.data(), static_cast<int>(text.size()) - 1, i);
     state.devices.emplace_back(text.data());
   }
-  // What it started is its own: it stays open.
+  // The library is not closed, because what it started keeps running.
   return state;
 }
 
@@ -63,7 +63,7 @@ class Socket {
     return bind(fd_, reinterpret_cast<const sockaddr*>(&address_), sizeof(address_)) == 0 ||
            errno != EADDRINUSE;
   }
-  // The beginning of what is said to `request`; nothing if that takes too long.
+  // Returns the beginning of the response to `request`; empty if that takes too long.
   std::string Ask(const std::string& request) const {
     if (connect(fd_, reinterpret_cast<const sockaddr*>(&address_), sizeof(address_)) != 0)
       return "";
@@ -86,12 +86,13 @@ class Socket {
 
 PortState LookAtPort(uint16_t port) {
   if (Socket(port).Bind()) return PortState::kFree;
-  // Clients' port speaks HTTP/2, begins with its settings (RFC 9113 §3.4), and cuts what begins otherwise.
+  // The clients' port speaks HTTP/2, sends its settings first (RFC 9113 §3.4), and closes
+  // connections that begin differently.
   using namespace std::string_literals;
   const std::string settings =
       Socket(port).Ask("PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\4\0\0\0\0\0"s);
   if (settings.size() >= 9 && settings[3] == 4 && settings[0] == 0) return PortState::kClients;
-  // The http port says how it is.
+  // The http port reports its health.
   const std::string health =
       Socket(port).Ask("GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n");
   return absl::StrContains(health, "\"reasons\"") ? PortState::kHttp : PortState::kOther;

@@ -1,4 +1,4 @@
-// The machine that a doctor looks at.
+// The machine that the doctor examines.
 #pragma once
 
 #include <cstdint>
@@ -8,14 +8,15 @@
 
 namespace voxeld::voxelctl {
 
-// What NVIDIA's driver answers.
+// The answers of NVIDIA's driver.
 struct CudaState {
   bool installed = false;  // libcuda.so.1 can be opened
-  int error = 0;           // of cuInit, of counting; 0: none
+  int error = 0;           // of cuInit or of counting devices; 0: none
   std::vector<std::string> devices;
 };
 
-// Who has a TCP port of this machine's: a voxeld's port for clients, its http port.
+// The user of a TCP port of this machine: a voxeld's port for clients, its http port, another program,
+// or nobody.
 enum class PortState : uint8_t { kFree, kClients, kHttp, kOther };
 
 struct Machine {
@@ -23,13 +24,13 @@ struct Machine {
   std::vector<std::string> rule_folders = {"/etc/udev/rules.d", "/run/udev/rules.d",
                                            "/usr/lib/udev/rules.d", "/lib/udev/rules.d"};
   std::string group_file = "/etc/group";
-  uint16_t clients_port = 50551;                          // that clients connect to
-  std::function<bool(const std::string& path)> writable;  // by whoever runs this
+  uint16_t clients_port = 50551;                          // the port to which clients connect
+  std::function<bool(const std::string& path)> writable;  // by the current user
   std::function<CudaState()> cuda;
   std::function<PortState(uint16_t port)> port;  // of 127.0.0.1
 };
 
-// This one.
+// Returns this machine.
 Machine ThisMachine();
 
 }  // namespace voxeld::voxelctl

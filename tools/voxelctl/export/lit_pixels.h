@@ -1,4 +1,4 @@
-// The pixels of a volume that are lit, and where they are.
+// The lit pixels of a volume, and their positions.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +9,8 @@
 
 namespace voxeld::voxelctl {
 
-// Calls `each` with the place in millimetres (x is NaN where the pixel lies nowhere) and the three bytes of colour, in the
-// volume's order: slice, then v, then u.
+// Calls `each` with the position in millimetres (x is NaN if the pixel has none) and the three
+// bytes of colour, in the volume's order: slice, then v, then u.
 void ForEachLit(const Volume& volume,
                 const std::function<void(const display::Vec3& at, const uint8_t* rgb)>& each);
 

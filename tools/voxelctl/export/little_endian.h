@@ -1,4 +1,4 @@
-// Numbers as files have them: the least byte first.
+// Writes little-endian numbers.
 #pragma once
 
 #include <bit>

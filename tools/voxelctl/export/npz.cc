@@ -20,12 +20,12 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// Without ZIP64.
+// The limit without ZIP64.
 constexpr uint64_t kMost = std::numeric_limits<uint32_t>::max() - uint64_t{1};
 constexpr uint16_t kDeflated = 8, kZipVersion = 20;
-constexpr uint32_t kFirstOfJanuary1980 = 0x0021'0000;  // ZIP knows no "never"
+constexpr uint32_t kFirstOfJanuary1980 = 0x0021'0000;  // ZIP cannot omit the time
 
-// The header of an array file, as "NPY" 1.0 has it: what follows begins at a multiple of 64.
+// Returns the header of an array file in "NPY" 1.0; the data after it begin at a multiple of 64.
 std::string NpyHeader(const std::string& type, const std::string& shape) {
   std::string text =
       absl::StrCat("{'descr': '", type, "', 'fortran_order': False, 'shape': (", shape, "), }");
@@ -101,7 +101,7 @@ class Zip {
 
   absl::Status Deflate(absl::string_view header, absl::string_view data, std::string* out) const {
     z_stream stream = {};
-    // Raw, as ZIP has it.
+    // ZIP uses raw deflate.
     if (::deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, -MAX_WBITS, 8,
                        Z_DEFAULT_STRATEGY) != Z_OK) {
       return absl::ResourceExhaustedError(

@@ -44,7 +44,7 @@ void PutDictionary(std::string* out, const std::map<std::string, std::string>& e
   }
 }
 
-// Node `number`, which puts node `child` somewhere.
+// Returns node `number`, which places node `child`.
 std::string Transform(uint32_t number, uint32_t child, const std::string& move) {
   std::string content;
   PutU32(&content, number);
@@ -68,12 +68,12 @@ std::string Shape(uint32_t number, uint32_t model) {
   return Chunk("nSHP", content);
 }
 
-// What is lit, by blocks.
+// The lit voxels, by blocks.
 class Voxels {
  public:
   explicit Voxels(const display::VoxelGrid& grid) : grid_(grid), size_{grid.nx, grid.ny, grid.nz} {}
 
-  // False: it lies outside.
+  // Returns false if the position is outside of the grid.
   bool Light(const display::Vec3& at, const uint8_t* rgb) {
     Cell cell, block;
     const double from[3] = {(at.x - grid_.origin_mm.x) / grid_.pitch_mm.x,
@@ -81,7 +81,7 @@ class Voxels {
                             (at.z - grid_.origin_mm.z) / grid_.pitch_mm.z};
     uint32_t within = 0;
     for (size_t a = 0; a < 3; ++a) {
-      // Pixels of flat slices lie on the faces of voxels or in their middles, as they come.
+      // Pixels of flat slices are either on the faces of voxels or in their centres.
       const double place = std::floor(from[a] + 1e-6);
       if (!(place >= 0 && place < size_[a])) return false;
       cell[a] = static_cast<int32_t>(place);
@@ -134,7 +134,8 @@ class Voxels {
   }
 
  private:
-  using Block = absl::flat_hash_map<uint32_t, Color8>;  // x, y and z in it, 8 bits each
+  // Keyed by x, y and z within it, 8 bits each.
+  using Block = absl::flat_hash_map<uint32_t, Color8>;
 
   int32_t Side(const Cell& block, size_t axis) const {
     return std::min(kModelSide, size_[axis] - block[axis] * kModelSide);
@@ -145,7 +146,7 @@ class Voxels {
     std::string size, xyzi;
     for (size_t a = 0; a < 3; ++a) PutU32(&size, static_cast<uint32_t>(Side(block, a)));
     PutU32(&xyzi, static_cast<uint32_t>(voxels.size()));
-    // The same volume is the same file.
+    // Sorted, so that the same volume always gives the same file.
     const std::map<uint32_t, Color8> sorted(voxels.begin(), voxels.end());
     for (const auto& [within, color] : sorted) {
       PutU32(&xyzi, within | (uint32_t{places.at(ColorCount::Key(color))} + 1) << 24);
@@ -153,7 +154,7 @@ class Voxels {
     return Chunk("SIZE", size) + Chunk("XYZI", xyzi);
   }
 
-  // Where the middle of the block's model goes.
+  // Returns the position of the centre of the block's model.
   std::string Move(const Cell& block) const {
     Cell to;
     for (size_t a = 0; a < 3; ++a) {

@@ -102,7 +102,7 @@ class Follower {
   }
 
  private:
-  // What the server said of the first that it refused; nothing: it refused none.
+  // Returns the server's message about the first refusal; empty if there was none.
   std::string Refused() const {
     const client::Tally tally = session_.GetTally();
     if (tally.refused_operations == 0 || tally.issues.empty()) return "";
@@ -128,7 +128,7 @@ class Follower {
     Malformed(from.malformed, from.malformed_last);
     scene_.tally().left_out.insert(from.left_out.begin(), from.left_out.end());
     if (from.topic.empty()) return absl::OkStatus();
-    // Whoever sends faster than it is shown waits.
+    // A sender that is faster than the display waits.
     while (!session_.HasRoom() && !end_.ended()) {
       if (interrupt_.WaitUntil(clock_, clock_.Now() + kRoomEvery)) return absl::OkStatus();
     }
@@ -142,7 +142,8 @@ class Follower {
           layer_.Put(id, std::move(piece.shape), std::move(piece.look)).status();
       if (absl::IsInvalidArgument(status)) {
         Malformed(1, std::string(status.message()));
-        if (absl::Status gone = layer_.Remove(id); !gone.ok()) return gone;  // what it was
+        // Removes its previous state.
+        if (absl::Status gone = layer_.Remove(id); !gone.ok()) return gone;
       } else if (!status.ok()) {
         return status;
       }

@@ -1,4 +1,4 @@
-// What a feed of markers tells of, put up as it comes.
+// Shows a feed of markers as it is received.
 #pragma once
 
 #include <string>
@@ -12,20 +12,22 @@
 namespace voxeld::voxelctl {
 
 struct FeedShowing {
-  std::string source;               // whom it follows, for people
-  std::string channel = "channel";  // what it is subscribed to, one of them, for people
+  std::string source;               // description of the source for people
+  std::string channel = "channel";  // what one of the subscribed items is called, for people
   std::string layer;
   std::string client_name;
-  bool reconnect = true;  // waits for a server that has gone; else that is the end
+  bool reconnect = true;  // waits for a server that is unreachable; otherwise ends
 };
 
-// Until an interrupt, which is no error; the feed's status when it ends, the session's (Unavailable) when that does. Each update is
-// one commit. What cannot be read is counted and told, and the rest goes on. With --json a line when it is connected, one for each of the
-// feed's news, a line of counts at most each second while messages come, and one at the end.
+// Runs until an interrupt, which is not an error. Otherwise returns the feed's status when it ends,
+// or the session's (Unavailable) when that ends. Each update is one commit. Unreadable parts are
+// counted and reported, and the rest continues. With --json it writes a line when it is connected,
+// one for each of the feed's news, a line of counts at most every second while messages come, and
+// one at the end.
 absl::Status ShowFeed(const FeedShowing& showing, markers::MarkerFeed& feed, Connection& connection,
                       Interrupt& interrupt, Console& console);
 
-// With a message that is fit for a terminal.
+// Returns the status with its message escaped for a terminal.
 absl::Status Escaped(const absl::Status& status);
 
 }  // namespace voxeld::voxelctl

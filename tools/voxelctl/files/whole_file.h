@@ -1,4 +1,4 @@
-// Files that are there whole or not at all.
+// Files that are written completely or not at all.
 #pragma once
 
 #include <memory>
@@ -22,13 +22,13 @@ class WholeFile {
   WholeFile(const WholeFile&) = delete;
   WholeFile& operator=(const WholeFile&) = delete;
 
-  // At the end of what is there.
+  // Appends to the file.
   absl::Status Write(absl::string_view bytes);
 
-  // On the disk, and in place; nothing can be written any more.
+  // Syncs the file to the disk and puts it in place; nothing can be written afterwards.
   absl::Status Commit();
 
-  // Where it is until then, for another program that writes it.
+  // Returns its path until then, for another program that writes it.
   const std::string& temporary() const { return temporary_; }
 
  private:
@@ -41,7 +41,7 @@ class WholeFile {
   bool in_place_ = false;
 };
 
-// All at once.
+// Writes the whole file in one call.
 absl::Status WriteWholeFile(const std::string& path, absl::string_view bytes);
 
 }  // namespace voxeld::voxelctl

@@ -23,7 +23,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// Lines of the profile.
+// The lines of the profile.
 class Profile {
  public:
   void Text(const std::string& key, const std::string& value) {
@@ -56,7 +56,7 @@ void AskDriver(Asker& asker, Profile& profile, bool& network) {
       "address",
       asker.Ask("Its address, in numbers, with a port if it is not the usual one?", "",
                 [](const std::string& answer) -> absl::StatusOr<std::string> {
-                  // The driver looks closer at the end.
+                  // The driver checks the address more closely at the end.
                   for (const char c : answer) {
                     const bool fits = absl::ascii_isxdigit(static_cast<unsigned char>(c)) ||
                                       c == '.' || c == ':' || c == '[' || c == ']';
@@ -82,7 +82,7 @@ void AskDriver(Asker& asker, Profile& profile, bool& network) {
   profile.Text("color_order", order);
 }
 
-// The axis along which a word says that something runs.
+// Returns the axis that a word such as "left-right" describes.
 char AxisOf(const std::string& word) {
   return word == "left-right" ? 'x' : word == "front-back" ? 'y' : 'z';
 }
@@ -155,14 +155,14 @@ void AskWiring(Asker& asker, Profile& profile, bool network) {
   profile.Value("per_strip", asker.Number("Lights on each output?", strip, 1, 100000, true));
 }
 
-// Whether a display can be made of it, as the daemon would.
+// Checks whether a display can be made of it, as the daemon would.
 absl::Status Try(const std::string& file) {
   const absl::StatusOr<display::Profile> profile = display::ReadProfile(file);
   if (!profile.ok()) return profile.status();
   sync::SystemClock clock;
   const absl::Status made =
       display::CreateDisplay({"lattice", profile->driver, profile->options}, clock).status();
-  // No USB is asked for its boards here.
+  // USB boards are not looked for here.
   return absl::IsUnavailable(made) ? absl::OkStatus() : made;
 }
 

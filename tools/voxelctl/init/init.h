@@ -1,4 +1,5 @@
-// voxelctl init: asks how an LED lattice is wired, in the words that xLights has for it, and writes its profile. Needs no daemon.
+// voxelctl init: asks how an LED lattice is wired, with xLights' terms, and writes its profile.
+// Needs no daemon.
 #pragma once
 
 #include <istream>
@@ -9,8 +10,9 @@
 
 namespace voxeld::voxelctl {
 
-// Questions go to the console, answers come from `in`, a line each; an empty one takes the default. What an answer cannot be is said,
-// and asked again. FailedPrecondition if the answers end before the questions; AlreadyExists if the file does.
+// Questions go to the console, and answers come from `in`, one per line; an empty one selects the
+// default. An invalid answer is reported, and the question is asked again. Errors:
+// FailedPrecondition if the answers end early; AlreadyExists if the file exists.
 absl::Status Init(const InitOptions& options, std::istream& in, Console& console);
 
 }  // namespace voxeld::voxelctl

@@ -1,4 +1,4 @@
-// Which lights a command means.
+// Selects the lights of a command.
 #pragma once
 
 #include "absl/status/statusor.h"
@@ -8,7 +8,8 @@
 
 namespace voxeld::voxelctl {
 
-// NotFound if there is no such display, or none at all; what is wrong with the layout's file, by its name.
+// Errors: NotFound if the display does not exist or the server has none; otherwise what is wrong
+// with the layout file, with its name.
 absl::StatusOr<LightMap> ChooseLights(const LightsOptions& options, Connection& connection);
 
 }  // namespace voxeld::voxelctl

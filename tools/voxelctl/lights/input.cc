@@ -19,8 +19,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr sync::TimeNs kRoomEvery =
-    sync::kMillisecond;  // how often it is asked for, while a picture waits
+constexpr sync::TimeNs kRoomEvery = sync::kMillisecond;  // polling interval while a picture waits
 constexpr sync::TimeNs kTellEvery = sync::kSecond;
 constexpr std::chrono::seconds kOpenTime(15);
 constexpr const char* kMalformed = "malformed";

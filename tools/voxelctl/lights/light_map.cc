@@ -19,7 +19,7 @@ using Three = std::array<double, 3>;
 struct Space {
   Three voxels{}, pitch_mm{}, origin_mm{};
   client::Affine to_scene;  // from voxels
-  bool round = false;       // what is far from the z axis is not seen
+  bool round = false;       // the parts far from the z axis are not visible
 };
 
 absl::StatusOr<Space> SpaceOf(const v1::DisplayDescription& display) {
@@ -178,7 +178,7 @@ absl::StatusOr<LightMap> LightsOfLayout(std::string_view json,
   for_each([&](size_t, const Three& point) {
     radius = std::max(radius, std::hypot(from_middle(point, 0), from_middle(point, 1)));
   });
-  // Outermost lights lie in the middle of the outermost voxels.
+  // The outermost lights are in the centres of the outermost voxels.
   double scale = HUGE_VAL;
   const auto fit = [&](size_t axis, double reach) {
     const double room = (space->voxels[axis] - 1) * space->pitch_mm[axis] / 2;
@@ -189,7 +189,7 @@ absl::StatusOr<LightMap> LightsOfLayout(std::string_view json,
     fit(0, radius);
     fit(1, radius);
   }
-  if (!std::isfinite(scale)) scale = 1;  // of one light
+  if (!std::isfinite(scale)) scale = 1;  // there is only one light
   LightMap map;
   map.transform = space->to_scene;
   for_each([&](size_t i, const Three& point) {

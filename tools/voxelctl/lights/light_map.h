@@ -1,4 +1,4 @@
-// Where the lights stand that come in by their numbers.
+// Maps numbered lights to places in the display.
 #pragma once
 
 #include <array>
@@ -15,31 +15,33 @@
 
 namespace voxeld::voxelctl {
 
-// Numbers of lights that can be told apart.
+// The maximum number of lights.
 inline constexpr size_t kMostLights = size_t{1} << 18;
 
 struct LightMap {
   size_t lights = 0;            // numbers: 0 to lights - 1
-  std::vector<uint32_t> light;  // of each place: its light's number, below `lights`
-  std::vector<float> places;    // x y z of each, in the display's voxels
-  bool cells = false;           // each is the corner of a cell, one unit wide; else a point
+  std::vector<uint32_t> light;  // per place: its light's number, below `lights`
+  std::vector<float> places;    // x y z per place, in the display's voxels
+  bool cells = false;           // places are corners of cells one unit wide; otherwise points
   client::Affine transform;     // places → scene
-  std::string where;            // for people
+  std::string where;            // description for people
 
-  // The places in the colours of `values`, three a light.
+  // Returns the places in the colours of `values`, three per light.
   client::Points Picture(std::span<const uint8_t> values) const;
 };
 
-// A display's own lights, by its pixels' numbers: slice after slice. FailedPrecondition if it is no lattice.
+// Returns a display's own lights, numbered by its pixels, slice after slice. Errors:
+// FailedPrecondition if it is not a lattice.
 absl::StatusOr<LightMap> LightsOf(const v1::DisplayDescription& display);
 
-// A box of lights, x fastest, then y, then z; as large as it can be in the display's volume, and in its middle. Where
-// that has as many voxels along each axis, each light is one. A light that is several voxels large fills them.
+// Returns a box of lights, x fastest, then y, then z, centred in the display's volume and as large
+// as fits. If the volume has as many voxels along each axis, each light is one voxel. A light that
+// spans several voxels fills them.
 absl::StatusOr<LightMap> LightsInBox(std::array<int, 3> size,
                                      const v1::DisplayDescription& display);
 
-// Lights at the points of a layout of Open Pixel Control, as large as it can be in the display's volume, and in its
-// middle; each is one voxel. InvalidArgument names the entry that is wrong.
+// Returns lights at the points of an Open Pixel Control layout, centred in the display's volume and
+// as large as fits; each is one voxel. Errors: InvalidArgument with the invalid entry.
 absl::StatusOr<LightMap> LightsOfLayout(std::string_view json,
                                         const v1::DisplayDescription& display);
 

@@ -1,4 +1,4 @@
-// Lights by their numbers: from the protocols of LED controllers, and raw from another program.
+// Shows lights by number: from the protocols of LED controllers, and raw from another program.
 #pragma once
 
 #include "absl/status/status.h"
@@ -9,14 +9,16 @@
 
 namespace voxeld::voxelctl {
 
-// Takes in what comes over the network until an interrupt, which is no error, and puts up the newest picture whenever
-// the server has room. A lost connection is opened again. With --json a line when it listens, and one a second with
-// what became of every message and picture; the last at its end.
+// Receives light data from the network until an interrupt, which is not an error, and shows the
+// newest picture whenever the server can accept it. Reconnects if the connection is lost. With
+// --json it writes a line when it listens, and one per second with the counts of all messages and
+// pictures, the last one at the end.
 absl::Status Input(const InputOptions& options, const Connector& connect, Interrupt& interrupt,
                    Console& console);
 
-// Puts up picture after picture of `descriptor`, none left out, at the pace at which the server takes them or at the
-// options', until its end. InvalidArgument if that is within a picture. With --json one object at the end.
+// Shows all pictures that `descriptor` delivers, at the rate at which the server accepts them or at
+// the options' rate, until the input ends. Errors: InvalidArgument if the input ends within a picture.
+// With --json it writes one object at the end.
 absl::Status Pipe(const PipeOptions& options, const Connector& connect, Interrupt& interrupt,
                   int descriptor, Console& console);
 

@@ -1,4 +1,4 @@
-// The commands of lights where VOXELD_LIGHTS is off.
+// The commands for lights if VOXELD_LIGHTS is off.
 #include "tools/voxelctl/lights/lights.h"
 #include "tools/voxelctl/text/not_built.h"
 

@@ -17,10 +17,11 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr int kLookUpMs = 100;  // for an interrupt
+constexpr int kLookUpMs = 100;  // interval at which an interrupt is checked
 constexpr sync::TimeNs kSettleLimit = 60 * sync::kSecond;
 
-// Fills `bytes`, or as much of it as there is before the end; how much that was.
+// Fills `bytes`, or as much of it as the input still has. Returns the number of bytes
+// read.
 absl::StatusOr<size_t> ReadWhole(int descriptor, std::vector<uint8_t>& bytes,
                                  const Interrupt& interrupt) {
   size_t have = 0;

@@ -1,4 +1,4 @@
-// voxelctl markers: what a robot's programs show in their viewers, put up as it comes.
+// voxelctl markers: shows what a robot's programs show in their viewers, as it is received.
 #pragma once
 
 #include "absl/status/status.h"
@@ -9,8 +9,10 @@
 
 namespace voxeld::voxelctl {
 
-// Until an interrupt, which is no error; Unavailable when either server goes. Each update is one commit. What cannot be read is
-// counted and told, and the rest goes on. With --json a line when it is connected, a line of counts at most each second while messages come, and one at the end.
+// Runs until an interrupt, which is not an error. Errors: Unavailable if either server disconnects.
+// Each update is one commit. Unreadable parts are counted and reported, and the rest continues.
+// With --json it writes a line when it is connected, a line of counts at most every second while
+// messages come, and one at the end.
 absl::Status FollowMarkers(const MarkersOptions& options, const Connector& connect,
                            Interrupt& interrupt, Console& console);
 

@@ -1,4 +1,4 @@
-// The command of markers where VOXELD_MARKERS is off.
+// The command for markers if VOXELD_MARKERS is off.
 #include "tools/voxelctl/markers/follow.h"
 #include "tools/voxelctl/text/not_built.h"
 

@@ -23,10 +23,11 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr sync::TimeNs kFadeStep = sync::kSecond / 30;
-constexpr sync::TimeNs kLook = sync::kSecond / 5;  // at the time of day, and at what is on
-constexpr sync::TimeNs kRest = sync::kSecond;      // after an item that cannot be played
+// Interval at which the time of day and the current item are checked.
+constexpr sync::TimeNs kLook = sync::kSecond / 5;
+constexpr sync::TimeNs kRest = sync::kSecond;  // after an item that cannot be played
 
-// Of a status of what is being played, when its file could be opened.
+// Returns whether a status of an item that was opened successfully is caused by the server.
 bool IsOfTheServer(const absl::Status& status) {
   return absl::IsUnavailable(status) || absl::IsUnauthenticated(status) ||
          absl::IsPermissionDenied(status);
@@ -50,7 +51,7 @@ class Player {
 
   absl::Status Run() {
     std::optional<size_t> at;
-    std::set<size_t> failed;  // one after another
+    std::set<size_t> failed;  // consecutively
     while (!interrupt_.requested()) {
       const std::optional<size_t> next = NextItem(playlist_, at, now_());
       if (!next.has_value()) {
@@ -89,7 +90,8 @@ class Player {
   }
 
  private:
-  // Whether one that has not `failed` can be played, now or at its hours; if none can: which are wrong in what.
+  // Checks whether an item outside `failed` can be played, now or at its hours. If none can,
+  // returns what is wrong with each.
   absl::Status AnyOther(const std::set<size_t>& failed) const {
     std::string faults;
     for (size_t i = 0; i < playlist_.items.size(); ++i) {
@@ -103,9 +105,9 @@ class Player {
         absl::StrCat("nothing of the playlist can be played", faults.empty() ? "" : ":", faults));
   }
 
-  // As long as what is shown is to be on.
+  // Waits as long as the current item is to be shown.
   absl::Status Stay(const PlaylistItem& item) {
-    // One that is on for its own length plays while it comes and while it goes.
+    // An item that is shown for its own length also plays while it fades in and out.
     const double fades = shown_->of_its_own_length() ? 2 * playlist_.cross_fade_s : 0;
     const double seconds = std::max(shown_->seconds() - fades, 0.0);
     const sync::TimeNs end = clock_.Now() + static_cast<sync::TimeNs>(seconds * sync::kSecond);
@@ -139,7 +141,7 @@ class Player {
     return FadeTo(*std::move(showing));
   }
 
-  // From what is shown to `next`, which may be nothing.
+  // Fades from the current item to `next`, which may be null.
   absl::Status FadeTo(std::unique_ptr<Showing> next) {
     const auto length = static_cast<sync::TimeNs>(playlist_.cross_fade_s * sync::kSecond);
     absl::Status status;
@@ -152,7 +154,7 @@ class Player {
       if (Wait(kFadeStep)) break;
       part = std::min(1.0, static_cast<double>(clock_.Now() - begin) / static_cast<double>(length));
       if (next != nullptr) status = next->SetOpacity(part);
-      if (shown_ != nullptr) (void)shown_->SetOpacity(1 - part);  // it goes, in any case
+      if (shown_ != nullptr) (void)shown_->SetOpacity(1 - part);  // it is removed in any case
       if (next != nullptr && status.ok()) status = next->status();
     }
     shown_ = std::move(next);
@@ -166,8 +168,8 @@ class Player {
   Console& console_;
   sync::SystemClock clock_;
   std::unique_ptr<Showing> shown_;
-  std::set<size_t> told_;  // of items: that they are passed over, since they were played last
-  bool opened_ = false;    // the file of the item that came last
+  std::set<size_t> told_;  // items that were reported as skipped since they last played
+  bool opened_ = false;    // whether the latest item's file was opened
 };
 
 absl::Status Check(const Playlist& playlist, const std::string& path, WeekMinute now,

@@ -1,4 +1,5 @@
-// voxelctl playlist: recordings and presets one after another, cross-faded, each at its hours.
+// voxelctl playlist: plays recordings and presets one after another, cross-faded, each at its
+// hours.
 #pragma once
 
 #include <functional>
@@ -12,13 +13,15 @@
 
 namespace voxeld::voxelctl {
 
-// The local time of day and week.
+// Returns the local time of day and week.
 WeekMinute LocalWeekMinute();
 
-// Until an interrupt, which is no error, or, without `loop`, the end of the last. An item that cannot be played is told once and
-// passed over; when none can, be it at other hours, or the server goes away, that is the error. With --json a line for each item as it comes up.
-// With `check` the files alone are read, and what would be on now is told; InvalidArgument has every item that would be
-// passed over. `connect` is called when it is to be played.
+// Plays until an interrupt, which is not an error, or, without `loop`, until the end of the last
+// item. An item that cannot be played is reported once and skipped. Errors: if no item can be
+// played, at any hour, or the server disconnects. With --json it writes a line for each item when
+// it is shown. With `check` it only reads the files and reports what would be shown now;
+// InvalidArgument then names every item that would be skipped. `connect` is called only for
+// playing.
 absl::Status PlayList(const PlaylistOptions& options, const Connector& connect,
                       const std::function<WeekMinute()>& now, Interrupt& interrupt,
                       Console& console);

@@ -16,9 +16,9 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr std::string_view kDays[] = {"mon", "tue", "wed", "thu", "fri", "sat", "sun"};
-constexpr double kMostSeconds = 1e7;  // a hundred days
+constexpr double kMostSeconds = 1e7;  // about a hundred days
 
-// "22:00" in minutes; "24:00" is the end of the day.
+// Converts "22:00" to minutes; "24:00" is the end of the day.
 std::optional<int> ParseTime(const std::string& text) {
   int hours = 0, minutes = 0, length = 0;
   if (std::sscanf(text.c_str(), "%2d:%2d%n", &hours, &minutes, &length) != 2) return {};

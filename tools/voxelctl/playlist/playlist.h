@@ -1,4 +1,5 @@
-// What a playlist file says, and which of its items is to be on when. Pure.
+// Parses playlist files, and determines which item is due when. Performs no I/O except reading the
+// file.
 //
 //   cross_fade = 2            # seconds between two items; default 1
 //   loop = true               # begin again at the end; default true
@@ -22,19 +23,19 @@
 
 namespace voxeld::voxelctl {
 
-// A place in the week, in minutes since Monday 0:00.
+// A time in the week, in minutes since Monday 0:00.
 using WeekMinute = int;
 inline constexpr WeekMinute kDayMinutes = 24 * 60, kWeekMinutes = 7 * kDayMinutes;
 
 struct Hours {
-  int from = 0, to = kDayMinutes;  // minutes of the day; `to` not after `from`: of the next day
+  int from = 0, to = kDayMinutes;  // minutes of the day; `to` not after `from`: on the next day
   uint8_t days = 0x7F;             // bit 0: Monday
 };
 
 bool IsWithin(const Hours& hours, WeekMinute now);
 
 struct PlaylistItem {
-  std::string file;  // as a path from here
+  std::string file;  // relative to the working directory
   std::optional<double> seconds;
   double speed = 1;
   Hours hours;
@@ -46,13 +47,13 @@ struct Playlist {
   std::vector<PlaylistItem> items;
 };
 
-// InvalidArgument with every fault, one a line, each as "path:line:column: what, the value, what would be right".
-// NotFound if there is no such file.
+// Errors: InvalidArgument with every fault, one per line, each as "path:line:column: what is wrong,
+// the value, what would be valid"; NotFound if the file does not exist.
 absl::StatusOr<Playlist> ReadPlaylist(const std::string& path);
 absl::StatusOr<Playlist> ParsePlaylist(std::string_view text, const std::string& path);
 
-// The item that comes after `after` (none: from the first), of those whose hours it is; nothing: there is none.
-// Without `loop`, nothing too once the last has been.
+// Returns the item after `after` (nothing: the first) whose hours include `now`; nothing if there
+// is none. Without `loop`, also nothing after the last item.
 std::optional<size_t> NextItem(const Playlist& playlist, std::optional<size_t> after,
                                WeekMinute now);
 

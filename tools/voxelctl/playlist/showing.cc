@@ -9,16 +9,16 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr double kLeastLength = 0.1;  // seconds; what is shorter is not played over and over
+constexpr double kLeastLength = 0.1;  // seconds; a shorter recording is not repeated
 constexpr double kMostWait = 1e8;     // seconds
 
-// What a file has.
+// The contents of a file.
 struct Contents {
   bool changes = false;   // more than one state
-  bool entities = false;  // in any of them
+  bool entities = false;  // in any of the states
 };
 
-// Reads as far as it takes to know. Errors: what is wrong with the file.
+// Reads as much as is needed to know. Errors: what is wrong with the file.
 absl::StatusOr<Contents> ContentsOf(recording::McapReader& reader) {
   int sets = 0;
   Contents contents;
@@ -32,7 +32,7 @@ absl::StatusOr<Contents> ContentsOf(recording::McapReader& reader) {
   return contents;
 }
 
-// An item's file, opened, and what it takes to play it.
+// An opened file of an item, with everything that is needed to play it.
 struct Opened {
   std::unique_ptr<recording::McapReader> reader;
   uint64_t start_ns = 0;
@@ -127,10 +127,11 @@ void Showing::Run() {
     status_ = status;
     last = std::exchange(playback_, nullptr);
   }
-  if (last != nullptr) (void)last->End();  // on its way out
+  if (last != nullptr) (void)last->End();  // it is ending anyway
 }
 
-// Through the file; Cancelled when it is to stop. What the time before has put up goes when the first state is there.
+// Plays the file once; Cancelled when it is to stop. The contents of the previous round are removed
+// once the first state is shown.
 absl::Status Showing::PlayOnce() {
   double opacity = 0;
   {
@@ -161,14 +162,15 @@ absl::Status Showing::PlayOnce() {
     if (wrong.ok() && std::exchange(first, false)) {
       const sync::MutexLock lock(mutex_);
       before = std::exchange(playback_, playback);
-      if (opacity_ != opacity) wrong = playback->SetOpacity(opacity_);  // told while it came up
+      // It was set while the first state was being sent.
+      if (opacity_ != opacity) wrong = playback->SetOpacity(opacity_);
     }
     if (before != nullptr && wrong.ok()) wrong = std::exchange(before, nullptr)->End();
     return wrong.ok();
   });
   if (!wrong.ok()) return wrong;
   if (!read.ok()) return read;
-  // One state stays up until it is told to go.
+  // A single state stays until it is stopped.
   if (still_) (void)AwaitOrStop(sync::kNever);
   return absl::OkStatus();
 }

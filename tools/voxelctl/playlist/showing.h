@@ -1,4 +1,5 @@
-// One item of a playlist on its way: a recording that plays by itself, as bright as it is told.
+// One playing item of a playlist: a recording that plays on its own thread, with an adjustable
+// opacity.
 #pragma once
 
 #include <cstdint>
@@ -17,38 +18,40 @@
 
 namespace voxeld::voxelctl {
 
-// What is wrong with an item's file, or with its item for such a file: what would have it passed over.
+// Returns what is wrong with an item's file, or with the item for that file; such an item would be
+// skipped.
 absl::Status CheckPlayable(const PlaylistItem& item);
 
 // Thread-safe.
 class Showing {
  public:
-  // Opens the file, and plays it from now on, on a thread of its own, over and over, in sessions whose `opacity` is the first. What
-  // is wrong with the file. `connection` and `clock` outlive it.
+  // Opens the file and plays it repeatedly on a separate thread, in sessions that begin with
+  // `opacity`. `connection` and `clock` must outlive the object. Errors: what is wrong with the
+  // file.
   static absl::StatusOr<std::unique_ptr<Showing>> Begin(const PlaylistItem& item, double opacity,
                                                         Connection& connection, sync::Clock& clock);
-  ~Showing();  // what is up goes
+  ~Showing();  // removes what is shown
   Showing(const Showing&) = delete;
   Showing& operator=(const Showing&) = delete;
 
   absl::Status SetOpacity(double opacity);
-  // How long it is to be on, in seconds; and whether that is as long as the recording itself is.
+  // Return how long it is to be shown, in seconds, and whether that is the recording's own length.
   double seconds() const { return seconds_; }
   bool of_its_own_length() const { return !item_.seconds.has_value(); }
-  // Its first state is to be seen.
+  // Returns whether its first state is visible.
   bool up() const;
-  // A state of the scene, and nothing that changes.
+  // Returns whether it is a single state of the scene without changes.
   bool still() const { return still_; }
-  // No entity is in any of its states.
+  // Returns whether none of its states contains an entity.
   bool empty() const { return empty_; }
-  // Why it does not play any more; OK: it does.
+  // Returns why it has stopped playing; OK as long as it plays.
   absl::Status status() const;
 
  private:
   Showing(const PlaylistItem& item, double opacity, Connection& connection, sync::Clock& clock);
   void Run();
   absl::Status PlayOnce();
-  bool AwaitOrStop(sync::TimeNs due);  // false: it is to stop
+  bool AwaitOrStop(sync::TimeNs due);  // returns false if it is to stop
 
   const PlaylistItem item_;
   Connection& connection_;

@@ -1,4 +1,4 @@
-// Ctrl-C and SIGTERM as an event that waits can end on.
+// Ctrl-C and SIGTERM as an event that ends waits.
 #pragma once
 
 #include <atomic>
@@ -13,8 +13,8 @@
 namespace voxeld::voxelctl {
 
 // Thread-safe. With `watch_signals`, the constructor blocks SIGINT and SIGTERM in the calling
-// thread, so make it before any other thread; a thread of its own takes them. The second one ends
-// the process at once with 130.
+// thread, so make it before any other thread; a thread of its own receives them. The second signal
+// terminates the process immediately with 130.
 class Interrupt {
  public:
   enum class Watch : uint8_t { kNothing, kSignals };
@@ -25,15 +25,16 @@ class Interrupt {
 
   bool requested() const { return requested_.load(); }
 
-  // As a signal would.
+  // Has the same effect as a signal.
   void Request() VOXELD_EXCLUDES(mutex_);
 
-  // Until it is requested or `deadline` (of `clock`) has come. True: it was requested.
+  // Waits until it is requested or `deadline` (of `clock`) has passed. Returns true if it was
+  // requested.
   bool WaitUntil(sync::Clock& clock, sync::TimeNs deadline) VOXELD_EXCLUDES(mutex_);
 
-  // `listener` is called at the first request, on whatever thread makes it, or at once
-  // if that has been. It must not call back into this object.
-  // RemoveListener returns when no call of it is in progress.
+  // Calls `listener` at the first request, on the thread that makes it, or immediately if that has
+  // already happened. The listener must not call back into this object. RemoveListener returns when
+  // no call of the listener is in progress.
   int AddListener(std::function<void()> listener) VOXELD_EXCLUDES(mutex_);
   void RemoveListener(int id) VOXELD_EXCLUDES(mutex_);
 

@@ -22,9 +22,10 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// How often voxels are lit in one volume: of each number how many voxels.
+// How evenly voxels are lit in one volume: for each number of times, how many voxels are lit that
+// often.
 struct Evenness {
-  std::map<uint64_t, uint64_t> voxels;  // by how many pixels have them in full
+  std::map<uint64_t, uint64_t> voxels;  // by how many pixels contain them completely
   uint64_t all = 0;
 
   uint64_t reached() const {
@@ -32,7 +33,7 @@ struct Evenness {
     return all - (none == voxels.end() ? 0 : none->second);
   }
   double Share() const { return static_cast<double>(reached()) / static_cast<double>(all); }
-  // Of the voxels that are reached at all, the number at `share` of them by rank.
+  // Returns the count at rank `share` among the voxels that are reached at all.
   uint64_t Quantile(double share) const {
     auto left = static_cast<double>(reached()) * share;
     for (const auto& [count, number] : voxels) {
@@ -44,14 +45,15 @@ struct Evenness {
   }
 };
 
-// A table is a product: of each outer place and each inner one, by set. Nothing of grids that are too large to go through.
+// A table is a product of outer and inner places, by set. Returns nothing for grids that are too
+// large to iterate over.
 std::optional<Evenness> EvennessOf(const display::FootprintTable& table,
                                    const display::VoxelGrid& grid) {
   const size_t n[3] = {static_cast<size_t>(grid.nx), static_cast<size_t>(grid.ny),
                        static_cast<size_t>(grid.nz)};
   const auto sets = static_cast<size_t>(table.inner_sets);
   const auto axis = static_cast<size_t>(table.inner_axis);
-  const bool whole = table.inner.entries.size() == 1;  // outer entries lie along all three
+  const bool whole = table.inner.entries.size() == 1;  // outer entries extend along all three axes
   const size_t cells = whole ? 1 : n[axis];
   constexpr uint64_t kMostPlaces = uint64_t{1} << 27, kMostVoxels = uint64_t{1} << 31;
   if (uint64_t{n[0]} * n[1] * n[2] > kMostVoxels ||
@@ -102,7 +104,7 @@ const char* ShapeOf(const display::Geometry& geometry) {
   return kNames[geometry.shape.index()];
 }
 
-// As the daemon reads it: what is its own first, the rest is the driver's.
+// Splits the options as the daemon does: its own first, the rest is the driver's.
 absl::StatusOr<display::DisplayInfo> InfoOf(const std::string& name,
                                             const display::Profile& profile) {
   display::DisplayOptions given{name, profile.driver, profile.options};

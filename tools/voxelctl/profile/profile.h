@@ -1,4 +1,4 @@
-// The command `profile`: what a display's description comes to, without a daemon or a device.
+// The command `profile`: shows the result of a display's description, without a daemon or a device.
 #pragma once
 
 #include <string>
@@ -10,10 +10,11 @@
 
 namespace voxeld::voxelctl {
 
-// InvalidArgument: the profile is wrong, with the field, its value and what would be right. NotFound: there is none of that name.
+// Errors: InvalidArgument if the profile is wrong, with the field, its value and what would be
+// valid; NotFound if no profile has that name.
 absl::Status ShowProfile(const ProfileOptions& options, Console& console);
 
-// Those that are installed.
+// Returns the installed profiles.
 std::vector<std::string> ProfileNames();
 
 }  // namespace voxeld::voxelctl

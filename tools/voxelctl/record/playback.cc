@@ -65,7 +65,7 @@ absl::StatusOr<uint64_t> Playback::Put(const v1::WatchSceneResponse& changes) {
   }
   const absl::StatusOr<v1::Accepted> accepted = stream_->Commit();
   if (!accepted.ok()) return accepted.status();
-  // Empty by now, and to be made anew where they come again.
+  // These layers are empty now, and are created again if they reappear.
   for (const std::string& layer : scene_.TakeEmptied()) {
     own_opacity_.erase(layer);
     v1::ClearLayerRequest clear;

@@ -1,4 +1,4 @@
-// A recorded scene that is put up in a session of its own, change set by change set.
+// Plays a recorded scene in a session of its own, change set by change set.
 #pragma once
 
 #include <cstdint>
@@ -17,8 +17,8 @@
 
 namespace voxeld::voxelctl {
 
-// What a recording is called in the scene: its file's name without folder and ending, not longer than fits into the
-// names of sessions and layers; fit for a terminal.
+// Returns a recording's name in the scene: its file's name without folder and extension, short
+// enough for names of sessions and layers, and escaped for a terminal.
 std::string RecordingName(const std::string& file);
 
 // Thread-safe. Statuses are the server's.
@@ -26,25 +26,26 @@ class Playback {
  public:
   struct Options {
     std::string client_name;
-    std::string layer_prefix;  // of the names of its layers
-    bool keep = false;         // what is up at the end stays
+    std::string layer_prefix;  // prefix of its layers' names
+    bool keep = false;         // keeps the final state in the scene
     double opacity = 1;
   };
-  // `connection` outlives it.
+  // `connection` must outlive the object.
   static absl::StatusOr<std::unique_ptr<Playback>> Begin(const Options& options,
                                                          Connection& connection);
 
-  // Only remembers: the next Put leads to the whole scene.
+  // Records the changes only: the next Put then leads to the whole scene.
   void Skip(const v1::WatchSceneResponse& changes);
-  // In one commit; answers its snapshot.
+  // Commits the changes at once. Returns: the snapshot.
   absl::StatusOr<uint64_t> Put(const v1::WatchSceneResponse& changes);
-  // Of all that it has put up and will: each layer's own times `opacity`, from 0 to 1. In one commit.
+  // Multiplies the opacity of all its present and future layers by `opacity`, from 0 to 1, in one
+  // commit.
   absl::Status SetOpacity(double opacity);
-  // What the server said of what was put up since this was asked last.
+  // Returns the server's issues since the previous call.
   std::vector<v1::Issue> TakeIssues();
-  // What is up goes, unless it is to stay.
+  // Removes its contents unless they are to be kept.
   absl::Status End();
-  uint64_t owner() const;  // whose layers they are
+  uint64_t owner() const;  // the owner of its layers
 
  private:
   Playback(const Options& options, Connection& connection)
@@ -57,7 +58,7 @@ class Playback {
   bool skipped_ VOXELD_GUARDED_BY(mutex_) = false;
   double opacity_ VOXELD_GUARDED_BY(mutex_);
   std::map<std::string, uint32_t> own_opacity_
-      VOXELD_GUARDED_BY(mutex_);  // by the layer's name here
+      VOXELD_GUARDED_BY(mutex_);  // by the layer's name in the scene
   Connection& connection_;
 };
 

@@ -26,7 +26,7 @@ uint64_t UnixNs() {
                                    .count());
 }
 
-// The file, and a thread that puts on the disk what has waited, also when nothing more comes.
+// The file, and a thread that syncs waiting messages to the disk even if no more arrive.
 class Taping {
  public:
   Taping(std::unique_ptr<recording::SceneRecorder> recorder, double duration_s,
@@ -70,7 +70,7 @@ class Taping {
     sync::MutexLock lock(mutex_);
     while (!stop_) {
       if (status_.ok()) status_ = recorder_->Tick(UnixNs());
-      // The watch may have nothing to tell for long.
+      // The watch may be silent for a long time.
       if (over() || !status_.ok()) interrupt_.Request();
       clock_.WaitUntil(mutex_, changed_,
                        std::min(clock_.Now() + kTick, end_.value_or(sync::kNever)));
@@ -103,7 +103,7 @@ absl::Status Record(const RecordOptions& options, const Connector& connect, Inte
   v1::WatchSceneRequest request;
   request.set_contents(true);
   absl::Status wrong;
-  uint64_t entities = 0;  // that came, new or changed
+  uint64_t entities = 0;  // added or changed
   absl::Status status = connection.WatchScene(request, [&](const v1::WatchSceneResponse& message) {
     wrong = taping.Add(message);
     entities += static_cast<uint64_t>(message.entities_size());
@@ -114,7 +114,7 @@ absl::Status Record(const RecordOptions& options, const Connector& connect, Inte
   console.EndProgress();
   if (wrong.ok()) wrong = taping.Close();
   if (!wrong.ok()) return {wrong.code(), EscapeForTerminal(wrong.message())};
-  // The end that was wanted.
+  // This is the intended end.
   if (absl::IsCancelled(status) && interrupt.requested()) status = absl::OkStatus();
   if (console.json()) {
     console.Data(nlohmann::ordered_json{{"file", options.file},

@@ -1,4 +1,4 @@
-// voxelctl record and replay: a daemon's scene into a file, and from it again.
+// voxelctl record and replay: write a daemon's scene to a file, and play it from there.
 #pragma once
 
 #include <istream>
@@ -11,14 +11,15 @@
 
 namespace voxeld::voxelctl {
 
-// Until an interrupt, which is no error, or the duration's end. What a kill of this process loses is the last
-// second at most. With --json one object at the end: change sets, bytes.
+// Records until an interrupt, which is not an error, or until the duration has elapsed. Killing
+// this process loses at most the last second. With --json it writes one object at the end: change
+// sets, bytes.
 absl::Status Record(const RecordOptions& options, const Connector& connect, Interrupt& interrupt,
                     Console& console);
 
-// At the pace at which it was recorded, or by a line of `in` for each change set. What it put up goes at the
-// end, unless it is to stay. With --json a line for each change set: its time in the file, the snapshot that it
-// was, the one that it is now.
+// Plays at the recorded pace, or one change set for each line of `in`. Removes its contents at the
+// end unless they are to be kept. With --json it writes a line for each change set: its time in the
+// file, the recorded snapshot, and the new snapshot.
 absl::Status Replay(const ReplayOptions& options, const Connector& connect, Interrupt& interrupt,
                     std::istream& in, Console& console);
 

@@ -1,4 +1,4 @@
-// The commands of recordings where VOXELD_RECORDING is off.
+// The commands for recordings if VOXELD_RECORDING is off.
 #include "tools/voxelctl/playlist/play_list.h"
 #include "tools/voxelctl/record/record.h"
 #include "tools/voxelctl/text/not_built.h"

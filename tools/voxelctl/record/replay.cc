@@ -41,7 +41,7 @@ std::string Announcement(const ReplayOptions& options, double seconds) {
   return text;
 }
 
-// One run through the file, and what it has put up.
+// One run through the file, and what it shows.
 class Run {
  public:
   Run(const ReplayOptions& options, const recording::McapSummary& summary, Connection& connection,
@@ -66,7 +66,7 @@ class Run {
                         connection_);
     if (!playback.ok()) return playback.status();
     playback_ = *std::move(playback);
-    // Who has a token has one owner, in whose layers the same names come again.
+    // With a token there is only one owner, in whose layers the same names reappear.
     const auto others = std::stable_partition(
         before->begin(), before->end(),
         [&](const OwnedLayer& layer) { return layer.owner == playback_->owner(); });
@@ -99,7 +99,7 @@ class Run {
 
   uint64_t changes() const { return changes_; }
 
-  // With --step, after one more line: what is up goes then.
+  // With --step it waits for one more line before the contents are removed.
   absl::Status End() {
     if (options_.step) {
       if (absl::Status status = Await(0); !status.ok()) return status;
@@ -110,7 +110,7 @@ class Run {
  private:
   static constexpr size_t kMostSaid = 20;
 
-  // What a replay of the file before this has left, when what is to be in its place is up.
+  // Removes what a previous replay of the file has left, once its replacement is shown.
   absl::Status TakeBeforeDown() {
     if (before_.empty()) return absl::OkStatus();
     const absl::StatusOr<TakenDown> taken = TakeDown(std::exchange(before_, {}), connection_);

@@ -9,7 +9,7 @@ namespace {
 
 using display::Vec3;
 
-constexpr double kDistance = 3.4;  // in radii of the outline's sphere
+constexpr double kDistance = 3.4;  // in radii of the outline's bounding sphere
 constexpr int kViewsAround = 360;
 constexpr double kFill = 0.92;  // of the picture's width or height
 

@@ -1,4 +1,4 @@
-// Where a picture of a display is taken from. Millimetres in, picture elements out.
+// The camera for a picture of a display. Input is in millimetres, output in picture elements.
 #pragma once
 
 #include <span>
@@ -8,31 +8,32 @@
 namespace voxeld::voxelctl {
 
 struct ViewAngles {
-  // The viewer stands in front (towards −y) at 0 and walks to the right,
-  // counter-clockwise seen from above.
+  // At 0 the viewer is in front (towards −y), and moves to the right, counter-clockwise seen from
+  // above.
   double azimuth_degrees = 24;
   double elevation_degrees = 20;  // above the horizon, −89 to 89
 };
 
-// A pinhole. Camera space: x to the right, y up, z away from the viewer.
+// A pinhole camera. In camera space x points to the right, y up, and z away from the viewer.
 class Camera {
  public:
-  // Looks at the middle of `outline` from a distance in proportion to its size,
-  // so near that depth can be told, and frames all of it in width·height elements
-  // with a margin: all that can be seen at this elevation from any side where it is
-  // to walk `around`, so that nothing grows and shrinks. `outline` is not empty.
+  // Looks at the centre of `outline` from a distance in proportion to its size, close enough to
+  // show depth, and fits all of it into width·height elements with a margin. With `around`, it fits
+  // everything that is visible from any side at this elevation, so that the size is constant while
+  // the camera moves around. Requires: `outline` is not empty.
   Camera(const ViewAngles& angles, std::span<const display::Vec3> outline, int width, int height,
          bool around = false);
 
   display::Vec3 ToCamera(const display::Vec3& point) const;
   display::Vec3 Rotate(const display::Vec3& direction) const;
 
-  // Elements from the picture's left and top edge, of a point in camera space; z must be > 0.
+  // Return elements from the picture's left and top edge for a point in camera space. Requires: z >
+  // 0.
   double ScreenX(const display::Vec3& p) const { return middle_x_ + focal_ * p.x / p.z; }
   double ScreenY(const display::Vec3& p) const { return middle_y_ - focal_ * p.y / p.z; }
   double focal() const { return focal_; }
 
-  // 0 at the nearest that the outline's sphere reaches, 1 at its farthest.
+  // Returns 0 at the nearest point of the outline's bounding sphere, 1 at its farthest.
   double Depth(const display::Vec3& p) const { return (p.z - distance_ + radius_) / (2 * radius_); }
 
  private:

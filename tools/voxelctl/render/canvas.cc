@@ -9,8 +9,8 @@ namespace {
 constexpr Light kBackground = {0.0035f, 0.0045f, 0.0075f};
 constexpr float kSurfaceShare = 0.80f;
 constexpr float kGlowShare = 0.42f;
-constexpr float kGlowDensity = 0.10f;  // how soon many layers of glow become opaque
-constexpr double kGlowReach = 1.9;     // of a splat's size
+constexpr float kGlowDensity = 0.10f;  // how quickly layers of glow become opaque
+constexpr double kGlowReach = 1.9;     // in sizes of a splat
 constexpr float kLineBehind = 0.25f;
 
 uint8_t Encode(float linear) {

@@ -1,4 +1,4 @@
-// Where splats and lines meet: light in floating point, with depth.
+// Combines splats and lines: light in floating point, with depth.
 #pragma once
 
 #include <array>
@@ -9,39 +9,39 @@
 
 namespace voxeld::voxelctl {
 
-// Linear light, 1 is full.
+// Linear light; 1 is full.
 struct Light {
   float r = 0, g = 0, b = 0;
 };
 
-// A splat's shape on the screen: the ellipse d with dᵀ·C⁻¹·d ≤ 1, C = (xx xy; xy yy).
+// A splat's shape on the screen: the ellipse of d with dᵀ·C⁻¹·d ≤ 1, C = (xx xy; xy yy).
 struct Ellipse {
   double x = 0, y = 0;
   double xx = 1, xy = 0, yy = 1;
 };
 
-// Two layers: the surface that is nearest, and a glow of all that lies along the line of sight, as
-// a display without occlusion has it. Not thread-safe.
+// Two layers: the nearest surface, and a glow of everything along the line of sight, as in a
+// display without occlusion. Not thread-safe.
 class Canvas {
  public:
   Canvas(int width, int height);
 
-  // The nearest splat of a pixel is its surface; each adds to the glow,
-  // with a soft edge, by `weight`.
+  // Adds a splat. The nearest splat of a pixel is its surface; each adds to the glow, with a soft
+  // edge, weighted by `weight`.
   void Splat(const Ellipse& shape, float depth, const Light& light, float weight);
 
-  // `thickness` elements wide, over what lies behind;
-  // where a surface is nearer it shines through faintly.
+  // Draws a line `thickness` elements wide over what is behind it; a nearer surface leaves it
+  // faintly visible.
   void Line(double x0, double y0, float depth0, double x1, double y1, float depth1,
             double thickness, const Light& light);
 
-  // Brings both layers together, averages factor·factor elements to a pixel, encodes as sRGB.
+  // Combines both layers, averages factor·factor elements per pixel, and encodes as sRGB.
   Image Develop(int factor) const;
 
  private:
   struct Element {
     Light surface;
-    float depth = 2;  // farther than anything
+    float depth = 2;  // farther than everything
     Light glow;       // weighted sum
     float glow_weight = 0;
     Light line;

@@ -13,13 +13,13 @@ constexpr int kGap = 2;
 constexpr int kMostPixels = 8192;
 constexpr uint8_t kFrame[3] = {34, 38, 46};
 
-// Columns for a sheet about as wide as 3 to 2.
+// Returns the number of columns for a sheet of about 3 to 2.
 int Columns(const Volume& volume, int cell_width, int cell_height) {
   const double columns = std::sqrt(1.5 * volume.slices * cell_height / cell_width);
   return std::clamp(static_cast<int>(std::lround(columns)), 1, volume.slices);
 }
 
-// A lattice's slices as pictures that are about square, each light a square too.
+// Returns a lattice's slices as pictures that are about square, with square lights.
 Volume Folded(const Volume& volume) {
   constexpr double kPixelsWanted = 1 << 20;
   const double lights = static_cast<double>(volume.slices) * volume.width;

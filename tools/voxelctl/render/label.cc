@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kShade = 208, kHalfWidth = 0.9;
 
-// Pixels about a stroke, by how much of them it covers.
+// Draws a stroke: pixels near it are blended by the share that it covers.
 void DrawStroke(double x0, double y0, double x1, double y1, Image& image) {
   const double dx = x1 - x0, dy = y1 - y0, length2 = std::max(1e-9, dx * dx + dy * dy);
   const auto clamp = [](double v, int size) {

@@ -1,4 +1,4 @@
-// Words in pictures.
+// Text in pictures.
 #pragma once
 
 #include <string_view>
@@ -8,7 +8,8 @@
 
 namespace voxeld::voxelctl {
 
-// Capitals `height` pixels high, from (x, y), the baseline's left end, in light grey over what is there.
+// Draws capitals `height` pixels high, from (x, y), the left end of the baseline, in light grey
+// over the existing picture.
 void DrawLabel(const text::StrokeFont& font, std::string_view ascii, double x, double y,
                double height, Image& image);
 

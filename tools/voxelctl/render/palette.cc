@@ -10,7 +10,7 @@ struct Counted {
   uint64_t pixels = 0;
 };
 
-// A run of the colours, and along which channel they differ most.
+// A range of the colours, and the channel in which they differ most.
 struct Group {
   size_t begin = 0, end = 0;
   int channel = 0, range = 0;
@@ -32,7 +32,8 @@ struct Group {
   }
 };
 
-// Where about half of the group's pixels are on either side, and at least a colour: it has two or more.
+// Returns the index that divides the group's pixels about in half, with at least one colour on
+// either side. Requires: two or more colours.
 size_t Middle(const std::vector<Counted>& colors, const Group& group) {
   uint64_t all = 0, before = 0;
   for (size_t i = group.begin; i < group.end; ++i) all += colors[i].pixels;
@@ -58,7 +59,7 @@ Color8 Mean(const std::vector<Counted>& colors, const Group& group) {
 }  // namespace
 
 void ColorCount::Add(const Image& image) {
-  // Pictures are mostly runs of one colour.
+  // Pictures consist mostly of runs of one colour.
   uint32_t last = 0;
   uint64_t* count = nullptr;
   for (size_t i = 0; i < image.rgb.size(); i += 3) {

@@ -1,4 +1,4 @@
-// Pictures with few colours, which take little on disk.
+// Pictures with few colours, which need little disk space.
 #pragma once
 
 #include <array>
@@ -15,19 +15,20 @@ using Color8 = std::array<uint8_t, 3>;
 struct PaletteImage {
   int width = 0, height = 0;
   std::vector<Color8> colors;    // at most 256
-  std::vector<uint8_t> indices;  // of each pixel, in an Image's order
+  std::vector<uint8_t> indices;  // per pixel, in an Image's order
 };
 
-// Which colours there are, and how often; of as many pictures as are added. Not thread-safe.
+// Counts how often each colour occurs in all added pictures. Not thread-safe.
 class ColorCount {
  public:
   void Add(const Color8& color) { ++pixels_[Key(color)]; }
   void Add(const Image& image);
 
-  // Means of those that are alike (median cut: Heckbert, "Color image quantization for frame buffer display", 1982),
-  // at most `most` (1 to 256); the colours themselves if there are no more of them.
+  // Returns means of similar colours (median cut: Heckbert, "Color image quantization for frame
+  // buffer display", 1982), at most `most` (1 to 256); the colours themselves if there are no more
+  // than that.
   std::vector<Color8> Cut(int most) const;
-  // The same; the place in it of what each colour became.
+  // Does the same, and stores in `places` the palette index of each colour.
   std::vector<Color8> Cut(int most, absl::flat_hash_map<uint32_t, uint8_t>* places) const;
 
   static uint32_t Key(const Color8& c) {
@@ -38,7 +39,7 @@ class ColorCount {
   absl::flat_hash_map<uint32_t, uint64_t> pixels_;
 };
 
-// With at most `most` colours, 1 to 256, as ColorCount cuts them.
+// Reduces a picture to at most `most` colours, 1 to 256, as ColorCount selects them.
 PaletteImage ReduceColors(const Image& image, int most);
 
 }  // namespace voxeld::voxelctl

@@ -11,7 +11,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// `png` has size and format; `pixels` and `colors` are as it says.
+// `png` has size and format, which describe `pixels` and `colors`.
 absl::Status Write(const std::string& path, png_image& png, const void* pixels, int stride,
                    const void* colors) {
   png.version = PNG_IMAGE_VERSION;

@@ -1,4 +1,4 @@
-// Pictures on disk.
+// Writes PNG files.
 #pragma once
 
 #include <string>
@@ -9,10 +9,10 @@
 
 namespace voxeld::voxelctl {
 
-// Writes `image` to a temporary file beside `path` and renames it there when it is whole: a reader
-// sees the old picture or the new one. The message of an error begins with the path.
+// Writes `image` to a temporary file beside `path` and renames it to `path` when it is complete: a
+// reader sees either the old picture or the new one. Error messages begin with the path.
 absl::Status WritePng(const std::string& path, const Image& image);
-// The same, with a palette in the file.
+// Does the same, with a palette in the file.
 absl::Status WritePalettePng(const std::string& path, const PaletteImage& image);
 
 }  // namespace voxeld::voxelctl

@@ -21,9 +21,10 @@ using display::Vec3;
 
 constexpr int kSupersampling = 2;
 constexpr double kFarBrightness = 0.22;  // at depth 1; 1 at depth 0
-constexpr double kCellSize = 1.30;       // so that neighbouring cells close up
-constexpr double kBallSize = 0.30;       // a lattice's light, in the least side of its cell
-constexpr double kLeastRadius = 1.1;     // of a splat, in elements
+constexpr double kCellSize = 1.30;       // makes neighbouring cells touch
+// Radius of a lattice's light, in the shortest side of its cell.
+constexpr double kBallSize = 0.30;
+constexpr double kLeastRadius = 1.1;  // of a splat, in elements
 constexpr Light kOutline = {0.050f, 0.075f, 0.115f};
 constexpr int kRingSteps = 96;
 
@@ -75,7 +76,7 @@ std::vector<Edge> Outline(const display::Geometry& geometry) {
   return CylinderOutline(std::min(high.x - low.x, high.y - low.y) / 2, low.z, high.z);
 }
 
-// The slice whose light lies beside that of `slice`; itself if there is none.
+// Returns the slice whose light is beside that of `slice`; `slice` itself without one.
 int32_t Neighbour(const display::Geometry& geometry, int32_t slice, int32_t slices) {
   if (const auto* rotor = std::get_if<display::Rotor>(&geometry.shape)) {
     return (slice + static_cast<int32_t>(rotor->panels.size())) % slices;
@@ -95,7 +96,7 @@ class Painter {
     }
   }
 
-  // Lights of a lattice are points: each a small ball, whatever lies beside it.
+  // Lights of a lattice are points: each is a small ball, whatever is beside it.
   void PaintLights(const display::Lattice& lattice) {
     const double radius =
         kBallSize * std::min({lattice.cell_mm.x, lattice.cell_mm.y, lattice.cell_mm.z});
@@ -114,7 +115,8 @@ class Painter {
     }
   }
 
-  // Pixels that lie in no straight columns: each by itself, as far as half-way to its neighbours.
+  // Paints pixels that are not in straight columns: each one separately, extended half-way to its
+  // neighbours.
   void PaintPixels(int32_t slice) {
     const display::Geometry& geometry = volume_.geometry;
     const display::Corrector corrector(geometry.correction);
@@ -137,11 +139,11 @@ class Painter {
         std::array<Vec3, 3> axes = {half_way(slice, next(u, volume_.width), v),
                                     half_way(slice, u, next(v, volume_.height)),
                                     half_way(beside, u, v)};
-        // Where a blade begins anew its neighbours are far away.
+        // At the start of a blade the neighbours are far away.
         for (Vec3& axis : axes) {
           if (Length2(axis) > far) axis = {};
         }
-        // Where slices crowd, near a rotor's axis, each counts for less of the glow.
+        // Slices are dense near a rotor's axis, so each contributes less to the glow.
         const double crowding = std::sqrt(Length2(axes[2]) / std::max(Length2(axes[0]), 1e-18));
         const bool crowds =
             std::holds_alternative<display::Rotor>(geometry.shape) && beside != slice;
@@ -152,14 +154,15 @@ class Painter {
     }
   }
 
-  // Pixel (u, v) of a slice lies at corner + v·step_v: the columns are straight.
+  // Paints a column of pixels. Pixel (u, v) of a slice is at corner + v·step_v: the columns are
+  // straight.
   void PaintColumn(int32_t slice, int32_t u) {
     const int32_t bottom = FirstLit(slice, u);
     if (bottom < 0) return;
     const display::Geometry& geometry = volume_.geometry;
     const Vec3 base = display::PixelPosition(geometry, slice, u, 0);
     const int32_t beside = Neighbour(geometry, slice, volume_.slices);
-    // Half the way to the next pixel along u, along v, and to the next slice.
+    // Half of the distances to the next pixel along u, along v, and to the next slice.
     std::array<Vec3, 3> axes = {};
     if (volume_.width > 1) {
       const int32_t next = u + 1 < volume_.width ? u + 1 : u - 1;
@@ -169,10 +172,11 @@ class Painter {
     if (volume_.height > 1) step_v = Minus(display::PixelPosition(geometry, slice, u, 1), base);
     axes[1] = Times(step_v, 0.5);
     axes[2] = Times(Minus(display::PixelPosition(geometry, beside, u, 0), base), 0.5);
-    // Where slices crowd, near a rotor's axis, each counts for less of the glow.
+    // Slices are dense near a rotor's axis, so each contributes less to the glow.
     const double crowding = std::sqrt(Length2(axes[2]) / std::max(Length2(axes[0]), 1e-18));
     const auto weight = static_cast<float>(beside == slice ? 1 : std::clamp(crowding, 0.05, 1.0));
-    // The surface is one pixel's; an eye sees the light of all that crowd there, beside what the sparsest have.
+    // The surface shows one pixel, but an eye sees the light of all dense slices together, relative
+    // to the sparsest.
     const bool turns = std::holds_alternative<display::Rotor>(geometry.shape) && beside != slice;
     const double sparse = turns ? SparsestStep(geometry, slice, beside) : 0;
     const double step = std::sqrt(Length2(axes[2]));
@@ -187,7 +191,8 @@ class Painter {
   }
 
  private:
-  // Half the way from a slice's first or last column to the next slice's, whichever is farther.
+  // Returns half of the distance from a slice's first or last column to the next slice's, whichever
+  // is greater.
   double SparsestStep(const display::Geometry& geometry, int32_t slice, int32_t beside) const {
     double most = 0;
     for (const int32_t u : {0, volume_.width - 1}) {
@@ -223,7 +228,7 @@ class Painter {
     }
     const double depth = camera_.Depth(at);
     const auto cue = static_cast<float>(1 + (kFarBrightness - 1) * std::clamp(depth, 0.0, 1.0));
-    // No brighter than full, and of the same colour.
+    // Limited to full brightness, with the same colour.
     const float most = std::max({pixel[0], pixel[1], pixel[2]});
     const float times = std::max(1.0f, std::min(together, 255 / most));
     const auto light = [&](int channel) {
@@ -251,16 +256,16 @@ void DrawOutline(const std::vector<Edge>& edges, const Camera& camera, Canvas* c
 }
 
 struct Stroke {
-  double x0, y0, x1, y1;  // in units of the letter's height, y up, about its middle
+  double x0, y0, x1, y1;  // in units of the letter's height, y up, relative to its centre
 };
 
-// The letters x, y and z are straight lines, so no font is needed.
+// The letters x, y and z consist of straight lines, so no font is needed.
 constexpr std::array<Stroke, 2> kX = {{{-0.35, -0.5, 0.35, 0.5}, {-0.35, 0.5, 0.35, -0.5}}};
 constexpr std::array<Stroke, 3> kY = {{{-0.35, 0.5, 0, 0}, {0.35, 0.5, 0, 0}, {0, 0, 0, -0.5}}};
 constexpr std::array<Stroke, 3> kZ = {
     {{-0.35, 0.5, 0.35, 0.5}, {0.35, 0.5, -0.35, -0.5}, {-0.35, -0.5, 0.35, -0.5}}};
 
-// In the lower left corner: the directions only, seen without perspective.
+// Draws the axes' directions in the lower left corner, without perspective.
 void DrawAxes(const Camera& camera, int width, int height, Canvas* canvas) {
   struct Axis {
     Vec3 direction;

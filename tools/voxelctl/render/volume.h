@@ -1,4 +1,4 @@
-// A volume as it was captured, and a picture. Words only.
+// A captured volume, and a picture. Plain data types only.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 namespace voxeld::voxelctl {
 
-// What a display shows: slices of width·height pixels, row-major, 8-bit RGB.
+// The content of a display: slices of width·height pixels, row-major, 8-bit RGB.
 struct Volume {
   std::string display;
   uint64_t number = 0;

@@ -33,7 +33,7 @@ const Attribute* Find(const Part& part, const std::string& name) {
   return nullptr;
 }
 
-// The numbers of a part's vertices; empty if it has none of that name.
+// Returns the values of a part's vertices; empty if it has no attribute of that name.
 std::vector<double> NumbersOf(const Part& part, const std::string& name) {
   if (const Attribute* attribute = Find(part, name); attribute != nullptr)
     return {attribute->values.begin(), attribute->values.end()};
@@ -114,7 +114,7 @@ absl::StatusOr<Legend> ApplyColorBy(const ColorBy& wanted, std::span<Model> mode
         part->colors.push_back(kWithout);
         continue;
       }
-      // All alike: the middle of the map.
+      // If all values are equal, they get the middle of the map.
       const double at = span > 0 ? std::clamp((number - legend.low) / span, 0.0, 1.0) : 0.5;
       part->colors.push_back(ColorOf((*table)[static_cast<size_t>(std::lround(at * 255))]));
     }

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kDarkest = 44;  // of the brightest channel
 
-// The light comes from the upper left in front (x right, y away, z up); of unit length.
+// The light comes from the upper left in front (x right, y away, z up); a unit vector.
 constexpr Point3 kToLight = {-0.3651, -0.6390, 0.6770};
 constexpr double kShadow = 0.30;
 
@@ -52,7 +52,7 @@ Rgb Shade(const Rgb& c, const Point3& n) {
   return {lit(c.r), lit(c.g), lit(c.b)};
 }
 
-// Each edge of the triangles once.
+// Returns each edge of the triangles once.
 std::vector<uint32_t> Edges(const std::vector<uint32_t>& triangles) {
   std::vector<std::pair<uint32_t, uint32_t>> edges;
   edges.reserve(triangles.size());
@@ -86,14 +86,14 @@ void ApplyFill(FillStyle fill, Part* part) {
 }  // namespace
 
 void ApplyLook(std::span<Model> models, const LookOptions& options) {
-  std::array<size_t, 3> seen = {};  // models with parts of each kind
+  std::array<size_t, 3> seen = {};  // models that have parts of each kind
   for (size_t m = 0; m < models.size(); ++m) {
     const std::array<size_t, 3> number = seen;
     for (const Part& part : models[m].parts)
       seen[static_cast<size_t>(part.kind)] = number[static_cast<size_t>(part.kind)] + 1;
     for (Part& part : models[m].parts) {
       if (part.colors.empty()) {
-        // A picture has its own colours, which these are multiplied by.
+        // A picture's own colours are multiplied by these.
         const Rgb plain = part.picture == kNoPicture
                               ? DefaultColor(part.kind, number[static_cast<size_t>(part.kind)])
                               : Rgb{255, 255, 255};

@@ -1,4 +1,4 @@
-// How models look: which of their elements are drawn, in which colours.
+// The style of models: which of their elements are drawn, and in which colours.
 #pragma once
 
 #include <cstddef>
@@ -12,13 +12,14 @@ enum class FillStyle : uint8_t { kSurface, kLines, kDots };
 
 struct LookOptions {
   FillStyle fill = FillStyle::kSurface;
-  bool flat = false;  // colours as they are, without shading
+  bool flat = false;  // unshaded colours
 };
 
-// Makes every part what `fill` asks for (kLines: each edge of a triangle once; kDots: the vertices;
-// what has no surface stays as it is) and gives every part colours: its own, or a default by kind
-// and place in `models`, shaded by the normals as placed, so call it after PlaceModels. Very dark
-// colours are lifted: light is all that a display can add. Normals are dropped afterwards.
+// Makes every part what `fill` requests (kLines: each edge of a triangle once; kDots: the vertices;
+// parts without a surface stay unchanged). Gives every part colours: its own, or a default by kind
+// and position in `models`. They are shaded by the normals as placed, so call it after PlaceModels.
+// Very dark colours are brightened, because a display can only add light. Normals are dropped
+// afterwards.
 void ApplyLook(std::span<Model> models, const LookOptions& options);
 
 }  // namespace voxeld::voxelctl

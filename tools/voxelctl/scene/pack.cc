@@ -12,28 +12,29 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr uint64_t kPieceBytes = 512 << 10;
-constexpr uint64_t kInstanceBytes = 32;              // of a part that draws another object, about
-constexpr uint64_t kPlaceBytes = 2 * sizeof(float);  // of a vertex on a picture
+// Approximate size of a part that draws another object.
+constexpr uint64_t kInstanceBytes = 32;
+constexpr uint64_t kPlaceBytes = 2 * sizeof(float);  // of a vertex's texture coordinates
 constexpr uint64_t kVertexBytes = 3 * sizeof(float) + 3;
-constexpr uint32_t kMostPictureSide = 4096;        // that every server takes
+constexpr uint32_t kMostPictureSide = 4096;        // that every server accepts
 constexpr uint64_t kMostTexturedBytes = 16 << 20;  // of a piece with a picture
 constexpr uint64_t kMostPictureBytes = 4 << 20;    // that is sent with each piece
-constexpr uint32_t kU16Vertices = 65536;           // of which 16-bit indices can speak
+constexpr uint32_t kU16Vertices = 65536;           // that 16-bit indices can address
 constexpr uint32_t kNone = UINT32_MAX;
 
-// 0 means that the server did not say.
+// 0 means that the server gave no limit.
 uint64_t AtMost(uint64_t wanted, uint64_t limit) {
   return limit == 0 ? wanted : std::min(wanted, limit);
 }
 
-// For the bulk of a message; 0: the server did not say.
+// The maximum for the bulk of a message; 0 if the server gave no limit.
 uint64_t MessageBytes(const client::Limits& limits) {
   return limits.max_message_bytes > 2 * kMessageOverhead
              ? limits.max_message_bytes - kMessageOverhead
              : limits.max_message_bytes;
 }
 
-// Gathers elements of one kind until a piece is full.
+// Collects elements of one kind until a piece is full.
 class Piece {
  public:
   Piece(Kind kind, const client::Limits& limits)
@@ -44,7 +45,8 @@ class Piece {
         most_indices_(AtMost(UINT32_MAX, limits.max_indices_per_entity)) {}
 
   Kind kind() const { return kind_; }
-  // Of all that it holds: a piece is flushed before these change. `picture` is null, or lives as long as the piece.
+  // Sets properties of the whole piece; a piece is flushed before these change. `picture` is null,
+  // or outlives the piece.
   void SetLook(double thickness, const std::string* picture) {
     thickness_ = thickness;
     picture_ = picture;
@@ -56,7 +58,7 @@ class Piece {
   uint64_t vertices() const { return count_; }
   uint64_t indices() const { return index_count_; }
 
-  // Whether an element of `corners` new vertices at most still fits.
+  // Returns whether an element of up to `corners` new vertices still fits.
   bool HasRoom(uint32_t corners) const {
     return count_ + corners <= most_vertices_ && index_count_ + corners <= most_indices_ &&
            bytes() + corners * (kVertexBytes + kPlaceBytes + sizeof(uint16_t)) <= MostBytes();
@@ -83,7 +85,7 @@ class Piece {
            places_.size() * sizeof(float) + (picture_ == nullptr ? 0 : picture_->size());
   }
 
-  // The piece as a shape; leaves this one empty.
+  // Returns the piece as a shape and empties it.
   client::Shape Take() {
     client::Vertices vertices{.positions = std::exchange(positions_, {}),
                               .colors = std::exchange(colors_, {}),
@@ -108,7 +110,7 @@ class Piece {
   }
 
  private:
-  // A picture is sent with each piece, so there should be few of them.
+  // A picture is sent with each piece, so there should be few pieces.
   uint64_t MostBytes() const { return picture_ == nullptr ? most_bytes_ : most_message_bytes_; }
 
   client::Thickness ToThickness() const {
@@ -124,7 +126,7 @@ class Piece {
   std::vector<float> positions_;
   std::vector<uint8_t> colors_;
   std::vector<uint16_t> indices_;
-  std::vector<float> places_;  // on the picture
+  std::vector<float> places_;  // texture coordinates
 };
 
 class Packer {
@@ -173,7 +175,7 @@ class Packer {
     return DefinePiece(std::move(packed->part), packed->bytes);
   }
 
-  // Keeps the first of all notes.
+  // Keeps only the first note.
   void Note(absl::string_view note) {
     if (sizes_.note.empty()) sizes_.note = std::string(note);
   }
@@ -221,7 +223,8 @@ class Packer {
   PackedSizes sizes_;
 };
 
-// Whether a part goes to the server with its picture. Lines and points have none, and a message has room for some of them only.
+// Returns whether a part is sent to the server with its picture. Lines and points have none, and a
+// message has space for only some pictures.
 bool IsSentWithPicture(const Part& part, const Model& model, const client::Limits& limits) {
   if (part.picture == kNoPicture || part.kind != Kind::kTriangles) return false;
   const std::string& picture = model.pictures[part.picture];

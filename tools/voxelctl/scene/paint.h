@@ -1,4 +1,4 @@
-// Colours of a picture at vertices.
+// Applies a picture's colours at vertices.
 #pragma once
 
 #include <string>
@@ -8,8 +8,10 @@
 
 namespace voxeld::voxelctl {
 
-// Returns: the part without its picture, each colour multiplied by the texel at its vertex. The part has colours and places on the
-// picture, a PNG or JPEG file. Between vertices the picture is lost. Errors: InvalidArgument if the picture cannot be read.
+// Returns: the part without its picture, each colour multiplied by the texel at its vertex.
+// Requires: the part has colours and texture coordinates on the picture, which is a PNG or JPEG
+// file. Between vertices the picture is lost. Errors: InvalidArgument if the picture cannot be
+// read.
 absl::StatusOr<Part> PaintVertices(const Part& part, const std::string& picture);
 
 }  // namespace voxeld::voxelctl

@@ -12,7 +12,7 @@ namespace voxeld::voxelctl {
 namespace {
 
 constexpr double kMargin = 0.97;       // the outermost voxels stay free
-constexpr double kInsideGlobe = 0.62;  // of its radius
+constexpr double kInsideGlobe = 0.62;  // share of its radius
 
 struct Bounds {
   Point3 min{HUGE_VAL, HUGE_VAL, HUGE_VAL};
@@ -22,7 +22,7 @@ struct Bounds {
     min = {std::min(min.x, p.x - r), std::min(min.y, p.y - r), std::min(min.z, p.z - r)};
     max = {std::max(max.x, p.x + r), std::max(max.y, p.y + r), std::max(max.z, p.z + r)};
   }
-  // Halves first: their sum stays finite.
+  // Halves each first, so that the sum stays finite.
   Point3 Center() const {
     return {min.x / 2 + max.x / 2, min.y / 2 + max.y / 2, min.z / 2 + max.z / 2};
   }
@@ -41,7 +41,7 @@ Point3 Upright(const Point3& p, Up up) {
   return p;
 }
 
-// How far a group of models reaches from its centre.
+// How far a group of models extends from its centre.
 struct Reach {
   double x = 0, y = 0, z = 0;
   double radius = 0;  // about the vertical axis
@@ -81,7 +81,7 @@ void ForEachPosition(std::span<Model*> group, Visit visit) {
   }
 }
 
-// What is thick reaches beyond its positions.
+// Thick elements extend beyond their positions.
 template <typename Visit>
 void ForEachReach(std::span<Model*> group, Visit visit) {
   for (Model* model : group) {
@@ -139,7 +139,7 @@ absl::StatusOr<DisplaySpace> VisibleSpace(int nx, int ny, int nz, const gpu::Aff
   const std::array<double, 3> half_voxels = {nx / 2.0, ny / 2.0, nz / 2.0};
   const std::array<double, 3> offset = {half_voxels[0] - m[3], half_voxels[1] - m[7],
                                         half_voxels[2] - m[11]};
-  // The centre: the inverse of the linear part by cofactors.
+  // The centre, from the inverse of the linear part by cofactors.
   const auto inverse_row = [&](size_t r) {
     const size_t a = (r + 1) % 3, b = (r + 2) % 3;
     double sum = 0;
@@ -201,7 +201,7 @@ void PlaceModels(std::span<Model> models, const DisplaySpace& space,
   for (std::vector<Model*>& group : groups) {
     Center(group);
     const Reach first = Measure(group);
-    // To unit size first: neither huge nor tiny units lose the ratios below.
+    // Scales to unit size first, so that neither huge nor tiny units lose the ratios below.
     if (first.sphere > 0) Scale(group, 1 / first.sphere);
     const Reach reach = Measure(group);
     Scale(group, has_globe ? Ratio(globe * kInsideGlobe, std::max(reach.sphere, 1e-9))

@@ -1,4 +1,4 @@
-// From a file's axes and units into a display: upright, centred, as large as fits.
+// Maps a file's axes and units into a display: upright, centred, as large as fits.
 #pragma once
 
 #include <cmath>
@@ -17,36 +17,38 @@ struct DisplaySpace {
   bool round = false;
 };
 
-// Of a display with nx·ny·nz voxels that shows the scene through `scene_to_voxel`. A view that
-// turns the scene gets the cube that fits inside. InvalidArgument if the map is singular.
+// Returns the space of a display with nx·ny·nz voxels that shows the scene through
+// `scene_to_voxel`. A view that rotates the scene gets the cube that fits inside. Errors:
+// InvalidArgument if the map is singular.
 absl::StatusOr<DisplaySpace> VisibleSpace(int nx, int ny, int nz, const gpu::Affine& scene_to_voxel,
                                           bool round);
 
-// What both show; `a` if that is nothing.
+// Returns the space that both show; `a` if that is empty.
 DisplaySpace Intersection(const DisplaySpace& a, const DisplaySpace& b);
 
 struct PlacementOptions {
   Up up = Up::kAuto;  // kAuto: each format's own
-  bool spin = false;  // leaves room to turn about the vertical axis
-  // Every model is fitted by itself; otherwise all share one space, as parts of one thing.
+  bool spin = false;  // reserves space for rotation about the vertical axis
+  // Fits every model separately; otherwise all share one space, as parts of one object.
   bool each = false;
 };
 
-// Turns, centres and scales the models' vertices in place, so that moved to space.center (and
-// turned about z) they lie within `space`. Globes keep their centre. Meshes beside a globe come
-// inside it. Every model must have a vertex.
+// Rotates, centres and scales the models' vertices in place, so that they lie within `space` when
+// moved to space.center (and rotated about z). Globes keep their centre. Meshes beside a globe are
+// placed inside it. Requires: every model has a vertex.
 void PlaceModels(std::span<Model> models, const DisplaySpace& space,
                  const PlacementOptions& options);
 
-// One place for models that follow one another: the same map for each, so that they move as they do among themselves.
+// One placement for successive models: the same map for each, so their relative motion is
+// preserved.
 class FramePlacement {
  public:
   explicit FramePlacement(Up up) : up_(up) {}
-  // Takes a model's reach in, before Fit. A few of many are enough where frames are much alike.
+  // Includes a model's extent, before Fit. If frames are similar, a few of many are enough.
   void Measure(const Model& model);
-  // Finds the map that puts all that was measured into `space`, as PlaceModels would.
+  // Computes the map that fits everything measured into `space`, as PlaceModels would.
   void Fit(const DisplaySpace& space, bool spin);
-  // Turns and moves a model's vertices in place.
+  // Rotates and moves a model's vertices in place.
   void Place(Model* model) const;
 
  private:
@@ -55,7 +57,7 @@ class FramePlacement {
   double scale_ = 1;
 };
 
-// To space.center, after a turn about z: the map of an instance.
+// Returns the map of an instance: to space.center, after a rotation about z.
 gpu::Affine InstanceTransform(const DisplaySpace& space, double turns);
 
 }  // namespace voxeld::voxelctl

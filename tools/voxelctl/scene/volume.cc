@@ -11,8 +11,8 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr uint64_t kBesideAsset = 64 << 10;  // of a commit that shows an asset
-constexpr uint64_t kMostBytes = 64u << 20;   // where the server names no limit
+constexpr uint64_t kBesideAsset = 64 << 10;  // for the rest of a commit that shows an asset
+constexpr uint64_t kMostBytes = 64u << 20;   // if the server gives no limit
 constexpr uint32_t kMostAlong = 65536;
 constexpr size_t kBins = 1024;
 constexpr double kOutliers = 0.001;
@@ -34,7 +34,8 @@ Range RangeOf(const std::vector<float>& samples) {
   return range;
 }
 
-// Otsu: where the two sides' means differ most, weighted by how many they are.
+// Otsu's method: the threshold at which the means of the two sides differ most, weighted by their
+// counts.
 std::array<double, 2> FindWindow(const std::vector<float>& samples, const Range& range) {
   if (!(range.least < range.greatest)) return {range.least - 1, range.least};
   std::vector<uint64_t> counts(kBins);
@@ -67,7 +68,8 @@ std::array<double, 2> FindWindow(const std::vector<float>& samples, const Range&
   return {low, std::max(range.least + static_cast<double>(top) * per_bin, low + per_bin)};
 }
 
-// Samples of a cell along each axis: the cells that are shortest grow first, until so many are left.
+// Returns the samples of a cell along each axis. The shortest cells grow first, until at most
+// `most` remain.
 Size Factors(const SampledVolume& volume, uint64_t most) {
   std::array<double, 3> step;
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -93,7 +95,8 @@ Size Factors(const SampledVolume& volume, uint64_t most) {
   return factors;
 }
 
-// For each cell calls `begin`, `add` with the index of each of its samples, and `end` with how many they are.
+// For each cell, calls `begin`, `add` with the index of each of its samples, and `end` with their
+// number.
 template <typename Begin, typename Add, typename End>
 void ForEachCell(const Size& size, const Size& factors, Begin begin, Add add, End end) {
   const auto& [nx, ny, nz] = size;
@@ -114,7 +117,8 @@ void ForEachCell(const Size& size, const Size& factors, Begin begin, Add add, En
   }
 }
 
-// The mean of each cell's numbers, as whole numbers from 0 at `low`, or where there is none, to their greatest at `high`.
+// Returns the mean of each cell's values as integers: 0 at `low` or without values, the maximum at
+// `high`.
 template <typename T>
 std::vector<T> Quantise(const SampledVolume& volume, const Size& factors, uint64_t count,
                         double low, double high) {
@@ -137,7 +141,7 @@ std::vector<T> Quantise(const SampledVolume& volume, const Size& factors, uint64
   return out;
 }
 
-// Four bytes of each cell, r g b and 255; 0 where all is black.
+// Returns four bytes per cell, r g b and 255; 0 if all is black.
 std::vector<uint8_t> Colors(const SampledVolume& volume, const Size& factors, uint64_t count) {
   std::vector<uint8_t> out;
   out.reserve(count * 4);
@@ -169,13 +173,13 @@ uint64_t BytesEach(const SampledVolume& volume, const VolumeLook& look) {
   return look.level ? 2 : AreColors(volume, look) ? 4 : 1;
 }
 
-// What becomes of bytes that go as an asset.
+// The result of bytes that are sent as an asset.
 struct Brought {
   const AssetSink& upload;
   absl::Status status;
 };
 
-// The numbers themselves, or the asset that they are now.
+// Returns the numbers themselves, or the asset that replaces them.
 template <typename T>
 client::Array<T> ToArray(std::vector<T> numbers, Brought* brought) {
   if (brought == nullptr) return client::Array<T>(std::move(numbers));
@@ -194,7 +198,7 @@ std::array<double, 2> WindowOf(const SampledVolume& volume) {
 
 namespace {
 
-// In so many bytes; `brought`: they go as an asset.
+// Packs the volume into at most `bytes`; with `brought`, they are sent as an asset.
 absl::StatusOr<PackedVolume> PackWithin(const SampledVolume& volume, const VolumeLook& look,
                                         uint64_t bytes, Brought* brought) {
   const bool colors = AreColors(volume, look);
@@ -206,7 +210,7 @@ absl::StatusOr<PackedVolume> PackWithin(const SampledVolume& volume, const Volum
   std::array<Point3, 3> edges;
   for (size_t axis = 0; axis < 3; ++axis) {
     size[axis] = (volume.size[axis] + factors[axis] - 1) / factors[axis];
-    // The last cell may reach beyond the volume.
+    // The last cell may extend beyond the volume.
     const double stretch =
         static_cast<double>(uint64_t{size[axis]} * factors[axis]) / volume.size[axis];
     const Point3 &from = volume.corners[0], &to = volume.corners[size_t{1} << axis];
@@ -261,7 +265,7 @@ absl::StatusOr<PackedVolume> PackWithin(const SampledVolume& volume, const Volum
   client::Transfer transfer;
   transfer.colormap = look.colormap.empty() ? "gray" : look.colormap;
   if (look.colormap.empty()) {
-    // Greys are dark at their beginning already.
+    // Grey maps are already dark at their beginning.
     transfer.values = {0, 1, 255};
     transfer.opacities = {0, 1, 1};
   } else {
@@ -287,7 +291,8 @@ absl::StatusOr<PackedVolume> PackVolume(const SampledVolume& volume, const Volum
   const uint64_t message =
       std::min(samples, beside_all_else(within(within(kMostBytes, limits.max_message_bytes),
                                                limits.max_uncommitted_bytes)));
-  // Until it is committed a server counts an asset twice: its bytes, and what its engines make of them.
+  // Until the commit, a server counts an asset twice: its bytes, and the form that its engines make
+  // of it.
   const uint64_t asset =
       std::min(samples, within(limits.max_asset_bytes,
                                limits.max_uncommitted_bytes > 0

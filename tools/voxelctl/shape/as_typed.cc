@@ -19,7 +19,7 @@ TypedKind KindOf(const std::string& text) {
   return absl::StartsWith(text, "clip_") ? TypedKind::kClip : TypedKind::kShape;
 }
 
-// The `number`-th of a kind, from 1; nothing if there is none.
+// Returns shape `number` of a kind, from 1; empty if it does not exist.
 std::string Nth(std::span<const std::string> shapes, TypedKind kind, size_t number) {
   for (const std::string& shape : shapes) {
     if (KindOf(shape) == kind && --number == 0) return shape;
@@ -34,7 +34,7 @@ std::string OfObject(std::span<const std::string> shapes, const std::string& nam
   return "";
 }
 
-// `path` is the field's, within its shape: "height", "surface.text".
+// `path` is the field's path within its shape: "height", "surface.text".
 std::string Said(const std::string& path, const std::string& typed, absl::string_view text) {
   if (absl::EndsWith(path, ".text")) (void)absl::ConsumePrefix(&text, "text ");
   const std::string field = path.substr(0, path.find_first_of(".["));
@@ -46,7 +46,8 @@ std::string Said(const std::string& path, const std::string& typed, absl::string
   return EscapeForTerminal(text);
 }
 
-// Takes what is before `end`, and `end`; false, and nothing taken, where it does not come.
+// Removes the text before `end`, and `end`, from the front. Returns false and removes nothing if
+// `end` does not occur.
 bool TakeUpTo(absl::string_view end, absl::string_view* text, absl::string_view* taken) {
   const size_t at = text->find(end);
   if (at == absl::string_view::npos) return false;

@@ -1,4 +1,4 @@
-// What a server says of a drawing, in the words in which it was typed.
+// Converts a server's error about a drawing to the words in which it was typed.
 #pragma once
 
 #include <span>
@@ -8,8 +8,8 @@
 
 namespace voxeld::voxelctl {
 
-// `refused` is the answer to ShapesRequest(shapes). Instead of the operation's path it then has the shape as it was typed,
-// and what is wrong with its field; a message of another form stays as it is.
+// `refused` is the response to ShapesRequest(shapes). Replaces the operation's path by the shape as
+// it was typed and the error of its field; a message of another form stays unchanged.
 absl::Status AsTyped(const absl::Status& refused, std::span<const std::string> shapes);
 
 }  // namespace voxeld::voxelctl

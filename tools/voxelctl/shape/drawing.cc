@@ -16,7 +16,7 @@ namespace {
 
 constexpr size_t kLabelBytes = 200;
 
-// What a command line puts up, in the order in which it takes effect: objects, then what draws them.
+// The contents of a drawing in the order in which they take effect: objects, then what draws them.
 class Drawing {
  public:
   absl::Status Add(const std::string& text) {

@@ -1,8 +1,8 @@
-// What a command line draws, as one request: shapes, and
+// Converts a drawing of a command line to one request. It consists of shapes, and
 //
 //   object NAME: SHAPE   a part of an object, which "instance object=NAME" draws
-//   mask: SHAPE          only what lies in voxels of such shapes is seen of the others
-//   clip_… …             as shape_text.h has it
+//   mask: SHAPE          the others are visible only in voxels of such shapes
+//   clip_… …             as in shape_text.h
 //
 // in any order.
 #pragma once
@@ -15,12 +15,13 @@
 
 namespace voxeld::voxelctl {
 
-// Whatever voxelctl puts up lies in this layer.
+// The layer of everything that voxelctl draws.
 inline constexpr const char* kLayer = "voxelctl";
-// What a draw masks that with, not seen itself.
+// The layer of masks, which are not visible themselves.
 inline constexpr const char* kMaskLayer = "voxelctl mask";
 
-// What is to be sent. InvalidArgument names each shape that is not understood, and what would have been.
+// Returns the request to send. Errors: InvalidArgument with each invalid shape, and what would have
+// been valid.
 absl::StatusOr<v1::ApplyUpdateRequest> ShapesRequest(std::span<const std::string> shapes);
 
 }  // namespace voxeld::voxelctl

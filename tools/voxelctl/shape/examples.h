@@ -1,4 +1,4 @@
-// An example of every shape: what the gallery shows, and docs/primitives.md.
+// An example of every shape, for the gallery and docs/primitives.md.
 #pragma once
 
 #include <span>
@@ -7,7 +7,7 @@ namespace voxeld::voxelctl {
 
 struct ShapeExample {
   const char* name;  // a label
-  const char* text;  // what draw takes, one beneath another
+  const char* text;  // input of draw, one shape per line
 };
 
 std::span<const ShapeExample> ShapeExamples();

@@ -76,7 +76,8 @@ absl::Status SetVertices(absl::string_view name, absl::string_view text, v1::Ver
   return absl::OkStatus();
 }
 
-// "solid" for FILL_SOLID: what is left of the value without the words that the enumeration has in common.
+// Returns "solid" for FILL_SOLID: the value's name without the prefix that the enumeration's values
+// share.
 std::string ShortName(const EnumValueDescriptor& value) {
   std::string name = value.name();
   const std::string zero = value.type()->value(0)->name();
@@ -112,7 +113,7 @@ absl::Status SetMessage(const FieldDescriptor& field, absl::string_view text, Me
     return absl::OkStatus();
   }
   if (auto* boundary = dynamic_cast<v1::Boundary*>(to)) {
-    // Words before the numbers: an axis, a form.
+    // Words before the numbers, such as an axis or a form.
     absl::string_view rest = absl::StripLeadingAsciiWhitespace(text);
     while (!rest.empty() && absl::ascii_isalpha(static_cast<unsigned char>(rest[0]))) {
       const absl::string_view word = rest.substr(0, rest.find(' '));
@@ -142,7 +143,7 @@ absl::Status ReadFile(const FieldDescriptor& field, absl::string_view path, absl
   return absl::OkStatus();
 }
 
-// A file by its path, or its bytes.
+// Sets a picture from a file's path, or from bytes.
 absl::Status SetPicture(const FieldDescriptor& field, absl::string_view text, Message* out) {
   std::string bytes;
   absl::string_view code = text;
@@ -159,7 +160,7 @@ absl::Status SetPicture(const FieldDescriptor& field, absl::string_view text, Me
   return absl::OkStatus();
 }
 
-// The words of an enumeration's field of the same message, if there is one: what elements are.
+// Returns the element type that an enumeration field of the same message sets, if there is one.
 v1::ElementType TypeBeside(const Message& message) {
   for (const char* name : {"type", "height_type"}) {
     const FieldDescriptor* const field = message.GetDescriptor()->FindFieldByName(name);
@@ -170,7 +171,7 @@ v1::ElementType TypeBeside(const Message& message) {
   return v1::ELEMENT_TYPE_UNSPECIFIED;
 }
 
-// One number of a packed array; InvalidArgument: the type has no such number.
+// Appends one number to a packed array. Errors: InvalidArgument if the type cannot represent it.
 absl::Status AppendNumber(absl::string_view name, double number, v1::ElementType type,
                           std::string* out) {
   const auto append = [&](auto value) {
@@ -180,7 +181,7 @@ absl::Status AppendNumber(absl::string_view name, double number, v1::ElementType
   if (type == v1::ELEMENT_TYPE_UNSPECIFIED || type == v1::ELEMENT_TYPE_F32) {
     return append(static_cast<float>(number));
   }
-  const double most = type == v1::ELEMENT_TYPE_U16 ? 65535 : 255;  // RGBA8: four numbers a sample
+  const double most = type == v1::ELEMENT_TYPE_U16 ? 65535 : 255;  // RGBA8: four numbers per sample
   if (number != std::floor(number) || number < 0 || number > most) {
     const auto* value = v1::ElementType_descriptor()->FindValueByNumber(type);
     return Wrong(name, absl::StrCat(number),
@@ -191,7 +192,8 @@ absl::Status AppendNumber(absl::string_view name, double number, v1::ElementType
                                       : append(static_cast<uint8_t>(number));
 }
 
-// Packed arrays: colours, or numbers of the type that the message has, else in single precision; or a file's bytes, as they are.
+// Sets a packed array: colours, or numbers of the message's element type, otherwise in single
+// precision; or the unchanged bytes of a file.
 absl::Status SetBytes(const FieldDescriptor& field, absl::string_view text, Message* out) {
   if (field.name() == "picture") return SetPicture(field, text, out);
   std::string bytes;
@@ -307,7 +309,7 @@ absl::Status SetField(const FieldDescriptor& field, absl::string_view text, Mess
       return SetEnum(field, text, out);
     case FieldDescriptor::CPPTYPE_STRING:
       if (field.type() == FieldDescriptor::TYPE_BYTES) return SetBytes(field, text, out);
-      // A text's lines; a shell leaves \n as it is.
+      // Splits a text into lines, because a shell leaves \n unchanged.
       reflection.SetString(
           out, &field,
           field.name() == "text" ? absl::StrReplaceAll(text, {{"\\n", "\n"}}) : std::string(text));

@@ -1,4 +1,5 @@
-// Fields of the wire's messages as people type them, NAME=VALUE: what values are is told in shape_text.h.
+// Parses fields of the protocol's messages as people type them, NAME=VALUE; shape_text.h describes
+// the values.
 #pragma once
 
 #include <google/protobuf/descriptor.h>
@@ -18,13 +19,13 @@ struct Setting {
   std::string name, value;
 };
 
-// InvalidArgument: a value that is not understood, and what would have been.
+// Returns InvalidArgument for an invalid value, with what would have been valid.
 absl::Status Wrong(absl::string_view name, absl::string_view value, absl::string_view right);
-// Words, those with spaces in quotes.
+// Splits a text into words; those with spaces are in quotes.
 absl::StatusOr<std::vector<std::string>> Words(absl::string_view text);
 absl::Status SetVec3(absl::string_view name, absl::string_view text, v1::Vec3* out);
 absl::Status SetColor(absl::string_view name, absl::string_view text, v1::Color* out);
-// A field of any type that can be typed, of `out`.
+// Sets a field of `out` of any type that can be typed.
 absl::Status SetField(const google::protobuf::FieldDescriptor& field, absl::string_view text,
                       google::protobuf::Message* out);
 

@@ -22,7 +22,7 @@ namespace {
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 
-// Where a shape is put: scaled, then turned about x, y and z, then moved.
+// Where a shape is placed: it is scaled, then rotated about x, y and z, then moved.
 struct Placement {
   v1::Vec3 at, scale, turn;
 
@@ -54,8 +54,8 @@ struct Placement {
   }
 };
 
-// A field by its name, or by those of the messages that it is in with points between, which are made: "grid.size_a".
-// Null: there is none.
+// Finds a field by its name, or by a dotted path through messages, which are created:
+// "grid.size_a". Returns null if it does not exist.
 const FieldDescriptor* FindField(absl::string_view name, Message** within) {
   for (;;) {
     const std::pair<absl::string_view, absl::string_view> parts =
@@ -69,7 +69,7 @@ const FieldDescriptor* FindField(absl::string_view name, Message** within) {
   }
 }
 
-// at, scale and turn; false if `setting` is none of them.
+// Sets at, scale and turn. Returns false if `setting` is none of them.
 absl::StatusOr<bool> SetPlacement(const Setting& setting, Placement* out) {
   v1::Vec3* const part = setting.name == "at"      ? &out->at
                          : setting.name == "scale" ? &out->scale
@@ -80,7 +80,7 @@ absl::StatusOr<bool> SetPlacement(const Setting& setting, Placement* out) {
   return true;
 }
 
-// Of what every shape has; false if `setting` is none of it.
+// Sets properties that every shape has. Returns false if `setting` is none of them.
 absl::StatusOr<bool> SetCommon(const Setting& setting, Placement* placement, v1::Entity* out) {
   const auto& [name, value] = setting;
   absl::Status status;
@@ -111,7 +111,7 @@ absl::StatusOr<bool> SetCommon(const Setting& setting, Placement* placement, v1:
   return true;
 }
 
-// NAME=VALUE, each word after the first.
+// Parses NAME=VALUE in each word after the first.
 absl::StatusOr<std::vector<Setting>> SettingsOf(const std::vector<std::string>& words) {
   std::vector<Setting> settings;
   for (size_t w = 1; w < words.size(); ++w) {
@@ -129,7 +129,7 @@ absl::StatusOr<std::vector<Setting>> SettingsOf(const std::vector<std::string>& 
     }
     settings.push_back({parts.first, parts.second});
   }
-  // Arrays are put into bytes by their types, wherever these stand.
+  // Types are set first, because the bytes of arrays depend on them wherever they are written.
   absl::c_stable_partition(settings,
                            [](const Setting& s) { return absl::EndsWith(s.name, "type"); });
   return settings;
@@ -185,7 +185,7 @@ absl::StatusOr<v1::Entity> ParseShapeText(absl::string_view text) {
     placement.Write(entity.mutable_transform());
     return entity;
   }
-  // A misspelt shape is none of an expression's beginnings.
+  // A misspelt shape name does not begin an expression.
   const std::string& first = words->front();
   if (words->size() == 1 || absl::StrContains((*words)[1], '=')) {
     std::vector<std::string> names(static_cast<size_t>(kinds.field_count()));

@@ -23,7 +23,7 @@ ordered_json Text(const FieldDescriptor* field, const std::string& value) {
   return field->type() == FieldDescriptor::TYPE_BYTES ? absl::Base64Escape(value) : value;
 }
 
-// One value of a field that is not repeated.
+// Returns one value of a field that is not repeated.
 ordered_json Single(const Message& m, const Reflection& r, const FieldDescriptor* f) {
   switch (f->cpp_type()) {
     case FieldDescriptor::CPPTYPE_INT32:

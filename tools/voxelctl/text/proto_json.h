@@ -1,4 +1,4 @@
-// Messages as JSON for programs.
+// Converts messages to JSON for programs.
 #pragma once
 
 #include <google/protobuf/message.h>
@@ -7,12 +7,12 @@
 
 namespace voxeld::voxelctl {
 
-// Field names as in the .proto file; every field that has a value or a default,
-// unset messages and oneofs left out; 64-bit integers as numbers, enums by name,
-// bytes in base64, what is not finite as null.
+// Uses field names as in the .proto file. Includes every field that has a value or a default; unset
+// messages and oneofs are left out. 64-bit integers are numbers, enums are names, bytes are base64,
+// and non-finite numbers are null.
 nlohmann::ordered_json ToJson(const google::protobuf::Message& message);
 
-// As a document on lines of its own; text that is not UTF-8 is replaced.
+// Returns a document that ends with a newline; text that is not UTF-8 is replaced.
 std::string JsonText(const nlohmann::ordered_json& json, bool one_line);
 
 }  // namespace voxeld::voxelctl

@@ -14,7 +14,8 @@ namespace {
 
 constexpr absl::string_view kGap = "  ";
 
-// Code points: what a terminal shows as columns, for the scripts that names are mostly written in.
+// Counts code points, which are a terminal's columns in the scripts in which names are mostly
+// written.
 size_t Width(absl::string_view text) {
   return static_cast<size_t>(
       std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xc0) != 0x80; }));

@@ -1,4 +1,4 @@
-// Columns for people.
+// Tables for people.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ class Table {
   };
   explicit Table(std::vector<Column> columns) : columns_(std::move(columns)) {}
 
-  // As many cells as columns.
+  // Requires: as many cells as columns.
   void Add(std::vector<std::string> cells);
 
   std::string Text() const;
@@ -28,10 +28,11 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
-// A number with its noun: "1 volume", "1,234 volumes"; `many` where an s is not enough.
+// Returns a number with its noun: "1 volume", "1,234 volumes"; `many` is the plural if adding an s
+// is not enough.
 std::string Counted(uint64_t count, const std::string& one, const std::string& many = "");
 
-// "1,234,567"; "12.3 MB"; "4.56 ms", "–" for 0; "1 h 02 min".
+// Return "1,234,567"; "12.3 MB"; "4.56 ms", "–" for 0; "1 h 02 min".
 std::string Grouped(uint64_t value);
 std::string Bytes(uint64_t value);
 std::string Duration(int64_t nanoseconds);

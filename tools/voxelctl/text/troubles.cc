@@ -15,7 +15,7 @@ std::vector<std::string> Troubles(const v1::Stats& stats) {
     if (!trouble.empty()) out.push_back(EscapeForTerminal(trouble));
   }
   for (const v1::DisplayStats& display : stats.displays()) {
-    // Of one that is lost the state says so, and why.
+    // A lost display's state already reports the error and its reason.
     if (display.device_trouble().empty() || display.state() == v1::DISPLAY_STATE_LOST) continue;
     out.push_back(EscapeForTerminal(
         absl::StrCat("display ", display.name(), ": ", display.device_trouble())));

@@ -1,4 +1,4 @@
-// What a server says that is amiss with itself.
+// Lists the problems that a server reports about itself.
 #pragma once
 
 #include <string>
@@ -8,8 +8,9 @@
 
 namespace voxeld::voxelctl {
 
-// A line each, as the server words it, made fit for a terminal: who cannot reach it, its grants, its configuration, its
-// state, its assets, its memory. Nothing of displays, which tell of themselves. Empty: all is well.
+// Returns a line for each problem, in the server's words, escaped for a terminal: unreachable
+// addresses, grants, configuration, state, assets, memory. Displays are not included, because they
+// report their own. Empty without problems.
 std::vector<std::string> Troubles(const v1::Stats& stats);
 
 }  // namespace voxeld::voxelctl

@@ -37,7 +37,7 @@ absl::StatusOr<std::string> NewToken() {
   return absl::StrCat("vx_", text);
 }
 
-// Answers how many tokens of that name were there before.
+// Appends the entry. Returns how many tokens of that name existed before.
 absl::StatusOr<size_t> Append(const std::string& path, const std::string& name,
                               const std::string& text) {
   struct stat found;
@@ -50,7 +50,7 @@ absl::StatusOr<size_t> Append(const std::string& path, const std::string& name,
   const daemon::Descriptor file(
       open(path.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
   if (!file.ok()) return absl::ErrnoToStatus(errno, path);
-  // At once, so that whoever reads it meanwhile sees all of it or nothing.
+  // Written in one call, so that a concurrent reader sees all of it or nothing.
   if (write(file.get(), text.data(), text.size()) != static_cast<ssize_t>(text.size()) ||
       fsync(file.get()) != 0) {
     return absl::ErrnoToStatus(errno, absl::StrCat(path, " could not be written whole"));
@@ -80,7 +80,7 @@ absl::Status MakeToken(const TokenOptions& options, Console& console) {
                     "expires = ", absl::FormatTime("%Y-%m-%dT%H:%M:%SZ", end, absl::UTCTimeZone()),
                     "\n");
   }
-  // As the daemon will read it.
+  // Checked as the daemon will read it.
   if (absl::Status status = access::ParseGrants(entry, "the token").status(); !status.ok()) {
     return absl::InvalidArgumentError(status.message());
   }

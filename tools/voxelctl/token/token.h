@@ -1,5 +1,5 @@
-// voxelctl token: a token that nobody can guess, and the entry of the grants file that lets it in. Needs no
-// daemon; what it prints is the only place where the token ever is.
+// voxelctl token: makes an unguessable token, and the entry of the grants file that admits it.
+// Needs no daemon. Its output is the only place where the token exists.
 #pragma once
 
 #include "absl/status/status.h"
@@ -8,9 +8,10 @@
 
 namespace voxeld::voxelctl {
 
-// The token on standard output, alone, so that it can go to a file; the entry as words, or appended to
-// TokenOptions::grants, which is made with mode 0600 if it is not there and otherwise must be right. With
-// --json both as one object. InvalidArgument for a name, scopes or days that there are not.
+// Writes only the token to standard output, so that it can be redirected to a file. The entry is
+// printed as a message, or appended to TokenOptions::grants, which is created with mode 0600 if it
+// does not exist and otherwise must be valid. With --json both are written as one object. Errors:
+// InvalidArgument for an invalid name, scopes or days.
 absl::Status MakeToken(const TokenOptions& options, Console& console);
 
 }  // namespace voxeld::voxelctl

@@ -1,6 +1,6 @@
 #include "tools/voxelctl/top/terminal.h"
 
-#define NCURSES_NOMACROS  // functions are functions: refresh(), erase(), timeout()
+#define NCURSES_NOMACROS  // keeps functions as functions: refresh(), erase(), timeout()
 #include <curses.h>
 #include <signal.h>
 #include <stdlib.h>
@@ -20,13 +20,14 @@ termios g_before;
 struct sigaction g_actions[std::size(kEnding)];
 SCREEN* g_screen = nullptr;
 
-// In a signal: only what may be called there. Attributes and the keypad's mode off, the cursor shown, the other screen left; those that do not
-// know these leave them out.
+// Runs in a signal handler, so it only calls async-signal-safe functions. Resets attributes and the
+// keypad mode, shows the cursor, and leaves the alternate screen; terminals that do not know a
+// sequence ignore it.
 void Restore(int signal) {
   constexpr char kBack[] = "\x1b[0m\x1b[?1l\x1b>\x1b[?25h\x1b[?1049l\r";
   (void)!::write(STDOUT_FILENO, kBack, sizeof kBack - 1);
   ::tcsetattr(STDIN_FILENO, TCSANOW, &g_before);
-  ::raise(signal);  // which ends the process now: SA_RESETHAND
+  ::raise(signal);  // terminates the process now: SA_RESETHAND
 }
 
 short ColorOf(TopStyle style) {
@@ -81,7 +82,8 @@ std::unique_ptr<Terminal> Terminal::Open(bool colors) {
     ::sigaction(kEnding[i], &action, &g_actions[i]);
   }
   ::cbreak();
-  // Ctrl-C is a key here: two of them in haste would otherwise end the process before it could tidy up.
+  // Ctrl-C is read as a key here: two of them in quick succession would otherwise terminate the
+  // process before it could restore the terminal.
   termios keys;
   if (::tcgetattr(STDIN_FILENO, &keys) == 0) {
     keys.c_cc[VINTR] = _POSIX_VDISABLE;

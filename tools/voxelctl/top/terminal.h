@@ -1,4 +1,4 @@
-// The terminal as a whole, and single keys. terminal.cc alone knows ncurses.
+// Full-screen output and single keys. Only terminal.cc uses ncurses.
 #pragma once
 
 #include <memory>
@@ -10,11 +10,11 @@ namespace voxeld::voxelctl {
 
 enum class TopKey : uint8_t { kNone, kQuit, kPause, kNext, kPrevious, kResize };
 
-// Takes standard input and output over, and gives them back as they were: when it goes, and when a signal that ends the
-// process comes first. One at a time, for one thread.
+// Takes over standard input and output, and restores them on destruction and on a fatal signal. At
+// most one object at a time, bound to one thread.
 class Terminal {
  public:
-  // Null if this is no terminal that it knows how to speak to.
+  // Returns null if the terminal is not supported.
   static std::unique_ptr<Terminal> Open(bool colors);
   ~Terminal();
   Terminal(const Terminal&) = delete;
@@ -23,10 +23,10 @@ class Terminal {
   int width() const;
   int height() const;
 
-  // In place of what was there.
+  // Replaces the shown lines.
   void Show(const std::vector<TopLine>& lines);
 
-  // The next key, or kNone after so long.
+  // Returns the next key, or kNone after that time.
   TopKey Wait(int milliseconds);
 
  private:

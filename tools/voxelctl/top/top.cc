@@ -19,7 +19,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-constexpr int kLook = 100;  // milliseconds: for a key, for news, for an end
+constexpr int kLook = 100;  // milliseconds: interval to check for keys, news and the end
 
 v1::WatchStatsRequest RequestOf(const TopOptions& options) {
   v1::WatchStatsRequest request;
@@ -60,7 +60,7 @@ class Dashboard {
   void Run(Terminal& terminal) {
     std::thread feeder([this] { Feed(); });
     const absl::Cleanup end = [&] {
-      interrupt_.Request();  // the call under way, and the wait for the next
+      interrupt_.Request();  // ends the current call and the wait for the next
       feeder.join();
     };
     bool draw = true;

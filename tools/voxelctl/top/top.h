@@ -1,4 +1,4 @@
-// The command `top`: how the server and its displays do, live.
+// The command `top`: shows the state of the server and its displays, live.
 #pragma once
 
 #include "absl/status/status.h"
@@ -9,9 +9,10 @@
 
 namespace voxeld::voxelctl {
 
-// A dashboard where standard input and output are a terminal and it is neither --once nor --json; it outlives the server, whose
-// return it waits for. Else tables, or a JSON document a line, to the console. `colors`: the dashboard may have them. Ends without
-// an error by q and by an interrupt.
+// Shows a dashboard if standard input and output are a terminal and neither --once nor --json is
+// given; it keeps running and waits if the server disconnects. Otherwise writes tables, or one JSON
+// document per line, to the console. `colors` allows the dashboard to use colours. Ends without an
+// error with q and with an interrupt.
 absl::Status Top(const TopOptions& options, bool colors, Connection& connection,
                  Interrupt& interrupt, Console& console);
 

@@ -32,7 +32,7 @@ TopStyle StyleOf(const v1::DisplayStats& display) {
   return display.state() == v1::DISPLAY_STATE_SHOWING ? TopStyle::kGood : TopStyle::kBad;
 }
 
-// As many columns as fit; one code point is one.
+// Truncates to the columns that fit; one code point is one column.
 std::string Cut(const std::string& text, int width) {
   int columns = 0;
   for (size_t i = 0; i < text.size(); ++i) {
@@ -50,7 +50,7 @@ std::string Bar(double share) {
   return absl::StrCat("[", filled, std::string(kBar - filled.size(), '.'), "]");
 }
 
-// A table's heading and rows, each with its style.
+// Adds a table's heading and rows, each with its style.
 void AddTable(const Table& table, const std::vector<TopStyle>& styles, std::vector<TopLine>* out) {
   size_t row = 0;
   for (const absl::string_view line : absl::StrSplit(table.Text(), '\n', absl::SkipEmpty())) {
@@ -292,7 +292,7 @@ std::vector<TopLine> TopView::Lines(int width, int height) const {
         {lost_.empty() ? "waiting for the server …" : absl::StrCat("nothing comes: ", lost_),
          lost_.empty() ? TopStyle::kPlain : TopStyle::kBad});
   }
-  const auto room = static_cast<size_t>(std::max(height - 1, 0));  // the last is the keys'
+  const auto room = static_cast<size_t>(std::max(height - 1, 0));  // the last line is for the keys
   std::string keys = kKeys;
   if (out.size() > room) {
     keys = absl::StrCat(kKeys, "   (", Counted(out.size() - room, "line"),

@@ -1,4 +1,4 @@
-// What the dashboard shows, as lines; knows no terminal.
+// The contents of the dashboard as lines; independent of the terminal.
 #pragma once
 
 #include <cstdint>
@@ -17,23 +17,24 @@ struct TopLine {
   TopStyle style = TopStyle::kPlain;
 };
 
-// Stats and owners as they came last, with what changed since those before; which display is looked at. What the
-// server chose is made fit for a terminal. Not thread-safe.
+// The latest stats and owners, with what changed since the previous ones, and which display is
+// selected. Text from the server is escaped for a terminal. Not thread-safe.
 class TopView {
  public:
-  // Left out while it is paused. `owners_trouble`: why there are none; empty: there are.
+  // Ignored while it is paused. `owners_trouble` is why owners are missing; empty: they are not.
   void Take(const v1::Stats& stats, const v1::ListOwnersResponse& owners,
             const std::string& owners_trouble);
-  // Why nothing comes, until something does.
+  // Sets why no data come, until some do.
   void Lose(const std::string& why);
 
   void TogglePause() { paused_ = !paused_; }
-  // The display so many places on, round and round.
+  // Selects the display `step` places on, cyclically.
   void Choose(int step);
-  // The display of that name, if there is one.
+  // Selects the display of that name, if there is one.
   void Choose(const std::string& name) { chosen_ = name; }
 
-  // At most `height` lines of at most `width` columns; what has no room is left out from the end, and said.
+  // Returns at most `height` lines of at most `width` columns; rows that do not fit are left out
+  // from the end, which is stated.
   std::vector<TopLine> Lines(int width, int height) const;
 
  private:
@@ -44,7 +45,7 @@ class TopView {
   void AddMemory(std::vector<TopLine>* out) const;
   void AddConnections(std::vector<TopLine>* out) const;
   void AddOwners(std::vector<TopLine>* out) const;
-  // Since the stats before, a second.
+  // Returns the rate per second since the previous stats.
   double Rate(uint64_t now, uint64_t before) const;
 
   v1::Stats stats_, before_;
@@ -53,7 +54,7 @@ class TopView {
   bool any_ = false, paused_ = false;
 };
 
-// The same for who cannot be shown a dashboard: displays, owners, a line of the rest.
+// Returns the same for output without a dashboard: displays, owners, a line of the rest.
 std::string TopText(const v1::Stats& stats, const v1::ListOwnersResponse& owners);
 
 }  // namespace voxeld::voxelctl

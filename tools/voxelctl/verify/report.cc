@@ -21,7 +21,7 @@ std::string SectionOf(const CaseResult& result) {
   return result.verdict.section.empty() ? result.what->section : result.verdict.section;
 }
 
-// Names and messages are from devices: nothing of them may break the document.
+// Names and messages come from devices, so they are escaped and cannot break the document.
 std::string Xml(const std::string& text) {
   return absl::StrReplaceAll(
       EscapeForTerminal(text),

@@ -1,4 +1,4 @@
-// What a conformance run found, for people, programs and build servers.
+// Reports of a conformance run for people, programs and build servers.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace voxeld::voxelctl {
 
 struct DeviceReport {
   std::string name, protocol, page;
-  display::conformance::RunResult run;  // its cases belong to a suite that lives on
+  display::conformance::RunResult run;  // its cases belong to a suite that outlives it
 };
 
 struct VerifyReport {
@@ -24,15 +24,15 @@ struct VerifyReport {
   size_t Count(display::conformance::Verdict::Kind kind) const;
 };
 
-// One case as it ended: a line, and what was wrong in lines of their own.
+// Returns the result of one case: a line, and what was wrong on separate lines.
 std::string CaseText(const display::conformance::CaseResult& result, const std::string& page);
-// "79 cases: 75 passed, 1 failed, 3 not applicable".
+// Returns "79 cases: 75 passed, 1 failed, 3 not applicable".
 std::string SummaryText(const VerifyReport& report);
 
 nlohmann::ordered_json ReportJson(const VerifyReport& report);
 
-// As Jenkins, GitLab and GitHub's actions read it: a suite a device, a test a case. What was not
-// applicable is skipped.
+// Returns XML that Jenkins, GitLab and GitHub's actions read: a suite per device, a test per case.
+// Cases that are not applicable are skipped.
 std::string JunitXml(const VerifyReport& report);
 
 }  // namespace voxeld::voxelctl

@@ -32,8 +32,8 @@ using display::conformance::Subject;
 using display::conformance::Verdict;
 using display::conformance::WakeWaiter;
 
-// "[NAME=]DRIVER[,KEY=VALUE…]", as the daemon's --display but that the name may be left out; what is
-// the daemon's own (`view`) is checked and of no effect.
+// Parses "[NAME=]DRIVER[,KEY=VALUE…]", like the daemon's --display except that the name may be left
+// out; the daemon's own options (`view`) are checked and have no effect.
 absl::StatusOr<display::DisplayOptions> ReadDisplay(const std::string& text) {
   const std::string first = text.substr(0, text.find(','));
   const bool named = absl::StrContains(first, '=');
@@ -46,7 +46,7 @@ absl::StatusOr<display::DisplayOptions> ReadDisplay(const std::string& text) {
       .name = config->name, .driver = config->driver, .options = std::move(split->driver)};
 }
 
-// What Open says, and what helps.
+// Returns the error of Open with a remedy.
 absl::Status CannotOpen(const Subject& subject, const absl::Status& status) {
   std::string help;
   if (absl::IsNotFound(status)) {
@@ -78,7 +78,7 @@ class Command {
 
     std::ofstream junit;
     if (!options_.junit.empty()) {
-      // Before the run, which may take minutes.
+      // Checked before the run, which may take minutes.
       junit.open(options_.junit, std::ios::binary | std::ios::trunc);
       if (!junit) return CannotWrite();
     }
@@ -103,7 +103,7 @@ class Command {
   }
 
  private:
-  // Made for the first display that asks for it.
+  // Created when the first display needs it.
   absl::StatusOr<display::UsbBus*> Usb() {
     if (usb_ == nullptr) {
       absl::StatusOr<std::unique_ptr<display::LibusbBus>> made = display::LibusbBus::Make(clock_);
@@ -152,7 +152,7 @@ class Command {
     return absl::OkStatus();
   }
 
-  // Waits for a device that is not there yet as long as it was asked to.
+  // Opens the device, and waits for a missing one as long as requested.
   absl::Status Open(Subject& subject) {
     constexpr sync::TimeNs kLook = 100 * sync::kMillisecond;
     const auto wait = static_cast<sync::TimeNs>(options_.wait_s * sync::kSecond);
@@ -166,7 +166,7 @@ class Command {
   }
 
   absl::StatusOr<RunResult> RunOne(Subject& subject) {
-    // Opening tells what is wrong; running would as well, but not what helps.
+    // Opening reports what is wrong with a remedy; running would report it without one.
     if (absl::Status status = Open(subject); !status.ok()) return CannotOpen(subject, status);
     if (!console_.json()) Announce(subject);
     subject.transport->Close();

@@ -1,5 +1,5 @@
-// The command `verify`: a protocol's conformance suite over the devices of a display, which it opens
-// itself, without a daemon.
+// The command `verify`: runs a protocol's conformance suite on the devices of a display, which it
+// opens itself, without a daemon.
 #pragma once
 
 #include "absl/status/status.h"
@@ -9,9 +9,10 @@
 
 namespace voxeld::voxelctl {
 
-// OK: no case failed. FailedPrecondition: some did. InvalidArgument: the display's text, the filter
-// or the file is wrong, with what would be right. Unavailable: the device is not there, or another
-// program has it. Cancelled: interrupted; the device was stopped.
+// Returns: OK if no case failed. Errors: FailedPrecondition if some failed; InvalidArgument if the
+// display's text, the filter or the file is wrong, with what would be valid; Unavailable if the
+// device is missing or in use by another program; Cancelled if it was interrupted, in which case
+// the device was stopped.
 absl::Status Verify(const VerifyOptions& options, Interrupt& interrupt, Console& console);
 
 }  // namespace voxeld::voxelctl
