@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Runs two builds of one of Google's benchmarks in turns, and says what the second takes of the first's processor time.
+"""Runs two builds of a Google Benchmark program alternately, and prints the ratio of the second's CPU time to the first's.
 
     tools/bench/in_turns.py build/plain/bin/voxel-assemble-bench build/release/bin/voxel-assemble-bench --turns 9 --filter '/1/'
 
-A ratio is of two runs that followed each other (each goes first every other time), so what else the machine does meets both; the median of them is told, with
-quartiles. The processor's time counts, not the clock's: of benchmarks with one thread it is what they did.
+A ratio compares two consecutive runs (each goes first every other time), so other load on the machine affects both. The median of the
+ratios is printed with quartiles. CPU time is used instead of wall time: for benchmarks with one thread it measures their own work.
 """
 import argparse
 import json
@@ -13,7 +13,7 @@ import subprocess
 
 
 def times(program, options):
-    """{benchmark: nanoseconds of processor time an iteration}."""
+    """Returns: {benchmark: nanoseconds of CPU time per iteration}."""
     ran = subprocess.run([program, "--benchmark_format=json", f"--benchmark_filter={options.filter}", f"--benchmark_min_time={options.min_time}"],
                          capture_output=True, text=True, check=True)
     factors = {"ns": 1, "us": 1e3, "ms": 1e6, "s": 1e9}

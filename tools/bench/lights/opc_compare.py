@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""How fast Open Pixel Control goes in: `voxelctl input opc`, and olad (the Open Lighting Architecture's daemon) as the peer, in turns
-within one run. Each is sent the same messages over one connection; a run ends when the receiver has read all of them. Of
-voxelctl every message is asked for afterwards: its tally has to say that it was set. olad does not count.
+"""Measures the throughput of Open Pixel Control input: `voxelctl input opc`, compared with olad (the Open Lighting Architecture's daemon),
+alternately within one run. Each receives the same messages over one connection; a run ends when the receiver has read all of them.
+Afterwards every message to voxelctl is accounted for: its statistics must say that it was set. olad does not count.
 
 usage: opc_compare.py --bin DIR [--messages N] [--lights N] [--runs N] [--json]
 """
@@ -36,7 +36,7 @@ def until(right: Callable[[], bool], what: str) -> None:
     while not right():
         if time.monotonic() > deadline:
             raise SystemExit(f"opc_compare: {what} did not come within {WAIT:.0f} s")
-        time.sleep(0.001)  # another program's state, which nothing tells
+        time.sleep(0.001)  # polling, because nothing signals another program's state
 
 
 def answers(port: int) -> bool:
@@ -45,7 +45,7 @@ def answers(port: int) -> bool:
 
 
 def send(port: int, block: bytes, blocks: int) -> float:
-    """Seconds until the receiver has read them all: until nothing waits at either end."""
+    """Returns: the seconds until the receiver has read all of them, that is until nothing waits at either end."""
     with socket.create_connection(("127.0.0.1", port), WAIT) as stream:
         mine = stream.getsockname()[1]
         began = time.monotonic()
@@ -56,7 +56,8 @@ def send(port: int, block: bytes, blocks: int) -> float:
 
 
 def waiting(local: int, remote: int) -> int:
-    """Bytes at that end of a connection on this machine, to be sent or to be read, as the kernel has them (proc(5))."""
+    """Returns: the bytes that wait to be sent or read at that end of a connection on this machine, as the kernel reports them
+    (proc(5))."""
     for line in Path("/proc/net/tcp").read_text(encoding="ascii").splitlines()[1:]:
         _, here, there, _, queues, *_ = line.split()
         if int(here.split(":")[1], 16) == local and int(there.split(":")[1], 16) == remote:
@@ -77,7 +78,7 @@ class Voxeld:
         json.loads(self._input.stdout.readline())
 
     def messages(self) -> int:
-        """How many have been read as they should be, by its count at the end; it ends."""
+        """Ends the receiver. Returns: how many messages were read correctly, by its final count."""
         self._input.terminate()
         out, _ = self._input.communicate(timeout=WAIT)
         tally = json.loads(out.splitlines()[-1])
@@ -99,7 +100,7 @@ class Olad:
         for name, text in files.items():
             Path(folder, f"ola-{name}.conf").write_text(text, encoding="utf-8")
         user: dict[str, Any] = {}
-        if os.geteuid() == 0:  # which olad does not run as
+        if os.geteuid() == 0:  # olad does not run as root
             nobody = pwd.getpwnam("nobody")
             user = {"user": nobody.pw_uid, "group": nobody.pw_gid, "extra_groups": []}
             for path in (Path(folder), *Path(folder).iterdir()):
@@ -115,7 +116,7 @@ class Olad:
 
 
 def send_to_olad(block: bytes, blocks: int) -> float:
-    """A new one each time: after a connection has ended it does not always listen again."""
+    """Starts a new olad each time: after a connection has ended it does not always listen again."""
     with tempfile.TemporaryDirectory() as folder:
         olad = Olad(folder)
         try:

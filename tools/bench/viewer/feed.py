@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Feeds the page's benchmark: points all over a rotor that move with every commit. A JSON line for each commit that was shown: when it
-was made (ms, Unix time) and in which volume it was shown, when its last byte had gone. usage: feed.py SERVER POINTS RATE SECONDS"""
+"""Feeds the page's benchmark: points all over a rotor that move with every commit. Prints a JSON line for each commit that was shown: when
+it was made (ms, Unix time), and in which volume it was shown, when its last byte was sent. usage: feed.py SERVER POINTS RATE SECONDS"""
 import json
 import sys
 import time
@@ -25,6 +25,6 @@ with voxel.connect(server, name="feed") as v:
         print(json.dumps({"made": made, "volume": volume, "shown": time.time() * 1000}), flush=True)
         left = began + (step + 1) / rate - time.monotonic()
         if left > 0:
-            time.sleep(left)  # the rate that was asked for
+            time.sleep(left)  # keeps the requested rate
     if rate * seconds < 1:
         time.sleep(seconds)

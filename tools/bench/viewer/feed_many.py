@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Feeds the page's memory benchmark: clouds of ever other sizes, a commit each, as fast as they are taken. For every line that comes in
-it commits `each` of them, waits for the last to be shown, and writes how many there have been. usage: feed_many.py SERVER COMMITS EACH"""
+"""Feeds the page's memory benchmark: clouds of varying sizes, one commit each, as fast as they are accepted. For every input line it
+commits `each` of them, waits until the last is shown, and prints the total so far. usage: feed_many.py SERVER COMMITS EACH"""
 import sys
 
 import numpy as np
