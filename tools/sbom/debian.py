@@ -1,4 +1,4 @@
-"""Debian's packages: which one a file is of, which version of it is here, and what it says of its licence."""
+"""Debian's packages: which package a file belongs to, its installed version, and its licence."""
 import functools
 import glob
 import os
@@ -16,7 +16,7 @@ SPDX = {
     "apache-2.0 with llvm exception": "Apache-2.0 WITH LLVM-exception", "gfdl-1.3": "GFDL-1.3-only",
     "gpl-2 with linux-syscall-note exception": "GPL-2.0-only WITH Linux-syscall-note",
 }
-# Of packages whose copyright file is prose, as we read it.
+# Our reading of packages whose copyright file is prose.
 READ_BY_US = {
     "libc-ares2": "MIT", "libc6": "LGPL-2.1-or-later", "libc6-dev": "LGPL-2.1-or-later", "libfontconfig1": "HPND-sell-variant",
     "libfontconfig-dev": "HPND-sell-variant", "libgcc-s1": "GPL-3.0-or-later WITH GCC-exception-3.1",
@@ -39,14 +39,14 @@ def _owners():
 
 
 def package_of(path):
-    """The package that `path` (a real one) is of, or None. What dpkg knows under /lib is under /usr/lib."""
+    """Returns: the package of `path` (a real path), or None. dpkg records some files of /usr/lib under /lib."""
     owners = _owners()
     return owners.get(path) or (owners.get(path[len("/usr") :]) if path.startswith("/usr/") else None)
 
 
 @functools.cache
 def describe(package):
-    """{version, source, source_version, architecture, homepage} of an installed package."""
+    """Returns: {version, source, source_version, architecture, homepage} of an installed package."""
     fields = ("Version", "source:Package", "source:Version", "Architecture", "Homepage")
     shown = subprocess.run(["dpkg-query", "-W", "-f", "\t".join("${%s}" % field for field in fields) + "\n", package],
                            capture_output=True, text=True, check=True).stdout.splitlines()[0].split("\t")
@@ -59,7 +59,7 @@ def copyright_file(package):
 
 
 class Paragraph(dict):
-    """Fields of a paragraph, by lower-case names; a field of several lines has them with their one space taken off."""
+    """Fields of a paragraph, by lower-case names; in a field of several lines, the leading space of each is removed."""
 
 
 def paragraphs(text):
@@ -79,8 +79,9 @@ def paragraphs(text):
 
 
 class Licence:
-    """What a package's copyright file says. expression: SPDX's, of `Files: *`, or None where the file is prose; texts: {LicenseRef: text}
-    of what is not in SPDX's list; names: all that occur; notice: copyright and text of `Files: *`, else the whole file; concluded: as we read prose."""
+    """The contents of a package's copyright file. expression: the SPDX expression of `Files: *`, or None if the file is prose;
+    texts: {LicenseRef: text} for licences that are not in SPDX's list; names: all that occur; notice: copyright and text of
+    `Files: *`, otherwise the whole file; concluded: our reading of prose."""
 
     def __init__(self, package):
         self.expression, self.texts, self.names, self.notice = None, {}, [], ""

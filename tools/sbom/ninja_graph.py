@@ -1,18 +1,18 @@
-"""What a program of a Ninja build was made of: objects, and the files that each object's compiler read."""
+"""Finds the inputs of a program of a Ninja build: objects, and the files that the compiler read for each object."""
 import os
 import struct
 import subprocess
 
 
 def inputs(build, target):
-    """All files that `target` is made of, however far away, as paths from `build` or absolute ones."""
+    """Returns: all direct and indirect inputs of `target`, as paths relative to `build` or absolute ones."""
     listed = subprocess.run(["ninja", "-C", build, "-t", "inputs", target], capture_output=True, text=True, check=True)
     return [line for line in listed.stdout.splitlines() if line and not line.startswith("ninja:")]
 
 
 def dependencies(build):
-    """{object: files that its compiler read}, from Ninja's log. It is read here, as a Ninja that is asked for it writes its log anew,
-    which must not happen while another one builds."""
+    """Returns: {object: files that its compiler read}, from Ninja's log. The log is parsed here, because Ninja rewrites its log when
+    it is queried, which must not happen while another Ninja builds."""
     with open(os.path.join(build, ".ninja_deps"), "rb") as file:
         data = file.read()
     magic = b"# ninjadeps\n"
@@ -25,7 +25,7 @@ def dependencies(build):
         at += 4
         is_list, size = bool(size >> 31), size & 0x7FFFFFFF
         if at + size > len(data):
-            break  # what is being written just now
+            break  # an entry that is currently being written
         record = data[at : at + size]
         at += size
         if is_list:
@@ -37,7 +37,8 @@ def dependencies(build):
 
 
 def files_read(build, programs):
-    """Real paths of all that was read to make `programs`: headers, and static libraries that are not of the build."""
+    """Returns: real paths of all files that were read to make `programs`: headers, and static libraries that are not part of the
+    build."""
     read = dependencies(build)
     result = set()
     for program in programs:

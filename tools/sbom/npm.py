@@ -1,4 +1,4 @@
-"""npm's modules that a bundle holds: version, licence, hash and notice."""
+"""The npm modules in a bundle: version, licence, hash and notice."""
 import base64
 import glob
 import json
@@ -28,7 +28,7 @@ class Module:
 
 
 def bundled(modules, listed):
-    """The modules of the list that tools/viewer/bundle.mjs wrote, or none if there is no page."""
+    """Returns: the modules of the list that tools/viewer/bundle.mjs wrote; none without a page."""
     if not listed:
         return []
     with open(listed, encoding="utf-8") as file:

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Writes what voxeld is made of, as SPDX 2.3, and the notices of what is inside its programs.
+"""Writes the components of voxeld as SPDX 2.3, and the notices of the components inside its programs.
 
-Told from the programs themselves and from the build: the libraries that they name and that these name (ldd), the packages whose headers or
-static libraries their compiler and linker read (Ninja's log), the modules in the page (esbuild's own account). The same build of the same
-commit on the same system gives the same bytes.
+They are determined from the programs and from the build: the libraries that they and their libraries name (ldd), the packages whose
+headers or static libraries their compiler and linker read (Ninja's log), and the modules in the page (esbuild's report). The same build
+of the same commit on the same system gives the same bytes.
 """
 import argparse
 import os
@@ -15,12 +15,12 @@ import ninja_graph
 import npm
 import spdx
 
-# A compiler's own parts in a program, which its exception leaves free, and the kernel's interface: no notice is owed for them.
+# A compiler's own parts in a program, which its exception exempts, and the kernel's interface: these need no notice.
 NO_NOTICE = {"libc6-dev", "libgcc-12-dev", "libstdc++-12-dev", "linux-libc-dev", "libcrypt-dev"}
 
 
 def shared_libraries(program):
-    """(names that it needs itself, {name: path} of all)."""
+    """Returns: (names that it needs itself, {name: path} of all)."""
     dynamic = subprocess.run(["readelf", "-dW", program], capture_output=True, text=True, check=True).stdout
     needed = set(re.findall(r"\(NEEDED\).*\[(.+)\]", dynamic))
     loaded = subprocess.run(["ldd", program], capture_output=True, text=True, check=True).stdout
@@ -33,7 +33,7 @@ def shared_libraries(program):
 
 
 def add_debian(document, package):
-    """A package of Debian's, once."""
+    """Adds a Debian package, once."""
     spdx_id = spdx.identifier("deb", package)
     if spdx_id in document.packages:
         return spdx_id
@@ -66,7 +66,7 @@ def add_modules(document, page, modules):
 
 
 def notices(modules, packages):
-    """What must be said of what is inside the programs: (name, version, text) of each."""
+    """Returns: the notices for the components inside the programs: (name, version, text) of each."""
     parts = [(f"{module.name} {module.version} (npm), in the page that voxeld serves", module.notice) for module in modules]
     for package in packages:
         if package not in NO_NOTICE:
@@ -107,12 +107,12 @@ def main():
                 raise SystemExit(f"{program}: {path} is of no package")
             linked.add(package)
             document.relate(voxeld, "DYNAMIC_LINK" if name in needed else "DEPENDS_ON", add_debian(document, package))
-    # Needed by a program itself and by way of another library: the first says it all.
+    # If a program needs a library both itself and through another library, the first relationship is enough.
     for one, _, other in [key for key in document.relationships if key[1] == "DYNAMIC_LINK"]:
         document.relationships.discard((one, "DEPENDS_ON", other))
 
     read = {debian.package_of(path) for path in ninja_graph.files_read(options.build, options.programs)} - {None}
-    # Not of what is linked, for static libraries and headers are in packages of their own.
+    # Excludes linked libraries, because static libraries and headers are in packages of their own.
     inside = sorted(read - linked)
     for package in inside:
         document.relate(voxeld, "STATIC_LINK", add_debian(document, package), "code of its headers or static libraries is compiled in")

@@ -1,4 +1,4 @@
-"""An SPDX 2.3 document as it is put together: packages, relationships, licences that are not in SPDX's list."""
+"""Builds an SPDX 2.3 document: packages, relationships, licences that are not in SPDX's list."""
 import datetime
 import hashlib
 import json
@@ -16,7 +16,7 @@ def purl(kind, name, version, **more):
 
 
 class Document:
-    """Everything is sorted when it is written: the same content is the same bytes, whatever order it came in."""
+    """Everything is sorted when it is written, so the same content gives the same bytes, whatever the order of insertion."""
 
     def __init__(self, name, version, epoch):
         self.name, self.version, self.epoch = name, version, epoch
@@ -57,7 +57,7 @@ class Document:
             "hasExtractedLicensingInfos": [{"licenseId": key, "name": key, "extractedText": text}
                                            for key, text in sorted(self.licences.items())],
         }
-        # A name of its own for each content.
+        # A unique name for each content.
         digest = hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()[:32]
         document["documentNamespace"] = f"https://voxeld.invalid/spdx/{self.name}-{self.version}-{digest}"
         return json.dumps(document, indent=1, sort_keys=True, ensure_ascii=False) + "\n"
