@@ -25,9 +25,10 @@ bool IsGdalMap(absl::string_view extension);
 // Returns the folders that GDAL needs besides the file: PROJ's database of coordinate systems.
 std::vector<std::string> MapDataFolders();
 
-// Reads points, lines and the outlines of areas with the colours of KML's styles and all numeric fields; of a Shapefile also the files
-// .shx, .dbf, .prj and .cpg beside it. A flat map is in the map's own units. For a globe, projected coordinates become longitude and
-// latitude. Errors: InvalidArgument with GDAL's message.
+// Reads points, lines and the outlines of areas with the colours of KML's styles and all numeric
+// fields; of a Shapefile also the files .shx, .dbf, .prj and .cpg beside it. A flat map is in the
+// map's own units. For a globe, projected coordinates become longitude and latitude. Errors:
+// InvalidArgument with GDAL's message.
 absl::StatusOr<Model> ReadGdalMap(const SourceFile& file, bool globe, bool attributes = false);
 
 }  // namespace voxeld::voxelctl

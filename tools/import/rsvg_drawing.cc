@@ -220,8 +220,8 @@ class Drawing {
                                          &has_view_box, &box);
     if (rsvg_handle_get_intrinsic_size_in_pixels(handle_.get(), &page.width, &page.height) ==
         FALSE) {
-      // The drawing takes the size of the page around it, which does not exist here. So its shape is
-      // that of the view box, or otherwise of its ink.
+      // The drawing takes the size of the page around it, which does not exist here. So its shape
+      // is that of the view box, or otherwise of its ink.
       page.width = box.width;
       page.height = box.height;
       if (has_view_box == FALSE) {

@@ -15,8 +15,8 @@ struct CudaState {
   std::vector<std::string> devices;
 };
 
-// The user of a TCP port of this machine: a voxeld's port for clients, its http port, another program,
-// or nobody.
+// The user of a TCP port of this machine: a voxeld's port for clients, its http port, another
+// program, or nobody.
 enum class PortState : uint8_t { kFree, kClients, kHttp, kOther };
 
 struct Machine {

@@ -24,10 +24,9 @@ absl::StatusOr<Model> ImportByProgram(const std::string& path, const ImportOptio
                                       Interrupt* interrupt);
 
 // Opens animation `number`, from 1, of a mesh file or skeleton (glTF, FBX, COLLADA, BVH, …), with
-// frames at `fps` per second from beginning to end. Meshes follow their bones; without
-// meshes the bones are lines. The program runs as long as the result lives. `interrupt` may be
-// null. Errors: InvalidArgument if the animation does not exist, with the names of the existing ones;
-// as above.
+// frames at `fps` per second from beginning to end. Meshes follow their bones; without meshes the
+// bones are lines. The program runs as long as the result lives. `interrupt` may be null. Errors:
+// InvalidArgument if the animation does not exist, with the names of the existing ones; as above.
 absl::StatusOr<std::unique_ptr<FrameSource>> OpenAnimation(
     const std::string& path, size_t number, double fps, OtherFiles other_files = OtherFiles::kBelow,
     Interrupt* interrupt = nullptr);

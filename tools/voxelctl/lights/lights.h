@@ -17,8 +17,8 @@ absl::Status Input(const InputOptions& options, const Connector& connect, Interr
                    Console& console);
 
 // Shows all pictures that `descriptor` delivers, at the rate at which the server accepts them or at
-// the options' rate, until the input ends. Errors: InvalidArgument if the input ends within a picture.
-// With --json it writes one object at the end.
+// the options' rate, until the input ends. Errors: InvalidArgument if the input ends within a
+// picture. With --json it writes one object at the end.
 absl::Status Pipe(const PipeOptions& options, const Connector& connect, Interrupt& interrupt,
                   int descriptor, Console& console);
 
