@@ -4,9 +4,10 @@
     tools/advisories.py            writes them
     tools/advisories.py --check    writes nothing
 
-The source lists what is known to be wrong with what voxeld is linked with, and what that means for voxeld; its own comments say
-how. The page is for people, the other file is OpenVEX, for scanners. Every file and every test that the source or SECURITY.md names
-must exist. Exit status 1 and a line for each fault otherwise, or, with --check, if a file is not what would be written.
+The source lists the known vulnerabilities of the libraries that voxeld links, and what they mean for voxeld; its own comments explain
+the format. The page is for people; the other file is OpenVEX, for scanners. Every file and every test that the source or SECURITY.md
+names must exist. Otherwise, or with --check if a file differs from what would be written, the exit status is 1 and a line is printed
+for each fault.
 """
 import argparse
 import functools
@@ -23,17 +24,17 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "docs/security"
 SOURCE = FOLDER / "advisories.toml"
 SECURITY = ROOT / "SECURITY.md"
-# OpenVEX's.
+# The justifications that OpenVEX defines.
 JUSTIFICATIONS = {"component_not_present", "vulnerable_code_not_present", "vulnerable_code_not_in_execute_path",
                   "vulnerable_code_cannot_be_controlled_by_adversary", "inline_mitigations_already_exist"}
-# What must stand beside a status.
+# The key that each status requires.
 NEEDS = {"not_affected": "justification", "affected": "action", "fixed": None, "under_investigation": None}
 WORDS = {"not_affected": "no", "affected": "**yes**", "fixed": "no: repaired by Debian", "under_investigation": "*not known*"}
 
 
 @functools.cache
 def tests():
-    """Names of all tests: Suite.Case of C++, module.Class.test of Python, NAME of ctest's own."""
+    """Returns: the names of all tests: Suite.Case for C++, module.Class.test for Python, NAME for ctest."""
     found = set()
     listed = subprocess.run(["git", "-C", ROOT, "ls-files", "--cached", "--others", "--exclude-standard", "tests"],
                             capture_output=True, text=True, check=True).stdout.split()
@@ -57,7 +58,7 @@ def tests():
 
 
 def faults(source):
-    """What is wrong with the source, line by line."""
+    """Returns: the faults of the source, line by line."""
     wrong = []
     libraries = {one["name"] for one in source["library"]}
     seen = set()
@@ -89,7 +90,7 @@ def faults(source):
 
 
 def wrapped(line):
-    """The line in parts of at most 140 characters."""
+    """Returns: the line in parts of at most 140 characters."""
     return [line] if len(line) <= 140 else textwrap.wrap(line, 140, break_long_words=False, break_on_hyphens=False)
 
 

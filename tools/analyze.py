@@ -37,7 +37,7 @@ def includers():
         with open(path, encoding="utf-8") as file:
             names = INCLUDE.findall(file.read())
         for name in names:
-            # As the compiler looks for it: beside the file that includes it, then in the root, then where users' programs have the client.
+            # Searched in the compiler's order: beside the including file, then in the root, then where users' programs have the client.
             for place in (os.path.normpath(os.path.join(os.path.dirname(path), name)), name, "client/cpp/" + name):
                 if place in known:
                     found.setdefault(place, []).append(path)
@@ -124,7 +124,8 @@ def run(mode, build_dir, path, commands):
 
 
 def optional(path):
-    """CUDA sources, sources of switched-off parts and some tests' main files are built elsewhere, some only where there is a GPU."""
+    """Returns whether the file is a CUDA source, a source of a disabled part or some test's main file, which are built elsewhere,
+    some of them only with a GPU."""
     return path.endswith("-inl.h") or re.match(r"gpu/cuda/|tools/bench/(frame|paper)/(no_)?cuda_"
                     r"|tests/.*cuda|tests/gpu/simt/(include/|vectors\.h|engines_simt\.cc)|tests/gpu/worker/illegal_|tests/fuzz/packed_main\.cc", path)
 

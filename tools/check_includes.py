@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks that includes point the way that ARCHITECTURE.md says, and that gRPC stays behind its two doors."""
+"""Checks that includes follow the directions in ARCHITECTURE.md, and that only the two allowed places include gRPC."""
 
 import os
 import re
@@ -17,14 +17,14 @@ ALLOWED = {
     "display/usb": ["display/api", "display/sync"],
     "display/conformance": ["display/sync", "display/usb"],
     "display/emulator": ["display/api", "display/sync", "display/usb", "display/geometry",
-                         # The protocol's words, shared by both ends; never the driver.
+                         # The protocol's definitions, which both ends share; never the driver.
                          "display/drivers/voxlink/protocol", "display/drivers/voxlink/packet",
                          "display/drivers/voxlink/assembler", "display/drivers/voxlink/capabilities",
                          "display/drivers/voxlink/decoder",
                          "display/drivers/fadecandy/protocol"],
     "display/drivers": ["display/api", "display/conformance", "display/crc", "display/sync", "display/usb",
                         "display/geometry"],
-    # The one driver whose device is not on a bus: it brings its model and carrier along.
+    # The only driver whose device is not on a bus: it contains its model and carrier.
     "display/drivers/simulated": ["display"],
     "gpu": ["display/api", "display/crc", "display/geometry", "display/sync"],
     "daemon": ["gpu", "display", "voxeld/v1", "daemon"],
@@ -35,49 +35,49 @@ ALLOWED = {
     "daemon/access": ["display/sync", "daemon/address", "daemon/log"],
     "daemon/listen": ["display/sync", "daemon/address", "daemon/core/stats", "daemon/log"],
     "tools": ["voxeld", "display/geometry", "display/api", "display/sync", "gpu", "tools",
-              # What an address looks like, and what was meant: alike at both ends.
+              # The syntax of an address, and suggestions: the same at both ends.
               "daemon/address", "daemon/usage",
-              # What a display's geometry is, on the wire.
+              # The protobuf form of a display's geometry.
               "daemon/geometry_wire",
               # Strokes of letters: in scenes and in pictures of them.
               "daemon/text",
               # Colour maps and pictures of meshes, read as the daemon reads them.
               "daemon/colormaps", "daemon/pictures"],
-    # Emulated devices are of display; this is their program.
+    # Emulated devices belong to display; this is the program that runs them.
     "tools/emulator": ["display", "daemon/usage", "tools/emulator"],
     "tools/bench": ["gpu", "display", "daemon/wire", "voxeld/v1", "tools/bench"],
     "tools/bench/voxel_bench": ["display/sync", "voxeld/v1", "tools/child", "daemon/process",
                                 "tools/bench/frame",
                                 "tools/bench/paper"],
-    # The one command that opens displays itself; it reads them as the daemon does.
+    # The only command that opens displays itself; it parses them as the daemon does.
     "tools/voxelctl/verify": ["display/conformance", "display/drivers/registry", "display/drivers/driver_context",
                               "display/drivers/options", "display/sync", "display/usb", "daemon/config/display_config",
                               "daemon/config/display_view", "tools/voxelctl"],
-    # What is calibrated is shown as the daemon would.
+    # A display is shown during calibration as the daemon would show it.
     "tools/voxelctl/calibrate": ["display/drivers/registry", "display/drivers/options", "display/drivers/driver_context",
                                  "display/profiles", "display/sync", "display/api", "display/usb", "gpu", "daemon/config",
                                  "daemon/core", "display/geometry", "tools/voxelctl"],
-    # A profile that was written is tried as the daemon would.
+    # A written profile is tested as the daemon would use it.
     "tools/voxelctl/init": ["display/drivers/registry", "display/drivers/options", "display/profiles", "display/sync",
                             "tools/voxelctl"],
-    # What comes in by the protocols by which pictures go out.
+    # Receives the protocols in which the network driver sends pictures.
     "tools/lights": ["display/drivers/network/protocol", "display/sync", "daemon/address", "tools/lights"],
     "tools/voxelctl/lights": ["display/drivers/wiring", "display/sync", "gpu/affine", "voxeld", "tools/lights", "tools/voxelctl"],
     "tools/markers": ["voxeld", "scene_update", "display/sync", "tools/markers"],
-    # A program of its own over what of voxelctl makes its connection and shows what comes in.
+    # A separate program, which uses the parts of voxelctl that connect and that show received scenes.
     "tools/ros": ["voxeld/credentials", "daemon/usage", "display/sync", "tools/markers", "tools/voxelctl/cli/server_options",
                   "tools/voxelctl/commands/console", "tools/voxelctl/connection/address", "tools/voxelctl/connection/connection",
                   "tools/voxelctl/feed", "tools/voxelctl/process", "tools/voxelctl/text", "tools/ros"],
     "tools/recording": ["voxeld/v1", "tools/recording"],
-    # Tokens are made as the daemon reads them.
+    # Tokens are made in the form that the daemon reads.
     "tools/voxelctl/token": ["daemon/access", "daemon/address", "tools/voxelctl"],
-    # And this reads descriptions of displays as the daemon does.
+    # Parses descriptions of displays as the daemon does.
     "tools/voxelctl/profile": ["display/api", "display/drivers/options", "display/drivers/usb_options",
                                "display/drivers/simulated", "display/geometry", "display/profiles",
                                "tools/voxelctl"],
-    # Its own headers are "voxeld/…", as its users write them.
+    # Its own headers are "voxeld/…", in the form that its users write.
     "client": ["voxeld", "display/sync", "daemon/address"],
-    # What users see has neither protobuf nor anything else of ours.
+    # Public headers use neither protobuf nor anything else of this project.
     "client/cpp/voxeld": ["voxeld/address.h", "voxeld/basics.h", "voxeld/credentials.h", "voxeld/drawing.h", "voxeld/expression.h",
                           "voxeld/receipt.h", "voxeld/shapes.h"],
     "client/cpp/examples": ["voxeld/client.h"],
@@ -87,12 +87,12 @@ ALLOWED = {
 # Every folder may include these.
 SHARED = ("common/",)
 
-# The only places that may include gRPC's headers: one on each side of the wire. No header does.
+# The only places that may include gRPC's headers: one on each side of the connection. No header includes them.
 GRPC = ("daemon/services/", "tools/voxelctl/connection", "tools/bench/voxel_bench/", "client/cpp/")
 GRPC_TESTS = ("tests/daemon/services/", "tests/e2e/", "tests/hil/", "tests/tools/", "tests/integration/")
 PROTOBUF_FREE = ("common/", "gpu/", "display/", "daemon/scene/", "daemon/core/", "daemon/pipeline/", "daemon/config/")
 
-# What is written from the repository root, or from where protobuf's files are made.
+# Includes that are relative to the repository root, or to protobuf's output folder.
 OURS = re.compile(r"(common|display|gpu|daemon|tools|client|tests|voxeld)/")
 INCLUDE = re.compile(r'^\s*#\s*include\s+([<"])([^">]+)[">]')
 
@@ -103,8 +103,8 @@ def rule_of(path):
 
 
 def wrong_includes(path, lines, own_header=os.path.exists):
-    """What is wrong with the includes of a file, whose path is from the repository root. own_header says whether there
-    is a header of that path."""
+    """Returns: what is wrong with the includes of a file, whose path is relative to the repository root. own_header says whether a
+    header exists at a path."""
     folder = rule_of(path)
     if folder is None:
         return [f"{path}: lies in no folder that has a rule"]
@@ -129,7 +129,7 @@ def wrong_includes(path, lines, own_header=os.path.exists):
         if target.startswith("google/protobuf/") and path.startswith(PROTOBUF_FREE):
             wrong.append(f"{where}: {folder} knows no protobuf")
         if not OURS.match(target):
-            # These are built outside of the tree as well.
+            # These are also built outside of the tree.
             if kind == '"' and not path.startswith(("client/cpp/examples/", "display/drivers/voxlink/firmware/")) and os.path.exists(os.path.join(os.path.dirname(path), target)):
                 wrong.append(f'{where}: "{target}" is not written from the repository root')
             continue

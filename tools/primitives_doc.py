@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes docs/primitives.md from what the wire contract, the engine's headers and the gallery's examples say.
+"""Writes docs/primitives.md from the comments of the wire contract and the engine's headers, and from the gallery's examples.
 
     tools/primitives_doc.py            writes it
     tools/primitives_doc.py --check    exit status 1 if it is not what would be written
@@ -16,7 +16,7 @@ EXAMPLES = ROOT / "tools/voxelctl/shape/examples.cc"
 OUT = ROOT / "docs/primitives.md"
 PICTURES = "images/primitives"
 
-# What headers say of a shape, if it is not the one that is called as the shape is.
+# The headers that describe a shape, if they are not named after it.
 _SOLID, _FIELD, _CURVE = ["solid.h", "solid_voxels.h"], ["../implicit/field.h"], ["../curves/cut.h"]
 HEADERS_OF = {
     "Segments": ["segments.h", "line.h", "capsule.h"],
@@ -32,16 +32,16 @@ HEADERS_OF = {
     "Volume": ["samples.h"], "Isosurface": ["samples.h"],
     "Instance": [],
 }
-# Within rims another distance counts than the general method's.
+# Within rims, a distance other than the general method's counts.
 FLAT = ("Disc", "Patch", "Polygon")
 
-# Of fields that say nothing in brackets: unit and default, by their type.
+# Unit and default by type, for fields that give none in brackets.
 BY_TYPE = {
     "Vertices": ("–", "needed"), "Grid": ("–", "needed"),
     "Thickness": ("voxels or length", "0: one voxel"),
     "bool": ("–", "false"),
 }
-# What is meant where a field of that name says nothing.
+# Descriptions of fields without one, by name.
 BY_NAME = {"shell": "how thick the surface is", "thickness": "how thick it is"}
 
 HEAD = """# Primitives
@@ -104,7 +104,7 @@ voxelctl draw "implicit surface='z = 0.3*sin(5*x)*cos(5*y)' level='z+0.5' colorm
 
 
 def wrapped(text: str) -> str:
-    """The same in lines of at most 140 characters, where it has longer ones; a list's lines are indented."""
+    """Returns: the text with lines longer than 140 characters wrapped; a list's lines are indented."""
     lines = []
     for line in text.split("\n"):
         indent = "  " if line.startswith("- ") else re.match(r" *", line)[0]
@@ -121,7 +121,7 @@ def comment_above(lines: list[str], at: int) -> str:
 
 
 def messages() -> dict[str, tuple[str, list[tuple[str, str, str]]]]:
-    """Of each message at the top: what stands above it, and (type, name, comment) of each field."""
+    """Returns: for each top-level message, the comment above it, and (type, name, comment) of each field."""
     lines = PROTO.read_text().split("\n")
     found = {}
     for i, line in enumerate(lines):
@@ -146,7 +146,8 @@ def messages() -> dict[str, tuple[str, list[tuple[str, str, str]]]]:
 
 
 def enums() -> dict[str, list[tuple[str, str]]]:
-    """By "Message.Enum", or "Enum" at the top: (value, comment) of each, as voxelctl takes them; what counts unless told, first."""
+    """Returns: by "Message.Enum", or "Enum" at the top: (value, comment) of each, as voxelctl accepts them; the default value is
+    first."""
     owner, name, found, above = "", "", {}, []
     for line in PROTO.read_text().split("\n"):
         if start := re.match(r"message (\w+) \{", line):
@@ -169,18 +170,18 @@ def enums() -> dict[str, list[tuple[str, str]]]:
 
 
 def words(values: list[tuple[str, str]]) -> str:
-    """`a`, `b` or `c`."""
+    """Returns: `a`, `b` or `c`."""
     named = [f"`{value}`" for value, _ in values]
     return " or ".join(filter(None, [", ".join(named[:-1]), named[-1]]))
 
 
 def unless_told(values: list[tuple[str, str]]) -> str:
-    """What UNSPECIFIED says that it is."""
+    """Returns: the default value that UNSPECIFIED's comment names."""
     return values[0][1].lower()
 
 
 def allowed(values: list[tuple[str, str]], said: str) -> tuple[list[tuple[str, str]], str]:
-    """The values that a field takes, by "not SOLID" or "SURFACE or SOLID" in what is said of it; and what else is said."""
+    """Returns: the values that a field allows, by "not SOLID" or "SURFACE or SOLID" in its comment; and the rest of the comment."""
     taken = values[1:]
     if only := re.match(r"([A-Z]+) or ([A-Z]+)(; |$)", said):
         taken = [v for v in taken if v[0].upper() in only.groups()]
@@ -192,7 +193,7 @@ def allowed(values: list[tuple[str, str]], said: str) -> tuple[list[tuple[str, s
 
 
 def table(message: str, fields: list[tuple[str, str, str]], values: dict[str, list[tuple[str, str]]]) -> list[str]:
-    """The fields of a message, and what its own words mean."""
+    """Returns: a table of a message's fields with their descriptions."""
     out, own = ["| field | type | unit | default | |\n|---|---|---|---|---|"], []
     for kind, name, said in fields:
         unit, default = BY_TYPE.get(kind, ("", ""))
@@ -215,14 +216,14 @@ def table(message: str, fields: list[tuple[str, str, str]], values: dict[str, li
 
 
 def kinds() -> list[tuple[str, str]]:
-    """(message, field) of each shape, in the wire's order."""
+    """Returns: (message, field) of each shape, in the protocol's order."""
     body = re.search(r"message Primitive \{\s*oneof kind \{(.*?)\}", PROTO.read_text(), re.S)
     assert body
     return re.findall(r"(\w+) (\w+) = \d+;", body[1])
 
 
 def paragraphs(text: str) -> tuple[str, str]:
-    """What a comment says, and what it guarantees."""
+    """Returns: a comment's description, and its guarantees."""
     parts = text.split("\n\n")
     said = [part for part in parts if not part.startswith("Guarantee: ")]
     promised = [part.removeprefix("Guarantee: ").replace("\n", " ") for part in parts if part.startswith("Guarantee: ")]
@@ -230,7 +231,7 @@ def paragraphs(text: str) -> tuple[str, str]:
 
 
 def headers(message: str) -> list[tuple[str, str, str]]:
-    """(header, what it says, what it guarantees) of each that says which voxels a shape covers."""
+    """Returns: (header, description, guarantees) for each header that says which voxels a shape covers."""
     found = []
     for name in HEADERS_OF.get(message, [f"{message.lower()}.h"]):
         path = (HEADERS / name).resolve()
@@ -242,7 +243,7 @@ def headers(message: str) -> list[tuple[str, str, str]]:
 
 
 def picture(name: str) -> str:
-    """An example's, as the gallery calls it; it must be there."""
+    """Returns: an example's picture, by the gallery's name for it; it must exist."""
     file = re.sub(r"[^a-z0-9_]+", "-", name.lower()) + ".png"
     if not (OUT.parent / PICTURES / file).exists():
         sys.exit(f"docs/{PICTURES}/{file} is missing; voxelctl gallery docs/images/gallery.png --each docs/{PICTURES}")
@@ -250,7 +251,7 @@ def picture(name: str) -> str:
 
 
 def examples() -> dict[str, list[tuple[str, str]]]:
-    """By field: (name, text) of each of the gallery's."""
+    """Returns: by field: (name, text) of each of the gallery's examples."""
     text = EXAMPLES.read_text()
     body = text[text.index("kExamples[]"):text.index("std::span<const ShapeExample> ShapeExamples")]
     result: dict[str, list[tuple[str, str]]] = {}
@@ -264,7 +265,7 @@ def examples() -> dict[str, list[tuple[str, str]]]:
 def page() -> str:
     all_messages, values, shown = messages(), enums(), examples()
     out = [HEAD]
-    pages: dict[str, str] = {}  # where a header's words stand
+    pages: dict[str, str] = {}  # headers' comments by page
     for message, field in kinds():
         above, fields = all_messages[message]
         about, promised = paragraphs(above)

@@ -10,7 +10,7 @@ import sys
 import time
 
 STEP = re.compile(rb"@ (\d+) (\d+) (.*)")
-EVERY_S = 10.0  # between lines that stay
+EVERY_S = 10.0  # between permanent lines
 FIRST_ESTIMATE = 0.03  # The first steps are short: an estimate from them alone would be far too low.
 
 
@@ -56,5 +56,5 @@ def main() -> None:
 if __name__ == "__main__":
     try:
         main()
-    except KeyboardInterrupt:  # the build, which got it too, ends by itself
+    except KeyboardInterrupt:  # the build also received it and ends itself
         sys.exit(130)

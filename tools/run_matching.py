@@ -39,7 +39,7 @@ def tests_of(build):
 
 
 def is_deep(test):
-    """Whether the test needs what only tools/setup --dev installs."""
+    """Returns whether the test needs what only tools/setup --dev installs."""
     return any(entry["name"] == "LABELS" and "deep" in entry["value"] for entry in test.get("properties", []))
 
 
@@ -74,7 +74,7 @@ def targets_of(build, tests):
 
 
 def programs_with(build, case_pattern):
-    """Test programs by the names of the cases in their sources, with the cases that match."""
+    """Returns: test programs by the names of the cases in their sources, with the cases that match."""
     with open(os.path.join(build, "compile_commands.json"), encoding="utf-8") as file:
         entries = json.load(file)
     programs = {}

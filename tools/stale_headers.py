@@ -13,7 +13,7 @@ from pathlib import Path
 
 
 def is_stale(build, precompiled):
-    """Returns: whether a header in `precompiled` came to this machine after it was made. Generated headers are left to Ninja."""
+    """Returns: whether a header in `precompiled` was installed after it was built. Generated headers are left to Ninja."""
     made = precompiled.stat().st_mtime
     listed = subprocess.run(["ninja", "-C", build, "-t", "deps", precompiled.relative_to(build)], capture_output=True, text=True, check=False)
     for line in listed.stdout.splitlines():

@@ -18,7 +18,7 @@ def main():
     parser.add_argument("build")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
-    # In a folder of its own, since ctest empties the log of a build whose tests it lists, also while they run.
+    # Uses a folder of its own, because ctest empties the log of a build whose tests it lists, even while they run.
     with tempfile.TemporaryDirectory() as folder:
         with open(os.path.join(folder, "CTestTestfile.cmake"), "w", encoding="utf-8") as file:
             file.write(f'subdirs("{os.path.abspath(arguments.build)}")\n')
