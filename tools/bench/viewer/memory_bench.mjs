@@ -1,7 +1,8 @@
-// The page's memory while very many commits come, a third of the time in a tab that is frozen as hidden ones are: JavaScript's heap
-// after collection, buffers of the GPU renderer, and what the browser's processes and the daemon hold, every twentieth of the way.
+// Measures the page's memory while very many commits come, for a third of the time in a tab that is frozen like hidden
+// ones: JavaScript's heap after collection, buffers of the GPU renderer, and the memory of the browser's processes and
+// the daemon, after every twentieth of the run.
 //   node memory_bench.mjs --bin DIR --wheel WHEEL --modules NODE_MODULES [--commits N] [--renderer 2d|gl] [--json]
-// Ends with 1 if the last fifth holds more than the second fifth (the first is for warming up) by a tenth.
+// Ends with 1 if the last fifth holds a tenth more than the second fifth (the first is for warming up).
 import { spawn } from "node:child_process";
 import { mkdtempSync, readFileSync, readdirSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
@@ -22,7 +23,7 @@ if (!options.bin || !options.wheel || !options.modules) {
 }
 const { chromium } = createRequire(join(resolve(options.modules), "x"))("playwright-core");
 const kSamples = 20;
-const kMore = 1.1; // of the last fifth over the second
+const kMore = 1.1; // ratio of the last fifth to the second
 const folder = mkdtempSync(join(tmpdir(), "voxeld-page-memory-"));
 const server = `unix:${folder}/voxeld.sock`;
 const port = await new Promise((done) => {
@@ -37,7 +38,7 @@ const daemon = spawn(join(options.bin, "voxeld"), ["--listen", server, "--http",
 await new Promise((done) => daemon.stdout.on("data", (text) => /engine:/.test(text) && done()));
 
 const resident = (pid) => Number(/^VmRSS:\s+(\d+)/m.exec(readFileSync(`/proc/${pid}/status`, "utf8"))?.[1] ?? 0) * 1024;
-// A process and those that it began.
+// Returns a process and its descendants.
 function family(pid) {
   const parents = readdirSync("/proc").filter((name) => /^\d+$/.test(name)).flatMap((name) => {
     try {
@@ -87,7 +88,7 @@ try {
     { env: { ...process.env, PYTHONPATH: options.wheel }, stdio: ["pipe", "pipe", "inherit"] });
   const lines = createInterface({ input: child.stdout })[Symbol.asyncIterator]();
   for (let turn = 0; turn < kSamples; ++turn) {
-    // Every third part of the way nobody sees the tab.
+    // The tab is hidden during every third part of the run.
     const hidden = turn % 3 === 2;
     if (hidden) await lifecycle.send("Page.setWebLifecycleState", { state: "frozen" });
     child.stdin.write("go\n");

@@ -1,5 +1,5 @@
-// The page measured in a headless browser without a GPU: pictures a second of a still rotor that is walked around; from a
-// commit to its pixels; what a viewer costs the daemon, none, one, and one that sleeps.
+// Measures the page in a headless browser without a GPU: pictures per second while the camera moves around a static
+// rotor; the time from a commit to its pixels; and the daemon's cost with no viewer, one viewer, and one that sleeps.
 //   node page_bench.mjs --bin DIR --wheel WHEEL --modules NODE_MODULES [--points N] [--seconds S] [--json]
 import { execFileSync, spawn } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync } from "node:fs";
@@ -36,13 +36,13 @@ const daemon = spawn(join(options.bin, "voxeld"), ["--listen", server, "--http",
   "--display", "rotor=simulated,geometry=rotor,size=128x64,slices=360,rate=30"], { stdio: ["ignore", "pipe", "inherit"] });
 await new Promise((done) => daemon.stdout.on("data", (text) => /engine:/.test(text) && done()));
 
-// Seconds of processor time that the daemon has used.
+// Returns the seconds of CPU time that the daemon has used.
 const used = () => {
   const fields = readFileSync(`/proc/${daemon.pid}/stat`, "utf8").split(") ")[1].split(" ");
   return (Number(fields[11]) + Number(fields[12])) / kTicks;
 };
 
-// All that was committed, once it has ended.
+// Starts a feed. Returns: its commits so far, and a promise of all of them that resolves when the feed ends.
 function feed(points, rate, time) {
   const child = spawn("/usr/bin/python3", [join(dirname(fileURLToPath(import.meta.url)), "feed.py"), server, String(points), String(rate), String(time)],
     { env: { ...process.env, PYTHONPATH: options.wheel }, stdio: ["ignore", "pipe", "inherit"] });
@@ -82,7 +82,7 @@ const watchDrawn = (page) => page.evaluate(() => {
 
 const result = { points: Number(options.points) };
 try {
-  const still = feed(options.points, 0.5 / seconds, seconds + 8); // one commit, which stays up meanwhile
+  const still = feed(options.points, 0.5 / seconds, seconds + 8); // one commit, which stays shown meanwhile
   const { page, first } = await open();
   result.first_picture_ms = first;
   await page.waitForFunction(() => globalThis.voxeld.inspect().drawn.points > 1000);
@@ -105,7 +105,7 @@ try {
   await still.ended;
   await page.close();
 
-  // What a viewer costs: the same feed without, with, and with one that is there and does not answer.
+  // The cost of a viewer: the same feed without one, with one, and with one that is connected and does not respond.
   const cost = async (whileFed) => {
     const fed = feed(20_000, 10, seconds + 2);
     await pause(2000);
@@ -124,7 +124,7 @@ try {
   result.commit_to_pixels_ms = told(drawn.map((commit) => seen.get(commit.volume) - commit.made));
   result.commit_to_light_ms = told(one.commits.map((commit) => commit.shown - commit.made));
   result.beyond_the_volume_ms = told(drawn.map((commit) => seen.get(commit.volume) - commit.shown));
-  await viewer.page.evaluate(() => (globalThis.requestAnimationFrame = () => 0)); // as a tab that nobody sees
+  await viewer.page.evaluate(() => (globalThis.requestAnimationFrame = () => 0)); // like a hidden tab
   const asleep = await cost(() => pause(seconds * 1000));
   result.cores = { without: none.share, with_one: one.share, asleep: asleep.share, of_one: one.share - none.share, of_a_sleeper: asleep.share - none.share };
 } finally {
