@@ -1,4 +1,4 @@
-"""Many lives at a time, each with a client's process of its own: what gRPC keeps of one server would be in the next one's way."""
+"""Runs many lives at a time, each with a client process of its own: state that gRPC keeps for one server would disturb the next one."""
 import argparse
 import concurrent.futures
 import multiprocessing as mp
@@ -13,7 +13,7 @@ Case = TypeVar("Case", bound=tuple[Any, ...])
 Result = TypeVar("Result")
 
 _CONTEXT = mp.get_context("forkserver")
-_CONTEXT.set_forkserver_preload(["numpy", "voxeld"])  # read once, of the folders that PYTHONPATH has
+_CONTEXT.set_forkserver_preload(["numpy", "voxeld"])  # read once from the folders in PYTHONPATH
 _STARTING = threading.Lock()
 
 
@@ -40,8 +40,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def chosen(cases: Sequence[Case], key: Callable[[Case], object], options: argparse.Namespace) -> list[Case]:
-    """What of them the options want, in an order of chance, so that those that are left are like those that are not. Where a case comes, and into
-    which part, is by its key and the seed alone: also where there are some more or less of others."""
+    """Returns the cases that the options select, in random order, so that the cases that are left out resemble those that are run. The
+    position of a
+    case, and the part that it belongs to, depend only on its key and the seed; adding or removing other cases does not change them."""
     part, parts = (int(number) for number in options.part.split("/"))
 
     def place(case: Case) -> int:
@@ -57,7 +58,7 @@ class Judged(Protocol):
 
 
 def verdict(results: Sequence[Judged]) -> int:
-    """The program's exit status: 1 if one of them is wrong, or if nothing failed in any."""
+    """Returns the program's exit status: 1 if a result is wrong, or if no case had a failure."""
     if any(result.wrong for result in results):
         return 1
     if all(result.how == "missed" for result in results):
@@ -71,7 +72,9 @@ def _send(pipe: Connection, run: Callable[..., Any], case: tuple[Any, ...]) -> N
 
 
 def _apart(run: Callable[..., Result], case: tuple[Any, ...]) -> Result:
-    """What it comes to. What ends without that, in what is made ready for it (a port that another life has taken meanwhile), is begun once more."""
+    """Returns the result of one case. If the process ends without a result while its case is being set up (for example because another life
+    has taken
+    its port), the case is run again."""
     for last in (False, True):
         here, there = _CONTEXT.Pipe(duplex=False)
         process = _CONTEXT.Process(target=_send, args=(there, run, case))
@@ -92,7 +95,7 @@ def _apart(run: Callable[..., Result], case: tuple[Any, ...]) -> Result:
 
 
 def each(run: Callable[..., Result], cases: Iterable[tuple[Any, ...]], jobs: int, within: float = 0, tell: Callable[[Result], None] = lambda result: None) -> list[Result]:
-    """run(*case) of each, in their order as far as `jobs` at a time allow; `tell` of each as it is there."""
+    """Calls run(*case) for each case, in order, as far as `jobs` at a time allow, and calls `tell` for each result as it arrives."""
     ends = time.monotonic() + within if within else float("inf")
     left = iter(cases)
     results: list[Result] = []

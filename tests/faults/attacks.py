@@ -35,7 +35,7 @@ from polling import until
 from programs import program
 
 PATIENCE = 60.0
-LEFT_FOR = 10.0  # s that a daemon has to give back what an owner held
+LEFT_FOR = 10.0  # seconds that a daemon has to release what an owner held
 
 
 class Daemon:
@@ -68,7 +68,7 @@ class Daemon:
     def shows(self) -> bool:
         try:
             return 'state="showing"} 1' in self.get("/metrics")
-        except OSError:  # it does not listen yet
+        except OSError:  # the daemon does not listen yet
             return False
 
     def memory_mib(self, what: str = "VmRSS") -> float:
@@ -77,12 +77,12 @@ class Daemon:
         return int(found[1]) / 1024 if found else 0.0
 
     def left_mib(self) -> float:
-        """Returns: resident memory LEFT_FOR seconds after the owners have left. The time is part of what is measured."""
+        """Returns the resident memory in MiB, LEFT_FOR seconds after the owners have left. The wait is part of the measurement."""
         time.sleep(LEFT_FOR)
         return self.memory_mib()
 
     def idle_mib(self) -> float:
-        """Returns: resident memory after an owner with a small moving scene has left. Then the display has its own buffers."""
+        """Returns the resident memory in MiB after an owner with a small moving scene has left. By then the display has allocated its own buffers."""
         with self.connect("first") as v:
             for step in range(100):
                 v.box("all", size=2 - 0.01 * step)
@@ -208,7 +208,7 @@ def owners(_: int, limit: int) -> dict[str, list[float]]:
         def guarded(number: int) -> None:
             try:
                 attack(number)
-            except BaseException as error:  # raised below, in the thread that waits
+            except BaseException as error:  # raised again below, in the waiting thread
                 errors.append(error)
 
         threads = [threading.Thread(target=guarded, args=(number,)) for number in range(len(admitted))]
@@ -224,7 +224,8 @@ def owners(_: int, limit: int) -> dict[str, list[float]]:
 
 
 def until_refused(limit: int, most: int, at_once: int, put: "Callable[[voxel.Layer, str], None]") -> dict[str, list[float]]:
-    """Puts entities up, `at_once` in a commit, until one is refused or there are `most`."""
+    """Inserts entities, `at_once` in each commit, until one is refused or `most` have been inserted. Returns the
+    measurements."""
     with Daemon(limit) as daemon:
         idle = daemon.idle_mib()
         issues: list[str] = []

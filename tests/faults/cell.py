@@ -1,4 +1,4 @@
-"""A daemon under a load, and who goes on beside it (fault_matrix_test). Paths are in VOXELD and PYTHONPATH."""
+"""A daemon under a load, and a client beside it that must not notice a fault (fault_matrix_test). The paths are in VOXELD and PYTHONPATH."""
 import contextlib
 import json
 import os
@@ -49,8 +49,8 @@ class Cell:
             f'[server]\nlisten = [{listen}]\nhttp = "127.0.0.1:{self.http}"\n[state]\ndir = "{self.folder}/state"\n{security}'
             f'[engine]\n{engine}[[display]]\nname = "hurt"\n{DISPLAYS}{hurt}[[display]]\nname = "well"\n{DISPLAYS}', encoding="utf-8")
         self.environment = {**os.environ, **(environment or {})}
-        self.told = ""  # by health, now and then
-        self.moved: set[str] = set()  # metrics that a fault has seen itself
+        self.told = ""  # what /healthz says, sampled now and then
+        self.moved: set[str] = set()  # metrics that a fault has already seen change
         self.goes_on: Optional["GoesOn"] = None
         self.start()
         test.addCleanup(self.close)
@@ -74,7 +74,7 @@ class Cell:
         return Path(f"{self.folder}/log").read_text(encoding="utf-8", errors="replace")
 
     def health(self, timeout: float = LONG) -> str:
-        """Its answer, 200 or 503."""
+        """Returns the text that /healthz answers, whether with 200 or 503."""
         try:
             with urllib.request.urlopen(f"http://127.0.0.1:{self.http}/healthz", timeout=timeout) as answer:
                 return str(answer.read().decode())
@@ -82,19 +82,20 @@ class Cell:
             return str(error.read().decode())
 
     def metrics(self) -> dict[str, float]:
-        """Of samples alone: what is said about them is in every answer."""
+        """Returns the samples only; the descriptions of the metrics are the same in every answer."""
         with urllib.request.urlopen(f"http://127.0.0.1:{self.http}/metrics", timeout=LONG) as answer:
             lines = answer.read().decode().splitlines()
         return {line.rpartition(" ")[0]: float(line.rpartition(" ")[2]) for line in lines if line and not line.startswith("#")}
 
     def watch_health(self, seconds: float, says: str = "") -> None:
-        """What it says meanwhile is kept; a daemon that is stopped says nothing. `says`: and for longer, LONG at most, until it has said that."""
+        """Records what /healthz says in the meantime; a stopped daemon says nothing. With `says`, goes on (for LONG at most) until it has
+        said that."""
         end = time.monotonic() + seconds
         last = end + LONG if says else end
         while time.monotonic() < end or time.monotonic() < last and self.daemon.poll() is None and not re.search(says, self.told):
             with contextlib.suppress(OSError, urllib.error.URLError):
                 self.told += self.health(max(0.05, end - time.monotonic())) + "\n"
-            time.sleep(0.05)  # the pace at which it is asked
+            time.sleep(0.05)  # the interval between queries
 
     def certificate(self, name: str) -> None:
         subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "2", "-subj", f"/CN={name}",
@@ -117,7 +118,7 @@ class Cell:
         self.test.assertEqual(self.load.stdout.readline(), "ready\n")
 
     def end_load(self) -> dict[str, int]:
-        """What became of everything; what was drawn stays up until close()."""
+        """Ends the load and returns the outcomes of its commits; what was drawn stays visible until close()."""
         if self.load is None:
             return {}
         assert self.load.stdin is not None and self.load.stdout is not None
@@ -147,7 +148,7 @@ class Cell:
 
 
 class GoesOn:
-    """A client that is to notice nothing: each commit is shown on the display that is well."""
+    """A client that must not notice anything: each of its commits is shown on the healthy display."""
 
     def __init__(self, cell: Cell) -> None:
         self.commits, self.wrong = 0, ""
@@ -175,7 +176,7 @@ class GoesOn:
 
 
 def same_light(cell: Cell) -> None:
-    """Both displays have the same, and it is not darkness."""
+    """Checks that both displays show the same, and that they are not dark."""
     with voxel.connect(cell.server, name="last", timeout=LONG) as v:
         v.layer("last").box("box", size=(0.4, 0.4, 0.4), color="white", fill="solid")
         accepted = v.commit().wait(LONG).accepted

@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
-"""So many clients at once, each with a layer of its own, which commit at a rate until a line comes in; then each waits for all that it is
-owed, and a line of JSON says what became of everything.
-For fault_matrix_test, and by hand: two lines on standard input end it. PYTHONPATH has the client."""
+"""Runs a number of clients at once, each with a layer of its own. They commit at a fixed rate until a line arrives on standard input; then
+each waits
+for all outstanding outcomes, and one line of JSON reports the results. For fault_matrix_test and manual use: two lines on standard input
+end it.
+PYTHONPATH has the client."""
 import argparse
 import contextlib
 import json
@@ -36,10 +38,10 @@ mutex = threading.Lock()
 
 
 def settle(frames: list[voxel.Frame]) -> None:
-    """A commit has ended as it should: refused, lost with its connection, or accepted with an outcome for each display."""
+    """Checks that a commit has ended properly: refused, lost with its connection, or accepted with an outcome for each display."""
     deadline = time.monotonic() + LONG
     for frame in frames:
-        with contextlib.suppress(voxel.VoxelError, TimeoutError):  # what came of it is looked at below
+        with contextlib.suppress(voxel.VoxelError, TimeoutError):  # the result is checked below
             frame.wait_shown(timeout=max(0.0, deadline - time.monotonic()))
         with mutex:
             ends["commits"] += 1
@@ -81,18 +83,18 @@ def stream(number: int) -> None:
                 settle(frames[:200])
                 del frames[:200]
             stop.wait(1 / rate)
-        layer.points("cloud", places)  # what is to be seen in the end
+        layer.points("cloud", places)  # what must be visible in the end
         frames.append(v.commit())
         settle(frames)
         with mutex:
             ended.append(number)
         over.release()
-        all_ended.wait(LONG)  # until then what it drew stays
+        all_ended.wait(LONG)  # until then, what it drew stays visible
 
 
 ended: list[int] = []
-begun = threading.Semaphore(0)  # for each client of which a commit was accepted, or that failed
-over = threading.Semaphore(0)  # for each client that has all that it is owed, or that failed
+begun = threading.Semaphore(0)  # released by each client of which a commit was accepted, or that failed
+over = threading.Semaphore(0)  # released by each client that has received every outcome, or that failed
 all_ended = threading.Event()
 threads = [threading.Thread(target=client, args=(n,)) for n in range(count)]
 for thread in threads:
@@ -106,5 +108,5 @@ deadline = time.monotonic() + 2 * LONG
 for _ in range(count):
     over.acquire(timeout=max(0.0, deadline - time.monotonic()))
 print(json.dumps({**ends, "clients": len(ended)}), flush=True)
-sys.stdin.readline()  # until what is shown has been looked at
+sys.stdin.readline()  # until the caller has looked at the displays
 all_ended.set()

@@ -1,12 +1,14 @@
-// Makes allocations fail, for tests: a library that is preloaded (LD_PRELOAD) and stands before the C library's allocator. The
-// environment says which allocation fails:
+// Makes allocations fail, for tests: a library that is preloaded (LD_PRELOAD) and wraps the C
+// library's allocator.
+// The environment selects the allocation that fails:
 //   FAIL_MALLOC_SITE=HEX  the first one from this site; a site is the four calls that led to the allocation
 //   FAIL_MALLOC_SKIP=N    not the first one from the site, but the one after N others (0)
 //   FAIL_MALLOC_N=N       the N-th one of the process
-//   FAIL_MALLOC_TIMES=T   how many attempts of that thread fail in a row (1); 0: from then on, all allocations of all threads
+//   FAIL_MALLOC_TIMES=T   how many attempts of that thread fail in a row (1); 0: from then on, all
+//     allocations of all threads
 //   FAIL_MALLOC_LIST=FILE at exit, writes every site to FILE: "HEX COUNT OBJECT+OFFSET …", innermost first
 //   FAIL_MALLOC_TOLD=FILE writes the site of the allocation that failed
-// It starts when its constructor runs, before most others.
+// It becomes active when its constructor runs, before most others.
 #define _GNU_SOURCE
 
 #include <dlfcn.h>
@@ -28,15 +30,15 @@
 #define kSites (1u << 16)
 
 typedef struct {
-  atomic_uint_fast64_t key;  // of the addresses; 0: free
+  atomic_uint_fast64_t key;  // hash of the addresses; 0: the entry is free
   atomic_uint_fast64_t count;
-  atomic_uint_fast64_t id;  // the same in each run; 0: not there yet
+  atomic_uint_fast64_t id;  // the same in each run; 0: not known yet
   uintptr_t frames[kFrames];
 } Site;
 
 static Site sites[kSites];
-static atomic_bool counts;    // whether anything is counted
-static atomic_bool by_sites;  // whether it is known where they come from
+static atomic_bool counts;    // whether allocations are counted
+static atomic_bool by_sites;  // whether call sites are determined
 static atomic_uint_fast64_t counted, fails_at, times;
 static uint64_t site_wanted, site_skip;
 static atomic_bool all_fail, has_failed;
@@ -44,7 +46,7 @@ static const char *list_path, *told_path;
 static _Thread_local __attribute__((tls_model("initial-exec"))) bool inside;
 static _Thread_local __attribute__((tls_model("initial-exec"))) uint64_t to_fail;
 
-// ---- where it comes from
+// ---- call sites
 
 typedef struct {
   uintptr_t frames[kFrames];
@@ -64,7 +66,7 @@ static _Unwind_Reason_Code OnFrame(struct _Unwind_Context* context, void* to) {
   Stack* stack = to;
   const uintptr_t at = _Unwind_GetIP(context);
   if (stack->count == 0) {
-    // What every allocation has in common says nothing.
+    // Frames that every allocation has in common say nothing.
     if (++stack->skipped > 24) return _URC_END_OF_STACK;
     const struct link_map* object = ObjectOf(at);
     if (IsNamed(object, "fail_malloc") || IsNamed(object, "libstdc++")) return _URC_NO_REASON;
@@ -96,7 +98,7 @@ static uint64_t IdOf(const uintptr_t* frames) {
   return id | 1;
 }
 
-// Null: there are more sites than it knows.
+// Returns null if there are more sites than the table holds.
 static Site* Here(void) {
   Stack stack = {0};
   _Unwind_Backtrace(&OnFrame, &stack);
@@ -137,7 +139,7 @@ static void Tell(const Site* site) {
   close(file);
 }
 
-// ---- whether it fails
+// ---- deciding whether an allocation fails
 
 static bool Fails(void) {
   if (!atomic_load_explicit(&counts, memory_order_relaxed) || inside) return false;
@@ -160,7 +162,7 @@ static bool Fails(void) {
   }
   if (fails) {
     if (atomic_exchange(&has_failed, true)) {
-      fails = false;  // it was once
+      fails = false;  // only once
     } else {
       Tell(site != NULL || told_path == NULL ? site : Here());
       const uint64_t wanted = atomic_load(&times);
@@ -208,7 +210,7 @@ __attribute__((destructor(101))) static void List(void) {
   close(file);
 }
 
-// ---- in the C library's place
+// ---- replacements for the C library's functions
 
 // NOLINTBEGIN(bugprone-reserved-identifier): the C library's own names.
 void* __libc_malloc(size_t bytes);

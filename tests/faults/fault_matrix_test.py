@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Faults against loads, each cell a test: the real voxeld with a display that is hurt and one that is not, nobody, one client or fifty
-that stream, and one more that goes on through all of it.
+"""Faults against loads, each cell a test: the real voxeld with a faulty display and a healthy one, and no client, one client or fifty
+that stream, and one more client that must run undisturbed through all of it.
 
-In every cell: the fault happened; the daemon lives (or ends and is started again, where a fault takes its memory away); the
-one that goes on misses nothing; every commit gets all that it is owed; both displays show the same in the end; and the fault's cause is told
-by a line of the log, by health, and by a metric that has moved since, but for what a fault says that one of them cannot know (faults.py).
+In every cell: the fault happened; the daemon survives (or exits and is restarted, where a fault takes its memory away); the
+undisturbed client misses nothing; every commit gets all its outcomes; both displays show the same in the end; and the cause is reported
+in a line of the log, by /healthz, and by a metric that has changed, except where the fault says that one of them cannot know it (faults.py).
 
 usage: VOXELD=… PYTHONPATH=… LOADS=idle,one,fifty fault_matrix_test.py [Matrix.test_FAULT_LOAD …]
-VOXELD is the daemon, PYTHONPATH the client's wheel and tests/e2e, FAULTY_ENGINE the engine that fails as it is told (default: tests/faulty_engine beside VOXELD)."""
+VOXELD is the daemon, PYTHONPATH the client's wheel and tests/e2e, FAULTY_ENGINE the engine that fails on request (default: tests/faulty_engine beside VOXELD)."""
 import contextlib
 import os
 import sys
@@ -24,9 +24,9 @@ from programs import program
 from relay import Relay
 
 LOADS = {"idle": 0, "one": 1, "fifty": 50}
-# USB faults begin after so many transfers, the first of these by which the load is there.
+# USB faults begin after this many transfers: the first of these numbers at which the load is already running.
 TRANSFERS = {"idle": (200, 1000, 5000), "one": (400, 1600, 6400), "fifty": (800, 3200, 12800)}
-WATCHDOG = 5.0  # seconds in which a daemon that has ended is there again, and serves
+WATCHDOG = 5.0  # seconds within which a daemon that has exited is restarted and serves
 if {"-h", "--help"} & set(sys.argv[1:]):
     print(__doc__)
     print("FAULT:", ", ".join(FAULTS))
@@ -61,7 +61,7 @@ class Matrix(unittest.TestCase):
                 if cell.daemon.poll() is not None:
                     self.assertTrue(fault.deadly, cell.said()[-2000:])
                     began = time.monotonic()
-                    cell.start()  # as whatever watches it does
+                    cell.start()  # as a service manager would do
                     self.assertLess(time.monotonic() - began, WATCHDOG)
                 if goes_on:
                     going = goes_on
@@ -88,7 +88,7 @@ def add_cells() -> None:
     for load in loads:
         for name, fault in FAULTS.items():
             if load == "idle" and name.startswith("network"):
-                continue  # nobody is behind it
+                continue  # no process is behind it
             def test(self: Matrix, fault: Callable[[], Fault] = fault, load: str = load) -> None:
                 made = fault()
                 if not isinstance(made, Usb):

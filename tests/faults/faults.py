@@ -1,4 +1,4 @@
-"""What is done to the daemon, its clients or its surroundings (fault_matrix_test), and where it is told."""
+"""The faults of the daemon, its clients or its surroundings (fault_matrix_test), and where each is reported."""
 import contextlib
 import os
 import re
@@ -22,25 +22,25 @@ TOLD = {"log", "health", "moved"}
 
 
 class Fault:
-    log = ""  # a line of the log since
-    health = ""  # what /healthz said meanwhile
-    moved: tuple[str, ...] = ()  # metrics that have grown since, each of these
-    cannot_know: dict[str, str] = {}  # which of the three is not to tell of it, and why
+    log = ""  # pattern of a line logged since the fault began
+    health = ""  # pattern of what /healthz said in the meantime
+    moved: tuple[str, ...] = ()  # metrics of which each has grown since
+    cannot_know: dict[str, str] = {}  # which of the three does not report it, and why
 
-    hurt, engine = "", 'kind = "cpu"\n'  # options of the display that is hurt, and of the engine
+    hurt, engine = "", 'kind = "cpu"\n'  # options of the faulty display, and of the engine
     tls = False
-    deadly = False  # the daemon may end, and is started again
+    deadly = False  # the daemon may exit, and is restarted
     clients_are_cut = False
 
     def environment(self, _folder: str) -> dict[str, str]:
         return {}
 
     def run(self, cell: Cell) -> None:
-        """Does it, sees that it happened, and takes it back."""
+        """Causes the fault, checks that it happened, and ends it."""
         cell.watch_health(1.5)
 
     def untold(self, lines: str, health: str, grown: list[str]) -> list[str]:
-        """What should have told of it and did not."""
+        """Returns the places that should have reported the fault and did not."""
         asked = {"log": bool(self.log), "health": bool(self.health), "moved": bool(self.moved)}
         assert {name for name, is_asked in asked.items() if not is_asked} == set(self.cannot_know), "each of the three tells of it, or has a reason why not"
         wrong = []
@@ -56,12 +56,13 @@ def hurt_display(name: str) -> str:
 
 
 class TooEarly(Exception):
-    """The fault was there before its load."""
+    """The fault occurred before the load was running."""
 
 
 class Usb(Fault):
-    """The display's own device, by its plan, from a transfer on: {out} of those to it, {into} of those from it, counted from its first. What is
-    told says that it happened."""
+    """A fault of the display's own device, by its plan: {out} is the number of the first affected transfer to the device, {into} that of
+    the first from
+    it, counted from the start. The reports show that it happened."""
 
     def __init__(self, plan: str, why: str, *moved: str) -> None:
         self.plan = plan
@@ -102,7 +103,8 @@ class WorkerLost(Fault):
 
 
 class EngineReports(Fault):
-    """An engine in a process of its own answers a frame by an error, as one on a GPU does: the tests' own, which draws on the CPU."""
+    """An engine in a process of its own answers a frame with an error, as an engine on a GPU does. It is the tests' own engine, which draws
+    on the CPU."""
 
     def __init__(self, kind: str) -> None:
         self.kind = kind
@@ -134,7 +136,7 @@ class EngineReports(Fault):
 
 
 class Refused(Fault):
-    """System calls of the running daemon fail for a while, all of them."""
+    """System calls of the running daemon fail for a while: every one of them."""
 
     health = r'"what":"state","why":"[^"]*state\.db'
     moved = ("voxeld_state_failures_total",)
@@ -158,7 +160,7 @@ class Refused(Fault):
             tracer.send_signal(signal.SIGINT)
             tracer.wait(LONG)
             try:
-                frame.wait_durable(LONG)  # it was not lost: it waited, or was told not to be
+                frame.wait_durable(LONG)  # it was not lost: it waited, or is known not to be durable
             except voxel.NotDurable:
                 pass
             v.layer("kept").sphere("ball", radius=0.3)
@@ -175,7 +177,7 @@ class Memory(Fault):
     def run(self, cell: Cell) -> None:
         size = int(re.search(r"VmSize:\s+(\d+)", Path(f"/proc/{cell.daemon.pid}/status").read_text(encoding="ascii"))[1]) * 1024  # type: ignore[index]
         # Less than a segment of arrays (32 MiB), and enough for the stacks (8 MiB) of the threads that gRPC starts: gRPC does not notice
-        # that a thread was refused, and leaves that thread's work undone. Who is told of such a daemon is the service manager's watchdog.
+        # that a thread was refused, and never does that thread's work. Only the service manager's watchdog detects such a daemon.
         subprocess.run(["prlimit", "--pid", str(cell.daemon.pid), f"--as={size + (28 << 20)}:unlimited"], check=True)
         with contextlib.suppress(voxel.VoxelError, TimeoutError):
             with voxel.connect(cell.server, name="large", timeout=5, on_issue=self.refuse) as v:
@@ -196,13 +198,13 @@ class Memory(Fault):
 
 
 class MemoryCgroup(Fault):
-    """Half as much as a client brings, by a control group: the kernel ends the daemon, and whatever watches it starts it again."""
+    """Limits memory to half of what a client sends, by a control group: the kernel kills the daemon, and a supervisor restarts it."""
 
     deadly = clients_are_cut = True
     cannot_know = dict.fromkeys(TOLD, "the kernel ends it unasked; whoever watches it and the kernel's log say so")
 
     def run(self, cell: Cell) -> None:
-        first = Path("/sys/fs/cgroup/memory")  # version 1; of 2 there is one tree of all
+        first = Path("/sys/fs/cgroup/memory")  # version 1; version 2 has one tree for all controllers
         tree, limit = (first, "memory.limit_in_bytes") if first.is_dir() else (Path("/sys/fs/cgroup"), "memory.max")
         group = tree / f"voxeld-{cell.daemon.pid}"
         size = int(re.search(r"RssAnon:\s+(\d+)", Path(f"/proc/{cell.daemon.pid}/status").read_text(encoding="ascii"))[1]) * 1024  # type: ignore[index]
@@ -221,7 +223,7 @@ class MemoryCgroup(Fault):
         try:
             cell.daemon.wait(LONG)
         finally:
-            client.kill()  # else it would bring the same to the next daemon
+            client.kill()  # otherwise it would send the same to the next daemon
             client.wait()
         assert cell.daemon.returncode == -signal.SIGKILL, cell.said()[-2000:]
 
@@ -239,7 +241,7 @@ class Descriptors(Fault):
         for _ in range(30):
             with contextlib.suppress(OSError):
                 held.append(socket.create_connection(("127.0.0.1", cell.port), timeout=1))
-        cell.watch_health(1.5)  # which takes a descriptor too
+        cell.watch_health(1.5)  # which needs a descriptor too
         for each in held:
             each.close()
         subprocess.run(["prlimit", "--pid", str(cell.daemon.pid), f"--nofile={before[0]}:{before[1]}"], check=True)
@@ -247,7 +249,7 @@ class Descriptors(Fault):
 
 
 class ClockSteps(Fault):
-    """An hour on, two back, and one on. What is measured goes by the clock that does not step."""
+    """The wall clock steps one hour forward, two back, and one forward. Measurements use the clock that does not step."""
 
     log = r"the wall clock stepped seconds=\+3[56]\d\d"
     health = '"what":"time","why":"the wall clock stepped by'
@@ -284,14 +286,14 @@ class StopClient(Fault):
         assert stopped is not None
 
         def theirs() -> float:
-            others = goes_on.commits  # of one operation each; one may be under way
+            others = goes_on.commits  # commits of one operation each; one may be under way
             return cell.metrics()["voxeld_operations_applied_total"] - others
 
         begun = theirs()
         until(lambda: theirs() > begun + 3, "a client that streams")
         stopped.send_signal(signal.SIGSTOP)
         at = -1.0
-        while abs(theirs() - at) > 2:  # what it had sent before is taken in
+        while abs(theirs() - at) > 2:  # waits until the daemon has taken in what it had sent before
             at = theirs()
             cell.watch_health(0.5)
         at, others = theirs(), goes_on.commits
@@ -312,14 +314,14 @@ class StopDaemon(Fault):
 
     def run(self, cell: Cell) -> None:
         cell.daemon.send_signal(signal.SIGSTOP)
-        cell.watch_health(1.6)  # so long it is stopped, and says nothing
+        cell.watch_health(1.6)  # it stays stopped, and silent, for that long
         assert "State:\tT" in Path(f"/proc/{cell.daemon.pid}/status").read_text(encoding="ascii")
         cell.daemon.send_signal(signal.SIGCONT)
         cell.watch_health(1, says=self.health)
 
 
 class StopViewer(Fault):
-    """A page that watches both displays is stopped, and goes on."""
+    """A page that watches both displays is stopped, and continued."""
 
     moved = ("voxeld_volume_watches_asleep_total",)
     cannot_know = dict.fromkeys(TOLD - {"moved"}, "a reader that stops, a page in the background say, is no fault: it is sent nothing more, and costs nothing")
@@ -331,7 +333,7 @@ class StopViewer(Fault):
             assert page.stdout.readline() == "reads\n"
             asleep = cell.metrics()["voxeld_volume_watches_asleep_total"]
             page.send_signal(signal.SIGSTOP)
-            # What the two ends' buffers have room for comes first.
+            # First, the buffers at both ends have to fill.
             until(lambda: cell.metrics()["voxeld_volume_watches_asleep_total"] >= asleep + 2, "two watches that sleep")
             cell.watch_health(1)
             page.send_signal(signal.SIGCONT)
@@ -342,7 +344,7 @@ class StopViewer(Fault):
 
 
 class Network(Fault):
-    """The clients' way to it, and theirs alone."""
+    """Disturbs the network path of the clients, and only theirs."""
 
     clients_are_cut = True
     relay: Relay
@@ -361,7 +363,7 @@ class Network(Fault):
         relay = self.relay
         resumed = cell.metrics()["voxeld_sessions_resumed_total"]
         if self.how == "stalls":
-            # Of the last seconds: what a busy machine made late has to have gone.
+            # The metric covers the last seconds: commits that a busy machine delayed must have left it.
             until(lambda: cell.metrics()['voxeld_commit_sending_seconds{stat="max"}'] < 1, "commits that come in time")
             relay.stall()
         elif self.how == "halves":
@@ -380,7 +382,7 @@ class Network(Fault):
 
 
 class Certificates(Fault):
-    """The server's certificate is exchanged for one that its clients do not trust, and back. Who is there stays."""
+    """The server's certificate is replaced by one that its clients do not trust, and then restored. Existing connections stay."""
 
     tls = True
     log, moved = "TLS files were read again", ("voxeld_tls_files_taken_total",)
@@ -404,7 +406,7 @@ class Certificates(Fault):
 
 
 class CertificateBroken(Fault):
-    """The server's key is exchanged for that of another certificate. What there was stays in force."""
+    """The server's key is replaced by the key of another certificate. The previous pair stays in force."""
 
     tls = True
     log = "TLS files are wrong: .*is not the key of the certificate"

@@ -1,6 +1,8 @@
-"""A life of the real voxeld, which tests make something fail in: its start, what is done with it (scenarios.py has ten), its end. And what must
-hold of it, whatever fails: no signal ends the daemon, nothing hangs, a start that fails says why, what was told to be shown is shown, and what was
-told to be durable is there after the next start."""
+"""A life of the real voxeld in which tests make something fail: its start, the steps carried out with it (scenarios.py has ten), its exit.
+
+This must hold whatever fails: no signal ends the daemon, nothing hangs, a start that fails says why, what was reported as shown is shown,
+and
+what was reported as durable is there after the next start."""
 import contextlib
 import gc
 import os
@@ -20,10 +22,11 @@ import voxeld as voxel
 
 from programs import ENDS_WITH_US
 
-PATIENCE = 8.0  # for what may not come any more
-ENDS = 30.0  # for a daemon to end by itself
-HEAP_SPREAD = 256 << 10  # bytes by which one unharmed life differs from another: 40 KiB were seen
-COUNTED_AGAIN = 30.0  # by when memory has been counted again on a busy machine: counting may have a thousandth of the time, and being kept from it counts too
+PATIENCE = 8.0  # seconds to wait for something that may never come
+ENDS = 30.0  # seconds for a daemon to exit by itself
+HEAP_SPREAD = 256 << 10  # bytes by which one undisturbed life differs from another: 40 KiB were seen
+COUNTED_AGAIN = 30.0  # seconds until memory has been counted again on a busy machine: counting may take a thousandth of the time, and time
+                      # during which it is preempted counts too
 
 
 def free_port() -> int:
@@ -34,28 +37,29 @@ def free_port() -> int:
 
 @dataclass
 class Told:
-    """What the daemon said, which has to be true."""
+    """The reports of the daemon, which must be true."""
 
-    shown: bool = False  # what the last capture looked for, in its volume
-    durable: bool = False  # the layer with the box, which a client told it to keep
-    kept: set[str] = field(default_factory=set)  # entities besides that are durable
-    gone: set[str] = field(default_factory=set)  # and those whose end is
-    failed: list[str] = field(default_factory=list)  # steps that were refused, with what was said
+    shown: bool = False  # what the last capture looked for was in its volume
+    durable: bool = False  # the layer with the box, which a client asked to be persistent, is durable
+    kept: set[str] = field(default_factory=set)  # further entities that are durable
+    gone: set[str] = field(default_factory=set)  # entities whose removal is durable
+    failed: list[str] = field(default_factory=list)  # steps that were refused, with the error
 
 
 class Life:
-    """Derived classes say what is done with it."""
+    """Derived classes define the steps."""
 
     about: ClassVar[str]
-    steps: ClassVar[tuple[str, ...]]  # methods, in their order; each may be refused, and the next is done all the same
-    shows: ClassVar[bool] = True  # unharmed, it has been told that something is shown,
-    keeps: ClassVar[bool] = False  # and durable
-    from_start: ClassVar[bool] = False  # what fails may do so as it starts, since that is a part of it; else once it is ready
+    steps: ClassVar[tuple[str, ...]]  # methods, in order; each may be refused, and the next is run all the same
+    shows: ClassVar[bool] = True  # if undisturbed, it reports that something is shown
+    keeps: ClassVar[bool] = False  # and that it is durable
+    from_start: ClassVar[bool] = False  # True: the failure may occur during startup, since startup is part of this life; False: only once
+                                        # it is ready
 
-    engine: ClassVar[str] = ""  # more lines of the configuration's section of that name
+    engine: ClassVar[str] = ""  # more lines for the configuration's section of that name
 
     def __init__(self, folder: Path, server: str = "") -> None:
-        """`server`: more lines of the configuration's section."""
+        """`server`: more lines for the configuration's section of that name."""
         self.folder = folder
         self.more = server
         self.server = f"unix:{folder}/s"
@@ -64,14 +68,14 @@ class Life:
         self.told = Told()
 
     def prepare(self) -> None:
-        """What there is before the first start; nothing fails then."""
+        """Prepares what exists before the first start; nothing fails then."""
 
     def listens(self) -> list[str]:
-        """Its addresses beside the socket."""
+        """Returns the addresses beside the socket."""
         return []
 
     def security(self) -> str:
-        """A section of the configuration, or nothing."""
+        """Returns a section of the configuration, or an empty string."""
         return ""
 
     def displays(self) -> str:
@@ -88,7 +92,7 @@ class Life:
         path = self.folder / "voxeld.toml"
         path.write_text(self.config(), encoding="utf-8")
         self.output = (self.folder / "output").open("w+", encoding="utf-8")
-        ends_with_us = () if before or environment else ENDS_WITH_US  # what is traced or preloaded is the daemon alone
+        ends_with_us = () if before or environment else ENDS_WITH_US  # only the daemon itself is traced or preloaded
         self.process = subprocess.Popen([*ends_with_us, *before, os.environ["VOXELD"], "--config", str(path), "--log-level", "info"],
                                         stdin=subprocess.DEVNULL, stdout=self.output, stderr=subprocess.STDOUT, text=True, start_new_session=True,
                                         env={**os.environ, **(environment or {})})
@@ -100,16 +104,16 @@ class Life:
     def ready(self, process: "subprocess.Popen[str]") -> bool:
         deadline = time.monotonic() + ENDS
         while time.monotonic() < deadline and process.poll() is None:
-            with contextlib.suppress(OSError):  # also one whose log cannot be written is ready
+            with contextlib.suppress(OSError):  # a daemon whose log cannot be written becomes ready too
                 with urllib.request.urlopen(f"http://127.0.0.1:{self.port}/healthz", timeout=PATIENCE) as answer:
                     return bool(answer.read())
-            time.sleep(0.01)  # nothing tells when it listens, and its end is an answer too
+            time.sleep(0.01)  # it polls: nothing signals when it listens, and its exit is an answer too
         return False
 
-    # ---- what it goes through
+    # ---- its steps
 
     def step(self, name: str, what: Callable[[], None]) -> None:
-        """What fails is noted and the next goes on; errors that are not the clients' own are the test's."""
+        """Runs one step. A failure is noted and the next step is run; errors that are not the client's own are failures of the test."""
         try:
             what()
         except (voxel.VoxelError, grpc.RpcError, TimeoutError, ConnectionError, OSError, AssertionError, StopIteration) as error:
@@ -117,7 +121,9 @@ class Life:
             self.told.failed.append(f"{name}: {type(error).__name__}: {said.partition(chr(10))[0]}")
 
     def lived(self, process: "subprocess.Popen[str]", pid: Callable[[], int], once_ready: Callable[[], None] = lambda: None) -> tuple[bool, str]:
-        """Whether it came to be ready, and lived then; and what it said that was not true. `pid`: the daemon's own, once it has begun."""
+        """Returns whether it became ready and ran its steps, and what it reported that was not true. `pid` returns the daemon's own process
+        id once it has
+        started."""
         is_ready = self.ready(process)
         self.pid = pid()
         if not is_ready:
@@ -130,7 +136,7 @@ class Life:
         return True, ""
 
     def went_well(self) -> bool:
-        """What was done with it is what it is for."""
+        """Returns whether all steps succeeded with the expected reports."""
         return not self.told.failed and self.told.shown == self.shows and self.told.durable == self.keeps
 
     def live(self) -> None:
@@ -157,7 +163,7 @@ class Life:
 
 
 def refuses(life: Life) -> str:
-    """What it says to one more client that draws, again and again; nothing: it serves, as it should whatever failed once."""
+    """Returns why another client that draws, after several attempts, is not served; empty: it is served, as it must be whatever failed once."""
     told, life.told = life.told, Told()
     try:
         for _ in range(8):  # each thread that had not answered yet may meet a failure of its own
@@ -171,7 +177,7 @@ def refuses(life: Life) -> str:
 
 
 def sockets() -> int:
-    """That this process has. A channel that nobody has any more is closed when Python comes to it: it comes now."""
+    """Returns the sockets of this process. Python closes a channel that nobody holds when it collects garbage, so it collects now."""
     gc.collect()
     found = 0
     for name in os.listdir("/proc/self/fd"):
@@ -181,8 +187,9 @@ def sockets() -> int:
 
 
 def descriptors(pid: int, most: int, patience: float = PATIENCE, ours: int = 1 << 20) -> int:
-    """How many a process has, once there are no more than `most`, or after a while. It has two for each connection: those of the sockets beyond `ours` that
-    this process has open still are not its own doing, and do not count."""
+    """Returns how many descriptors a process has, once there are at most `most`, or after a while. Each connection takes two: those of the
+    sockets
+    beyond `ours` that this process still has open are not the daemon's doing, and are not counted."""
     deadline = time.monotonic() + patience
     while True:
         try:
@@ -193,11 +200,11 @@ def descriptors(pid: int, most: int, patience: float = PATIENCE, ours: int = 1 <
             have -= 2 * max(sockets() - ours, 0)
         if have <= most or time.monotonic() > deadline:
             return have
-        time.sleep(0.02)  # connections close by themselves, and nothing tells when
+        time.sleep(0.02)  # it polls: connections close by themselves, and nothing signals when
 
 
 def metric(port: int, name: str) -> int:
-    """As the daemon tells it; -1: it does not."""
+    """Returns the value that the daemon reports; -1: it reports none."""
     try:
         with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=PATIENCE) as answer:
             found = re.search(rf"^{name} (\S+)", answer.read().decode(), re.M)
@@ -207,15 +214,15 @@ def metric(port: int, name: str) -> int:
 
 
 def heap(port: int, most: int) -> int:
-    """Bytes that it has allocated, once they are no more than `most`, or after a while. -1: it does not tell."""
+    """Returns the bytes that it has allocated, once they are at most `most`, or after a while. -1: it does not report them."""
     deadline = time.monotonic() + COUNTED_AGAIN
     while not 0 <= (have := metric(port, "voxeld_process_heap_bytes")) <= most and time.monotonic() < deadline:
-        time.sleep(0.05)  # what is over is let go of by and by, and nothing tells when
+        time.sleep(0.05)  # it polls: memory is released gradually, and nothing signals when
     return have
 
 
 def events(pid: int) -> int:
-    """How many of a process's descriptors are eventfds."""
+    """Returns how many of a process's descriptors are eventfds."""
     with contextlib.suppress(OSError):
         return sum(os.readlink(f"/proc/{pid}/fd/{name}") == "anon_inode:[eventfd]" for name in os.listdir(f"/proc/{pid}/fd"))
     return 0
@@ -223,13 +230,13 @@ def events(pid: int) -> int:
 
 @dataclass(frozen=True)
 class Rest:
-    """What a daemon has before its end, when nobody is there."""
+    """The resources that a daemon holds before its exit, when no client is connected."""
     descriptors: int
     heap: int  # bytes allocated
 
 
 def at_rest(life: Life, pid: int) -> Rest:
-    """Once connections that have ended are closed: as many descriptors until memory has been counted since."""
+    """Returns what it holds once closed connections are gone: once the number of descriptors has not changed since memory was last counted."""
     deadline = time.monotonic() + PATIENCE
     have, since = -1, 0.0
     while True:
@@ -238,11 +245,11 @@ def at_rest(life: Life, pid: int) -> Rest:
             have, since = now, time.monotonic()
         elif time.monotonic() > min(since + 1.2, deadline):  # memory is counted each second
             return Rest(have, metric(life.port, "voxeld_process_heap_bytes"))
-        time.sleep(0.02)  # nothing tells when
+        time.sleep(0.02)  # it polls: nothing signals when
 
 
 def leaks(life: Life, most: Rest, more: int = 0) -> str:
-    """Memory that is left beyond what there is unharmed and `more`, of a life in which its clients missed nothing; nothing: none."""
+    """Returns the memory left beyond `more` and what an undisturbed life leaves, for a life in which its clients missed nothing; empty: no leak."""
     allowed = most.heap + HEAP_SPREAD + more
     if life.told.failed or 0 <= (left := heap(life.port, allowed)) <= allowed:
         return ""
@@ -250,7 +257,7 @@ def leaks(life: Life, most: Rest, more: int = 0) -> str:
 
 
 def end(process: "subprocess.Popen[str]", pid: int) -> Optional[int]:
-    """Its exit status when it was asked to end; None: it had to be killed."""
+    """Returns its exit status after it was asked to exit; None: it had to be killed."""
     if pid:
         with contextlib.suppress(ProcessLookupError):
             os.kill(pid, signal.SIGTERM)
@@ -270,8 +277,9 @@ class Ending:
 
 
 def judge(life: Life, status: Optional[int], is_ready: bool, alive: bool, reason: str = "") -> Ending:
-    """What came of a life that ended with `status`; `alive`: until it was asked to end. `reason`: that the failure came to others' code, which ends
-    the process by its own decision."""
+    """Returns the ending of a life that exited with `status`. `alive`: it ran until it was asked to exit. `reason`: the failure hit code of
+    others, which
+    ends the process by its own decision."""
     said = life.said()
     if status is None:
         return Ending("hung", "it did not end when it was asked to")
@@ -282,7 +290,8 @@ def judge(life: Life, status: Optional[int], is_ready: bool, alive: bool, reason
     if not is_ready:
         return Ending("refused", "" if said.strip() and status != 0 else f"it ended with {status} before it was ready, and said nothing")
     if alive:
-        late = "did not end in time" in said  # others wait for threads that they did not get; it is ended, and says so
+        late = "did not end in time" in said  # libraries wait for threads that they did not get; the daemon then exits by itself, and says
+                                              # so
         fine = status == 0 or late
         return Ending("late" if late else "lived", "" if fine else f"it ended with {status} when it was asked to: {said.strip().splitlines()[-1:]}")
     told = reason or re.search(r"^voxeld: .|error|failed|cannot", said, re.I | re.M)
@@ -290,7 +299,7 @@ def judge(life: Life, status: Optional[int], is_ready: bool, alive: bool, reason
 
 
 def again(before: Life) -> str:
-    """Starts it once more, unharmed, on the same state; what was wrong then, or nothing."""
+    """Starts it once more, undisturbed, on the same state. Returns what was wrong then; empty: nothing."""
     life, told = type(before)(before.folder), before.told
     process = life.start()
     life.pid = process.pid

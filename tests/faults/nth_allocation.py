@@ -1,21 +1,21 @@
 #!/usr/bin/env python3
-"""Every allocation of the daemon failed once: from each place that asks for memory, in the process and in the libraries of others, one allocation fails
-in one of ten scenarios (scenarios.py) of the real voxeld, which is then started again on the same state, unharmed. A place is the four calls that
-led to it; what there is comes from lives in which nothing fails, and each place fails in the first scenario that comes by it.
+"""Makes every allocation of the daemon fail once: one allocation fails at each place that allocates memory, in the process and in third-party libraries,
+in one of ten scenarios (scenarios.py) of the real voxeld, which is then restarted on the same state, undisturbed. A place is the four calls that
+led to it; the list of places comes from lives in which nothing fails, and each place fails in the first scenario that reaches it.
 
 usage: nth_allocation.py [--scenarios NAME,…] [--way once|forever] [--sample N] [--seed N] [--part K/N] [--within S] [--sites HEX,…] [--jobs N] [--list] [--json]
 
-The way that it fails:
+The ways to fail:
   once      one allocation fails (the default)
   forever   from then on every allocation fails
 
-What must hold: where operator new asked, the daemon exits with 1 and one line that says why; where a C library asked, the daemon lives, or exits so, or
-ends by the abort of a library that gives up. In each case nothing hangs, what was told to be shown is shown, what was told to be durable is there
-after the next start, and a daemon that lives has no more descriptors and memory than unharmed. Paths are in VOXELD, FAIL_MALLOC (the preloaded
-library) and PYTHONPATH; exits with 1 if one did not.
+What must hold: where operator new fails, the daemon exits with 1 and one line that says why; where a C library's allocation fails, it survives, or exits like that, or
+ends by the abort of a library. In each case nothing hangs, what was reported as shown is shown, what was reported as durable is there
+after the next start, and a daemon that survives has no more descriptors and memory than an undisturbed one. Paths are in VOXELD, FAIL_MALLOC (the preloaded
+library) and PYTHONPATH; exits with 1 if one of these does not hold.
 
-What came of them, by the way that they fail: lived, refused, ended, late, known, wrong as nth_syscall.py says; missed: nobody came by that place; once:
-something was wrong, and not when it was made again, as on a machine that is busy with other things."""
+Results, for each way to fail: lived, refused, ended, late, known, wrong as in nth_syscall.py; missed: no thread reached that place; once:
+something was wrong, but not when the case was repeated, as happens on a machine that is busy with other things."""
 import argparse
 import collections
 import json
@@ -32,7 +32,8 @@ from life import Ending, Life, Rest, again, at_rest, descriptors, end, judge, le
 from programs import program
 from scenarios import SCENARIOS
 
-# Who may end the process where it asked for memory itself: by an abort, or since it does not look at what it got (fontconfig, OpenSSL).
+# Libraries that may end the process when they run out of memory: by an abort, or because they do not check the result (fontconfig,
+# OpenSSL).
 GIVES_UP = re.compile(r"^(libfontconfig|libcrypto|libssl|libgrpc|libgrpc\+\+|libgpr|libabsl_\w+|libprotobuf|libupb|libtbb|libstdc\+\+|ld-linux-x86-64)[^ ]*\.so")
 ENDED = "voxeld: out of memory, exiting"
 
@@ -52,7 +53,7 @@ class Result:
     how: str  # lived, refused, ended, late, hung, crashed, missed, known: …
     stack: list[str]  # innermost first
     wrong: str = ""
-    once: str = ""  # what was wrong at first, and not again
+    once: str = ""  # what was wrong the first time, but not when repeated
     failed: list[str] = field(default_factory=list)
 
 
@@ -81,10 +82,10 @@ def run(scenario: str, way: str, place: Place, rest: Rest) -> Result:
         others = next((frame for frame in stack if not frame.startswith("libc.so")), "")
         gives_up = GIVES_UP.match(others)
         if way == "forever" and ENDED in said:
-            gives_up = re.match("(anybody)", "anybody")  # who asks next is chance
+            gives_up = re.match("(anybody)", "anybody")  # which library allocates next is a matter of chance
         ending = judge(life, status, is_ready, alive, f"{gives_up[1]} asked, and gives up" if gives_up else "")
         if is_ready and status == 1 and ENDED in said:
-            ending = Ending("ended")  # be it on its way to the end
+            ending = Ending("ended")  # also when it is already exiting
         after = again(life)
         wrong = wrong or ending.wrong or after
         if not met:
@@ -101,7 +102,7 @@ def run(scenario: str, way: str, place: Place, rest: Rest) -> Result:
 
 
 def run_twice(scenario: str, way: str, place: Place, rest: Rest) -> Result:
-    """What is wrong must be so again: a machine that is busy with other things leaves clients waiting, too."""
+    """Repeats a case that went wrong. Only a repeated error counts: a machine that is busy with other things makes clients wait, too."""
     first = run(scenario, way, place, rest)
     if not first.wrong:
         return first
@@ -114,7 +115,7 @@ def run_twice(scenario: str, way: str, place: Place, rest: Rest) -> Result:
 
 
 def places(scenario: str) -> tuple[str, list[Place], Rest]:
-    """Where memory is asked for in a life without failures, and what there is before its end."""
+    """Returns the places that allocate memory in a life without failures, and what the daemon holds before its exit."""
     with tempfile.TemporaryDirectory(prefix="voxeld-nth-") as name:
         life = SCENARIOS[scenario](Path(name))
         life.prepare()

@@ -1,18 +1,19 @@
 #!/usr/bin/env python3
-"""Every n-th system call of the daemon failed once: strace makes one call fail in each thread, in one of ten scenarios (scenarios.py) of the real
-voxeld: from its start on, or, where the start is as in another, once it is ready. Then it is started again on the same state, unharmed.
+"""Makes every n-th system call of the daemon fail once: strace makes one call fail in each thread, in one of ten scenarios (scenarios.py) of the real
+voxeld: from its start on, or, where another scenario has the same startup, once it is ready. Then it is restarted on the same state, undisturbed.
 
 usage: nth_syscall.py [--scenarios NAME,…] [--calls NAME,…] [--most N] [--sample N] [--seed N] [--part K/N] [--within S]
                       [--jobs N] [--list] [--json]
 
-What must hold: no signal ends the daemon, nothing hangs, a start that fails says why, what was told to be shown is shown, what was told to be
-durable is there after the next start, whoever comes afterwards is served, no descriptor and no memory is left, and the daemon ends by itself when asked. Paths are in VOXELD and PYTHONPATH; ends with 1 if one did not.
+What must hold: no signal ends the daemon, nothing hangs, a start that fails says why, what was reported as shown is shown, what was reported as
+durable is there after the next start, later clients are served, no descriptor and no memory leaks, and the daemon exits by itself
+when asked. Paths are in VOXELD and PYTHONPATH; exits with 1 if one of these does not hold.
 
-What came of them, by scenario and by call:
-  lived     it went on                              late     it was asked to end, had not after 5 s, and ended itself with the reason
-  missed    no thread made so many of these calls   known    a library of others made the call, and ended the process, or kept something
-  refused   it did not start, and said why          wrong    something of the above does not hold; the lines before say what
-  ended     it ended with 1, and said why"""
+Results, by scenario and by call:
+  lived     it went on                              late     it had not exited 5 s after the request, and terminated itself with the reason
+  missed    no thread made so many of these calls   known    a third-party library made the call, and ended the process, or leaked something
+  refused   it did not start, and said why          wrong    one of the above does not hold; the lines before say which
+  ended     it exited with 1, and said why"""
 import argparse
 import collections
 import contextlib
@@ -32,7 +33,7 @@ from life import ENDS, Ending, Life, Rest, again, at_rest, descriptors, end, eve
 from programs import program
 from scenarios import SCENARIOS
 
-# What fails, and with what: errors that a system in want gives.
+# The calls that fail, and their errors: those that a system out of resources returns.
 ERRORS = {
     "openat": ["EMFILE"], "read": ["EIO"], "pread64": ["EIO"], "write": ["ENOSPC"], "pwrite64": ["ENOSPC"], "writev": ["EIO"], "fsync": ["EIO"],
     "fdatasync": ["EIO"], "ftruncate": ["ENOSPC"], "fallocate": ["ENOSPC"], "rename": ["EIO"], "unlink": ["EACCES"], "mkdir": ["EACCES"],
@@ -47,20 +48,20 @@ ERRORS = {
 
 # Without them libraries use a pipe, which is one descriptor more.
 A_PIPE_INSTEAD = ("eventfd2", "epoll_ctl")
-# What leaves a connection open: a shutdown that did nothing, which of a connected socket it never does, as long as its client has it open; and gRPC, which
-# waits for room after ENOBUFS: of a socket that was never full nobody tells that it has some.
+# Failures that leave a connection open: a shutdown that did nothing, which never happens to a connected socket that its client keeps open;
+# and gRPC, which waits for room after ENOBUFS: nothing ever signals room on a socket that was never full.
 LEAVES_IT_OPEN = (("shutdown", "ENOTCONN"), ("sendmsg", "ENOBUFS"))
-# Seconds after which a client gives up a connection on which nobody answers, and it is closed at both ends.
+# Seconds after which a client gives up a connection that nobody answers; it is then closed at both ends.
 GIVES_UP = 40.0
-# gRPC that cannot wake an epoll by an eventfd polls without one, and has an eventfd for each of its threads instead.
+# When gRPC cannot use an eventfd to wake an epoll, it polls without one, and has an eventfd for each of its threads instead.
 POLLS_INSTEAD = re.compile(r"\(INJECTED\)\n(?: > .*\n)*? > .*grpc_ev_epoll1_posix")
-# oneTBB that cannot load its allocator takes its memory of the C library's, half a megabyte.
+# When oneTBB cannot load its allocator, it takes its memory, half a megabyte, from the C library.
 WITHOUT_ALLOCATOR = re.compile(r"\(INJECTED\)\n(?: > .*\n)*? > .*/libtbb\.so")
-# What that may be at the most.
+# The upper bound of that memory in bytes.
 ALLOCATORS_SHARE = 1 << 20
-# Where others decide what becomes of the process when they are refused memory, threads or descriptors.
+# Third-party libraries that decide themselves what becomes of the process when they are refused memory, threads or descriptors.
 THEIRS = re.compile(r"/(libgrpc|libgrpc\+\+|libgpr|ld-linux-x86-64|libsqlite3|libtbb)[^/]*\.so")
-# What is asked on somebody's behalf.
+# Libraries that make a call on behalf of their caller.
 BASE = re.compile(r"/(libc|libstdc\+\+|libgcc_s|libm|libabsl_\w+)[^/]*\.so")
 
 
@@ -76,12 +77,12 @@ class Result:
 
 
 def whose(trace: str) -> list[str]:
-    """Of each call that failed the library of others that made it, by its stack; empty: it was our own."""
+    """Returns, for each call that failed, the third-party library that made it, by its stack; empty: it was our own code."""
     return [of_stack(stack) for stack in re.findall(r"\(INJECTED\)\n((?: > .*\n)*)", trace)]
 
 
 def of_stack(stack: str) -> str:
-    """Whoever asked first what only passes it on."""
+    """Returns the library that made the call, skipping those that only pass it on."""
     for frame in stack.splitlines():
         if match := THEIRS.search(frame):
             return match[1]
@@ -91,7 +92,7 @@ def of_stack(stack: str) -> str:
 
 
 class Traced:
-    """A life under strace, which begins with it, or once it is ready."""
+    """A life under strace, which is attached from the start or once it is ready."""
 
     def __init__(self, scenario: str, folder: Path, *options: str) -> None:
         self.life = SCENARIOS[scenario](folder)
@@ -120,7 +121,7 @@ class Traced:
         return status
 
     def _pid(self) -> int:
-        """The daemon's own, beneath its tracer or not."""
+        """Returns the daemon's own process id, with or without a tracer as its parent."""
         if not self.life.from_start:
             return self._process.pid
         with contextlib.suppress(OSError, ValueError):
@@ -128,7 +129,7 @@ class Traced:
         return 0
 
     def _has_all(self) -> bool:
-        with contextlib.suppress(OSError):  # a thread that ends meanwhile
+        with contextlib.suppress(OSError):  # a thread that ends in the meantime
             return all(re.search(r"^TracerPid:\t[1-9]", Path(f"/proc/{self.life.pid}/task/{task}/status").read_text(encoding="ascii"), re.M)
                        for task in os.listdir(f"/proc/{self.life.pid}/task"))
         return False
@@ -139,15 +140,16 @@ class Traced:
         while not self._has_all():
             if self._tracer.poll() is not None or time.monotonic() > deadline:
                 sys.exit("strace does not come to hold of the daemon")
-            time.sleep(0.005)  # nothing tells when it has all threads
+            time.sleep(0.005)  # it polls: nothing signals when it has all threads
 
 
 def run(scenario: str, call: str, error: str, n: int, rest: Rest, stacks: bool = False) -> Result:
-    """With `stacks`, much slower, what others' code does when it is refused is told from what ours does."""
+    """Runs one case. With `stacks`, which is much slower, failures in third-party code are distinguished from failures in ours."""
     with tempfile.TemporaryDirectory(prefix="voxeld-nth-") as name:
         ours = sockets()
         traced = Traced(scenario, Path(name), *(["-k"] if stacks else []), "-e", f"trace={call}",
-                        *(["-P", f"{name}/output"] if call == "write" else []),  # what else is written to this way are events, which cannot fail
+                        *(["-P", f"{name}/output"] if call == "write" else []),  # other writes in this way are those to events, which
+                                                                                 # cannot fail
                         "-e", f"inject={call}:error={error}:when={n}")
         life, leak, much, others = traced.life, "", "", 0
         is_ready, wrong = traced.lived()
@@ -164,9 +166,9 @@ def run(scenario: str, call: str, error: str, n: int, rest: Rest, stacks: bool =
                 much = leak and leaks(life, rest, ALLOCATORS_SHARE)
         status = traced.end()
         found = Path(name, "trace")
-        trace = found.read_text(encoding="utf-8", errors="replace") if found.exists() else ""  # it did not come that far
+        trace = found.read_text(encoding="utf-8", errors="replace") if found.exists() else ""  # it did not get that far
         theirs = whose(trace) if stacks else [""]
-        # What ends a process is the call that failed last.
+        # The call that failed last is what ended the process.
         ending = judge(life, status, is_ready, alive, f"{theirs[-1]} asked, and gives up" if theirs and theirs[-1] else "")
         after = again(life)
         excused = all(theirs) or (others and others <= most and POLLS_INSTEAD.search(trace)) or (not others and not much and WITHOUT_ALLOCATOR.search(trace))
@@ -178,11 +180,12 @@ def run(scenario: str, call: str, error: str, n: int, rest: Rest, stacks: bool =
 
 
 def run_or_excuse(scenario: str, call: str, error: str, n: int, rest: Rest) -> Result:
-    """What ends it by a signal, hangs, or leaves something is made again with stacks: others' code may have decided so. If not, the first time counts."""
+    """Runs one case. If it ends by a signal, hangs or leaks, it is repeated with stacks: third-party code may have decided so. If not, the
+    first result counts."""
     first = run(scenario, call, error, n, rest)
     if first.how not in ("crashed", "hung", "leaks"):
         return first
-    for _ in range(3):  # which thread is refused is up to chance
+    for _ in range(3):  # chance decides which thread's call fails
         again_with_stacks = run(scenario, call, error, n, rest, stacks=True)
         if again_with_stacks.how.startswith("known") or again_with_stacks.wrong:
             return again_with_stacks
@@ -190,7 +193,7 @@ def run_or_excuse(scenario: str, call: str, error: str, n: int, rest: Rest) -> R
 
 
 def count(scenario: str) -> tuple[str, dict[str, int], Rest]:
-    """How often a thread calls each at the most, and what there is before the end."""
+    """Returns how often one thread makes each call at most, and what the daemon holds before its exit."""
     with tempfile.TemporaryDirectory(prefix="voxeld-nth-") as name:
         traced = Traced(scenario, Path(name), "-e", f"trace={','.join(ERRORS)}")
         is_ready, wrong = traced.lived()

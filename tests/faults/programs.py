@@ -1,16 +1,17 @@
-"""The programs that these tests run, which whoever starts them names in the environment."""
+"""The programs that these tests run; the environment names them."""
 import os
 import sys
 from pathlib import Path
 
 LIBRARIES = {"FAIL_MALLOC": "tests/libvoxeld_fail_malloc.so"}
 
-# Before a program: the kernel kills it when the test that started it has ended, however that ended.
+# Put before a program: the kernel kills it when the test that started it has ended, however that ended.
 ENDS_WITH_US = ("setpriv", "--pdeathsig", "KILL")
 
 
 def program(variable: str, what: str) -> str:
-    """The path in `variable`; without one that can be run (or loaded, a library) the process ends with 2 and a line that says so."""
+    """Returns the path in `variable`. If it is not a program that can be run (or a library that can be loaded), the process exits with 2
+    and a message."""
     path = os.environ.get(variable, "")
     example = f"{variable}=build/test/bin/{LIBRARIES.get(variable, 'voxeld')}"
     wrong = ""

@@ -1,11 +1,11 @@
-"""A network that can be made worse: forwards connections from a port of its own to another address."""
+"""A network that can be degraded: forwards connections from a port of its own to another address."""
 import contextlib
 import socket
 import threading
 
 
 class Relay:
-    """`stalled`: nothing passes. `half`: of what comes, the first half passes, and the connection ends. cut(): all connections end."""
+    """`stalled`: nothing passes. `half`: the first half of each received piece passes, and the connection ends. cut(): all connections end."""
 
     def __init__(self, to: tuple[str, int]) -> None:
         self._to = to
@@ -14,7 +14,7 @@ class Relay:
         self.going = threading.Event()
         self.going.set()
         self.half = False
-        self.held = self.halved = 0  # bytes that waited; pieces of which half passed
+        self.held = self.halved = 0  # bytes that were delayed; pieces of which only half passed
         self._mutex = threading.Lock()
         self._open: list[socket.socket] = []
         threading.Thread(target=self._accept, daemon=True).start()
@@ -27,7 +27,7 @@ class Relay:
         self.going.set()
 
     def cut(self) -> int:
-        """How many there were."""
+        """Ends all connections. Returns how many there were."""
         with self._mutex:
             ended, self._open = self._open, []
         for each in ended:

@@ -1,4 +1,4 @@
-"""Ten core scenarios: lives of the real voxeld (life.py) that tests make something fail in."""
+"""Ten core scenarios: lives of the real voxeld (life.py) in which tests make something fail."""
 import contextlib
 import hashlib
 import os
@@ -25,16 +25,16 @@ TOKEN = "a-token-of-this-test-alone"
 
 
 def ask(channel: grpc.Channel, method: str, request: Message, answer: type[Message], token: str = "") -> Any:
-    """One call, as DisplayService/ListDisplays."""
+    """Makes one call, such as DisplayService/ListDisplays."""
     call = channel.unary_unary(f"/voxeld.v1.{method}", type(request).SerializeToString, answer.FromString)
     return call(request, timeout=PATIENCE, metadata=(("authorization", f"Bearer {token}"),) if token else ())
 
 
 class Draws(Life):
-    """Ends with a red ball that must be seen where it was told to be shown."""
+    """Ends with a red ball that must be visible if it was reported as shown."""
 
     def capture(self, display: str = "stack") -> None:
-        with self.connect(name="five", on_disconnect=30.0) as v:  # what is shown stays up where the connection is lost meanwhile
+        with self.connect(name="five", on_disconnect=30.0) as v:  # what is shown stays visible if the connection is lost in the meantime
             v.layer("last", order=9).sphere("ball", radius=0.3, color="red", fill="solid")
             frame = v.commit()
             outcomes = frame.wait_shown(timeout=PATIENCE)
@@ -131,7 +131,7 @@ class Resumed(Draws):
                 if turn % 6 == 5:
                     frames[-1].wait(PATIENCE)
                     assert relay.cut() > 0
-            # Outcomes that were under way when it was cut are told to nobody any more; that a commit was accepted is.
+            # Outcomes that were under way at the disconnect are reported to nobody; that a commit was accepted is reported.
             for frame in frames:
                 frame.wait(PATIENCE)
             assert frames[-1].wait_shown(timeout=PATIENCE)
@@ -164,7 +164,7 @@ class Kept(Draws):
                 raise RuntimeError(f"what was told to be durable is not there: {sorted(found)}")
 
     def change(self) -> None:
-        """What is on its way when it fails is told to be neither kept nor gone."""
+        """A change that is under way when it fails counts neither as kept nor as gone."""
         v = self.connect(name="changes", on_disconnect="keep")
         told = self.told
         try:
@@ -285,7 +285,7 @@ class Watched(Draws):
                     v.commit().wait_shown(timeout=PATIENCE)
                     if select.select([page.stdout], [], [], 0)[0]:
                         break
-            # Its end without a word is an answer too.
+            # A page that ends without output is an answer too.
             assert select.select([page.stdout], [], [], PATIENCE)[0] and page.stdout.readline() == "reads\n", "the page was sent nothing"
         finally:
             page.kill()

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""A long day in short: the real voxeld with three displays, state and http, and clients of every kind that come, draw, err and go. Its
-resident memory, what of it is held, descriptors, threads and latencies are measured all the while, and lines are laid through them.
+"""A long day in a short time: the real voxeld with three displays, state and http, and clients of every kind that connect, draw, make errors and leave. Its
+resident memory, its accounted memory, descriptors, threads and latencies are measured throughout, and lines are fitted to them.
 
 usage: soak.py [--minutes M] [--warm-up M] [--roles NAME,…] [--environment NAME=VALUE]… [--csv FILE] [--svg FILE] [--json]      Paths are in
 VOXELD and PYTHONPATH (the client and tests/e2e).
 
-Ends with 1 if a commit has not had all that it is owed, or if something grows: the 95 % confidence interval of its slope (by medians of
-elevenths of what comes after warming up) lies above zero by more than GROWTH says an hour."""
+Exits with 1 if a commit has not received all its outcomes, or if something grows: the 95 % confidence interval of its slope (by medians of
+elevenths of the samples after warming up) lies above zero by more than GROWTH allows in an hour."""
 import argparse
 import contextlib
 import csv
@@ -30,12 +30,12 @@ import voxeld as voxel
 from polling import until
 from programs import ENDS_WITH_US, program
 
-EVERY = 2.0  # seconds from sample to sample
+EVERY = 2.0  # seconds between samples
 LONG = 60.0
 PARTS = 11
 WARM_UP = 10
-LEAST = 10  # minutes beyond warming up; of a shorter run slopes are told, and receipts alone are judged
-# By what part of its level a quantity may grow in an hour; of whole numbers, by how many.
+LEAST = 10  # minutes beyond warming up; a shorter run reports its slopes, but only the receipts are judged
+# The part of its level by which a quantity may grow in an hour; for integers, the number.
 GROWTH = {"resident_mb": 0.02, "anonymous_mb": 0.02, "held_mb": 0.02, "descriptors": 0.5, "threads": 0.5, "p50_ms": 0.5, "p99_ms": 0.5}
 WHOLE = ("descriptors", "threads")
 DISPLAYS = 3
@@ -44,7 +44,7 @@ Stop = Any  # multiprocessing's Event is a function, not a type
 
 
 class Tally:
-    """Commits, by what came of them. All that is owed has to come."""
+    """Counts commits by outcome. Every outcome has to arrive."""
 
     def __init__(self) -> None:
         self.open: list[voxel.Frame] = []
@@ -60,7 +60,7 @@ class Tally:
         deadline = time.monotonic() + patience
         for frame in self.open:
             if patience:
-                with contextlib.suppress(voxel.VoxelError, TimeoutError):  # what came of it is looked at below
+                with contextlib.suppress(voxel.VoxelError, TimeoutError):  # the result is checked below
                     frame.wait_shown(timeout=max(0.0, deadline - time.monotonic()))
             if not frame.complete:
                 left.append(frame)
@@ -78,7 +78,7 @@ class Tally:
 
 
 def steady(server: str, stop: Stop, tally: Tally, rng: np.random.Generator) -> None:
-    """Retained things that move, at 30 a second, each waited for."""
+    """Retained entities that move, 30 commits a second, each waited for."""
     with voxel.connect(server, name="steady", timeout=LONG) as v:
         ball = v.sphere("ball", radius=0.3, color="orange", fill="solid")
         cloud = rng.uniform(-1, 1, (2000, 3)).astype(np.float32)
@@ -96,7 +96,7 @@ def steady(server: str, stop: Stop, tally: Tally, rng: np.random.Generator) -> N
 
 
 def immediate(server: str, stop: Stop, tally: Tally, rng: np.random.Generator) -> None:
-    """Whole frames, faster than any display."""
+    """Draw batches, faster than any display."""
     with voxel.connect(server, name="immediate", flow="latest", timeout=LONG) as v:
         while not stop.is_set():
             with v.frame("wave") as frame:
@@ -107,9 +107,9 @@ def immediate(server: str, stop: Stop, tally: Tally, rng: np.random.Generator) -
 
 
 def passing(server: str, stop: Stop, tally: Tally, rng: np.random.Generator) -> None:
-    """Comes, draws, and goes, in every way."""
+    """Connects, draws, and leaves, in every way."""
     ways: list[Any] = ["clear", 0.2, "keep"]
-    owner = b""  # of what is kept: else each would leave an owner behind, as it should
+    owner = b""  # the owner of what is persistent: otherwise each client would leave an owner behind, as it should
     turn = 0
     while not stop.is_set():
         turn += 1
@@ -128,7 +128,7 @@ def passing(server: str, stop: Stop, tally: Tally, rng: np.random.Generator) -> 
 
 
 def erring(server: str, stop: Stop, tally: Tally, rng: np.random.Generator) -> None:
-    """What is wrong, what is asked, and what is large."""
+    """Sends commits that cause issues, queries, and large uploads."""
     with voxel.connect(server, name="erring", on_issue=lambda issue: None, timeout=LONG) as v:
         turn = 0
         while not stop.is_set():
@@ -153,14 +153,14 @@ def role(name: str, server: str, stop: Stop, answer: Pipe) -> None:
     why = ""
     try:
         ROLES[name](server, stop, tally, np.random.default_rng(len(name)))
-    except BaseException as error:  # whatever it is, it is the result
+    except BaseException as error:  # any exception is the result
         why = f"{type(error).__name__}: {error}"
     answer.send((tally.ends, why))
 
 
 def sample(pid: int, port: int) -> dict[str, float]:
     status = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
-    # Resident is what files hold too: programs' pages, which come as they are first used, and of which there are no more than files have.
+    # Resident memory includes mapped files: pages of programs, which are loaded at first use, and are bounded by the size of the files.
     number = {key: int(value) for key, value in re.findall(r"^(VmRSS|RssAnon|Threads):\s+(\d+)", status, re.M)}
     with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=LONG) as answer:
         held = re.search(r"^voxeld_process_heap_bytes (\S+)", answer.read().decode(), re.M)
@@ -169,7 +169,7 @@ def sample(pid: int, port: int) -> dict[str, float]:
 
 
 def line_through(times: np.ndarray[Any, Any], values: np.ndarray[Any, Any]) -> tuple[float, float]:
-    """Slope an hour and half of its 95 % interval, of the medians of the parts."""
+    """Returns the slope in an hour and half of its 95 % interval, of the medians of the parts."""
     parts = [part for part in np.array_split(np.arange(len(times)), PARTS) if len(part)]
     x = np.array([np.median(times[part]) for part in parts]) / 3600
     y = np.array([np.median(values[part]) for part in parts])
@@ -217,7 +217,8 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="voxeld-soak-") as folder:
         server = f"unix:{folder}/s"
         log = open(f"{folder}/log", "w+", encoding="utf-8")
-        # Full after a minute or two, assets and sessions that have gone, so that what is kept stays as much, and making room goes on all the time.
+        # Assets and dormant sessions reach these limits after a minute or two, so that what is kept stays constant, and eviction happens
+        # all the time.
         Path(f"{folder}/voxeld.toml").write_text("[limits]\nmax_assets = 64\nmax_sessions = 64\n", encoding="utf-8")
         daemon = subprocess.Popen(
             [*ENDS_WITH_US, voxeld, "--config", f"{folder}/voxeld.toml", "--listen", server, "--http", "127.0.0.1:0", "--state-dir", f"{folder}/state", "--log-level", "info", "--engine", "cpu",

@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
-"""A page, as a program that can be stopped: watches displays over the http port's WebSocket, and says of what comes that it is shown, which has the
-next volume sent. A line on standard output once volumes come ("reads"), and another once some come after it was stopped and goes on ("reads again").
-For fault_matrix_test, and by hand; it goes on until it is ended."""
+"""A page, as a program that can be stopped: it watches displays over the WebSocket of the http port, and acknowledges each volume as shown,
+upon which
+the next is sent. It prints a line once volumes arrive ("reads"), and another once some arrive after it was stopped and continued ("reads
+again").
+For fault_matrix_test and manual use; it runs until it is killed."""
 import argparse
 import signal
 import socket
@@ -22,7 +24,7 @@ def continued(_number: int, _frame: Optional[FrameType]) -> None:
 
 
 def text(message: str) -> bytes:
-    """A frame of text, masked by nothing."""
+    """Returns a text frame, masked with zeros."""
     return bytes([0x81, 0x80 | len(message), 0, 0, 0, 0]) + message.encode()
 
 
