@@ -46,7 +46,7 @@ void Eye::Drew(uint64_t volume, Look look, uint64_t oldest_snapshot, uint64_t sn
 
 std::string Eye::Sees(Look look, sync::TimeNs now, bool may_go_back) {
   shown_.push_back({look, now});
-  // A display that had no volume yet shows a black one for who captures or watches.
+  // A display that has had no volume yet shows a black one to captures and watchers.
   if (look == black_ && (newest_shown_ == 0 || may_go_back)) return "";
   const auto found = by_look_.find(look);
   if (found == by_look_.end()) return "the device shows what was never drawn";

@@ -1,4 +1,5 @@
-// simulation: whole daemons below gRPC with their devices, a seed each, in one thread, on a clock of their own.
+// simulation: runs whole daemons below gRPC with their devices, one for each seed, in one thread,
+// with a simulated clock.
 #include <atomic>
 #include <chrono>
 #include <cinttypes>
@@ -38,7 +39,7 @@ struct Options {
   bool verbose = false, json = false, quiet = false;
 };
 
-// What is wrong; empty: nothing.
+// Returns what is wrong with the arguments; empty: nothing.
 std::string Parse(const std::vector<std::string>& args, Options* options) {
   const auto wrong = [](const std::string& arg, const std::string& value, const char* right) {
     return absl::StrCat(arg, " is \"", value, "\"; give ", right);
@@ -87,12 +88,12 @@ struct Failure {
   std::string what;
 };
 
-// What all seeds came to; shared by the jobs.
+// The totals of all seeds; shared by the jobs.
 struct Sum {
   std::mutex mutex;
   Tally tally;
   uint64_t seeds = 0;
-  uint64_t hash = 0;  // of all traces, in any order
+  uint64_t hash = 0;  // over all traces, independent of their order
   std::vector<Failure> failures;
 
   void Add(uint32_t seed, const Tally& one, uint64_t trace_hash, const std::string& wrong) {

@@ -4,8 +4,8 @@
     tests/simulation/mutants.py [--scratch DIR] [--seeds N] [--jobs N] [--json FILE] [NAME …]
     tests/simulation/mutants.py --check     only whether each still fits the tree, and builds nothing
 
-NAME: those whose names contain it; none: all. A copy of the tree is built in DIR (build/mutants), by the
-preset "test". Prints a table: the defect, the first seed that finds it, what was found wrong. Ends with 0 if all were
+NAME selects the defects whose names contain it; without one, all are planted. A copy of the tree is built in DIR (build/mutants), by the
+preset "test". Prints a table: the defect, the first seed that finds it, what was found wrong. Exits with 0 if all were
 found.
 """
 import argparse
@@ -22,7 +22,7 @@ ROOT = HERE.parent.parent
 
 
 def read_defects(names):
-    """The defects whose names contain one of `names` (all, if there are none): {name: patch}."""
+    """Returns the defects whose names contain one of `names` (all, if `names` is empty): {name: patch}."""
     defects = {}
     for section in (HERE / "mutants.patch").read_text(encoding="utf-8").split("Defect: ")[1:]:
         name, patch = section.split("\n", 1)
@@ -36,7 +36,7 @@ def run(command, **options):
 
 
 def copy_tree(source):
-    """What git tracks or would, as it is in the working tree; files that have not changed keep their times."""
+    """Copies the files of the working tree that git tracks or would track; files that have not changed keep their times."""
     names = run(["git", "ls-files", "--cached", "--others", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True).stdout.split("\n")
     wanted = {name for name in names if name and (ROOT / name).is_file()}
     for name in wanted:
@@ -49,7 +49,7 @@ def copy_tree(source):
         name = str(old.relative_to(source))
         if old.is_file() and not name.startswith("build/") and name not in wanted:
             old.unlink()
-    # What the build has fetched, if anything.
+    # The files that the build has fetched, if any.
     data = source / "build" / "data"
     if (ROOT / "build" / "data").exists() and not data.exists():
         data.parent.mkdir(exist_ok=True)
@@ -72,7 +72,7 @@ def build_simulation(source, build, jobs):
 
 
 def simulate(build, seeds, jobs):
-    """The first seed in which something is wrong, and what; nothing: none is."""
+    """Returns the first seed in which something is wrong, and the error; None: no seed finds one."""
     done = subprocess.run([build / "bin/tests/simulation", "--seeds", f"1..{seeds}", "--jobs", str(jobs), "--quiet", "--json"],
                           capture_output=True, text=True, check=False)
     if done.returncode not in (0, 1):

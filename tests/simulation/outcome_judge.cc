@@ -49,7 +49,7 @@ void OutcomeJudge::Boards(size_t d, DisplayState state) {
 
 void OutcomeJudge::Boarded(size_t d, DisplayState state) {
   const size_t from = std::exchange(boarding_from_[d], boarding_to_[d]);
-  // A setting that came along was taken before some of them, or after.
+  // A setting that was posted together with the commits took effect before some of them, or after.
   if (!screens_[d].blank_changes) return;
   for (size_t i = from; i < boarding_to_[d]; ++i) {
     commits_[i].on[d].may |= May(commits_[i], d, state);
@@ -101,7 +101,7 @@ bool OutcomeJudge::LooksLike(size_t d, Look look, uint64_t to) const {
       std::any_of(eye.drawn().begin(), eye.drawn().end(), [look, to](const Eye::Drawn& volume) {
         return volume.snapshot >= to && volume.drawn_ns.has_value() && volume.look == look;
       });
-  // Else nothing was drawn of it: nothing that an engine sees had changed.
+  // Otherwise no volume was drawn for it: nothing had changed that an engine sees.
   return drawn || SameScene(eye, look, to);
 }
 
@@ -197,7 +197,8 @@ std::string OutcomeJudge::JudgePresented(Entry& entry, size_t d, const CommitOut
     return absl::StrCat("PRESENTED at ", outcome.time_ns, ", before its time ",
                         entry.commit.present_at);
   }
-  // Of one session's commits that ride in one volume only the newest is; later ones in later volumes.
+  // If several commits of one session are shown by one volume, only the newest is presented in it;
+  // later commits are in later volumes.
   uint64_t& last = last_presented_[{d, entry.commit.session}];
   if (outcome.volume <= last && !taken_back_.contains(entry.commit.session)) {
     return absl::StrCat("PRESENTED in volume ", outcome.volume, " after volume ", last);
@@ -220,9 +221,9 @@ std::string OutcomeJudge::JudgeUnchanged(const Entry& entry, size_t d,
   for (const Eye::Drawn& drawn : eye.drawn()) {
     if (drawn.snapshot < entry.commit.snapshot || !drawn.drawn_ns.has_value()) continue;
     if (drawn.look == same->look) return "";
-    break;  // the first drawn with it decides
+    break;  // the first one drawn with it decides
   }
-  // None was drawn: nothing that an engine sees had changed.
+  // No volume was drawn for it: nothing had changed that an engine sees.
   if (SameScene(eye, same->look, entry.commit.snapshot)) return "";
   return absl::StrCat("UNCHANGED from volume ", outcome.volume, ", which looks otherwise");
 }

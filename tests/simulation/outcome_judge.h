@@ -1,9 +1,10 @@
-// What became of every commit on every display, judged by what was asked of the engines and by what an eye saw of
-// the devices: exactly one outcome each, of a kind that the rules of rider_book.h allow.
+// Judges the outcome of every commit on every display by the requests to the engines and by what
+// was seen of the devices: exactly one outcome each, of a kind that the rules of rider_book.h
+// allow.
 //
-// Beside scripted displays this is known exactly (tests/daemon/core/model/outcome_ledger.h); here devices fail by
-// themselves, so that some outcomes may be one or another, and a volume may be LOST only on a display that something
-// has disturbed.
+// With scripted displays the outcome is known exactly (tests/daemon/core/model/outcome_ledger.h);
+// here devices fail by themselves, so that some outcomes may be one or another, and a volume may be
+// LOST only on a display that something has disturbed.
 #pragma once
 
 #include <cstdint>
@@ -31,11 +32,11 @@ class OutcomeJudge {
     std::string name;
     Eye eye;
     sync::TimeNs disturbed_until = 0;
-    sync::TimeNs lied_until = -1;  // what its device told until then need not be so
-    sync::TimeNs tolerance = 0;    // of times that its device tells, while nothing disturbs it
+    sync::TimeNs lied_until = -1;  // what its device reported until then may be untrue
+    sync::TimeNs tolerance = 0;  // for the times that its device reports while nothing disturbs it
     bool pattern = false;
-    uint64_t patterns = 0;                                // set so far
-    bool pattern_changes = false, blank_changes = false;  // on its way to the display
+    uint64_t patterns = 0;                                // how many were set so far
+    bool pattern_changes = false, blank_changes = false;  // a change is on its way to the display
   };
 
   explicit OutcomeJudge(std::vector<Screen> screens) : screens_(std::move(screens)) {}
@@ -43,24 +44,25 @@ class OutcomeJudge {
   Screen& screen(size_t d) { return screens_[d]; }
   const Screen& screen(size_t d) const { return screens_[d]; }
 
-  // ---- what happened, as it happened
+  // ---- events, in the order in which they happen
   void OnApplied(const Applied& commit, sync::TimeNs now);
-  // A snapshot's scene, as it is to be seen; equal numbers, equal scenes.
+  // Records the visible scene of a snapshot; equal numbers mean equal scenes.
   void Pictured(uint64_t snapshot, uint64_t picture) { pictures_[snapshot] = picture; }
-  // The display's thread takes what was posted to it, in that state.
+  // The display's thread, in this state, starts to take the commits that were posted to it.
   void Boards(size_t d, display::DisplayState state);
-  // It has done so.
+  // It has taken them.
   void Boarded(size_t d, display::DisplayState state);
-  void Removed() { removed_ = true; }  // displays have ended; the core has not
+  void Removed() { removed_ = true; }  // the displays have stopped; the core has not
   void Disturb(size_t d, sync::TimeNs until);
 
-  // An outcome that a client was told. What is wrong with it; empty: nothing.
+  // A client received an outcome.
+  // Returns: what is wrong with it; empty: nothing.
   std::string Told(uint64_t session, const daemon::Receipt& receipt, const CommitOutcome& outcome,
                    sync::TimeNs now);
-  // It comes again: the client did not get it.
+  // The receipt will be sent again: the client did not get it.
   void TakeBack(uint64_t session, const daemon::Receipt& receipt);
 
-  // Whether that is what snapshot `to`, or a newer one, looks like on a display.
+  // Returns whether snapshot `to`, or a newer one, has this look on a display.
   bool LooksLike(size_t d, Look look, uint64_t to) const;
   uint64_t Missing(uint64_t session, uint64_t incarnation, std::string* which) const;
   uint64_t owed() const { return owed_; }
@@ -69,7 +71,7 @@ class OutcomeJudge {
   const std::map<CommitOutcome::Kind, uint64_t>& kinds() const { return kinds_; }
 
  private:
-  // What may become of a commit, as bits.
+  // The outcomes that a commit may have, as bits.
   static constexpr uint32_t kRides = 1u << 16;
   static uint32_t Bit(CommitOutcome::NotShown why) { return 1u << static_cast<uint32_t>(why); }
 
@@ -77,7 +79,7 @@ class OutcomeJudge {
     bool told = false;
     uint32_t may = 0;
     uint64_t patterns = 0;
-    uint64_t presented = 0;  // in which volume
+    uint64_t presented = 0;  // the volume that presented it
   };
   struct Entry {
     Applied commit;
@@ -87,9 +89,11 @@ class OutcomeJudge {
 
   uint32_t May(const Entry& entry, size_t d, display::DisplayState state) const;
   Entry* Find(uint64_t session, const daemon::Receipt& receipt, size_t* index);
-  // Whether a volume with `from` but not `to` (0: not anything), before volume `before`, was surely shown.
+  // Returns whether a volume with snapshot `from` but not `to` (0: no limit), older than volume
+  // `before`, was certainly shown.
   static bool ShownBetween(const Eye& eye, uint64_t from, uint64_t to, uint64_t before);
-  // Whether a volume that looks so was drawn of the same scene as a snapshot from `from` on has.
+  // Returns whether a volume with this look was drawn of a scene equal to that of snapshot `from`
+  // or a newer one.
   bool SameScene(const Eye& eye, Look look, uint64_t from) const;
   std::string Judge(size_t index, size_t d, const CommitOutcome& outcome, sync::TimeNs now);
   std::string JudgePresented(Entry& entry, size_t d, const CommitOutcome& outcome,

@@ -1,4 +1,4 @@
-// What judges outcomes and pictures judges as it should: told what is right it says nothing, told what is wrong it says what.
+// Tests the judges of outcomes and pictures: they accept what is right, and report what is wrong.
 #include "tests/simulation/outcome_judge.h"
 
 #include <gmock/gmock.h>
@@ -42,7 +42,8 @@ TEST(Eye, GoesNotBack) {
 
 class OutcomeJudgeTest : public ::testing::Test {
  protected:
-  // A commit of session 1 in that snapshot, applied at that time, that a display which shows has taken.
+  // A commit of session 1 in that snapshot, applied at that time, and taken by a display that is
+  // showing.
   void Commit(uint64_t sequence, uint64_t snapshot, sync::TimeNs now, sync::TimeNs present_at = 0) {
     judge_.OnApplied({1, 0, sequence, sequence, snapshot, true, false, present_at}, now);
     judge_.Pictured(snapshot, snapshot);

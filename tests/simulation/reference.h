@@ -1,4 +1,4 @@
-// What a scene is to look like: the plain scene drawn whole, once, by a fresh engine.
+// Draws what a scene must look like: the plain scene, drawn whole, once, by a fresh engine.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 namespace voxeld::simulation {
 
-// The pictures of a volume, packed as `info` says, seen through a view in voxels.
+// Returns the slice images of a volume, packed as `info` says, seen through a view in voxels.
 std::vector<std::byte> DrawPlain(const daemon::model::PlainScene& scene,
                                  const display::DisplayInfo& info);
 

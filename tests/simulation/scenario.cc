@@ -16,10 +16,10 @@ using display::TransferStatus;
 using display::TransportFault;
 using display::emulator::Fault;
 
-constexpr double kFar = 1e12;  // outside on every display
+constexpr double kFar = 1e12;  // outside of every display
 constexpr uint32_t kColors[] = {0xFFFFFF, 0xFF0000, 0x00FF00, 0x0000FF, 0x80C040};
 
-// In quarters of a voxel: sums and products of such are exact.
+// Returns quarters of a voxel: sums and products of quarters are exact.
 float Quarter(Chance& chance, uint32_t voxels) {
   return static_cast<float>(chance.Pick(4 * voxels)) / 4;
 }
@@ -97,7 +97,7 @@ std::map<std::string, std::string> RandomDevice(Chance& chance, const std::strin
       break;
     default:
       device["size"] = chance.OneIn(2) ? "8x8x8" : "8x6x4";
-      if (chance.OneIn(8)) device["size"] = "24x16x3";  // a picture takes several packets
+      if (chance.OneIn(8)) device["size"] = "24x16x3";  // a slice image takes several packets
   }
   switch (chance.Pick(6)) {
     case 0:
@@ -180,7 +180,7 @@ Scenario MakeScenario(uint32_t seed) {
   Scenario scenario;
   scenario.seed = seed;
   scenario.limits = script.limits;
-  // How many commits wait for their time is for the core to say, where sweeps decide when that is.
+  // The core decides how many commits may wait for their time when the sweeps decide when that is.
   scenario.limits.max_timed_commits = daemon::Limits().max_timed_commits;
   scenario.settles = script.settles;
   scenario.actions = std::move(script.actions);

@@ -1,4 +1,4 @@
-// What a seed stands for: displays and their devices, limits, and what happens, as plain data.
+// The scenario of a seed: displays and their devices, limits, and the events, as plain data.
 #pragma once
 
 #include <cstdint>
@@ -16,15 +16,16 @@ struct Scenario {
   daemon::Limits limits;
   std::vector<SeatOptions> seats;
   bool device_faults = false, transport_faults = false, engine_faults = false, jumps = false;
-  bool lies = false;         // devices tell what is not so
-  bool memory_ends = false;  // now and then there is none for clients
-  bool settles = true;       // ends when all is shown and everybody has left; else in the middle
+  bool lies = false;         // devices report what is not true
+  bool memory_ends = false;  // now and then clients run out of memory
+  bool settles = true;       // ends when everything is shown and every client has left; otherwise
+                             // it stops in the middle
   std::vector<daemon::model::Action> actions;
 };
 
 Scenario MakeScenario(uint32_t seed);
 
-// A fault on a device's cable, soon.
+// Returns a fault on a device's cable that happens soon.
 display::emulator::Fault RandomFault(Chance& chance);
 
 // Points, lines, boxes and balls on grids of about 8 voxels a side, under a view in voxels.

@@ -1,4 +1,4 @@
-// What is done to displays, their devices and engines, and time.
+// The actions on displays, their devices and engines, and on time.
 #include <algorithm>
 #include <exception>
 
@@ -54,11 +54,12 @@ void SimulationRun::Do(const Action& action) {
     case ActionKind::kClose:
     case ActionKind::kResume:
     case ActionKind::kEvict:
-      // What a session that ends does with a commit whose time is coming could not be told; nor, of limits that all
-      // share, whether its last commits come before those of others.
+      // It could not be predicted what a session that ends does with a commit whose time is coming,
+      // nor, with limits that all sessions share, whether its last commits come before those of
+      // others.
       Step();
       AwaitCertainty();
-      // Nor in which order commits for one sweep are applied at its end.
+      // Nor could the order be predicted in which commits for one sweep are applied when it ends.
       if (std::any_of(plain_.sessions.begin(), plain_.sessions.end(),
                       [](const auto& entry) { return entry.second.due.size() > 1; })) {
         return;
@@ -121,7 +122,7 @@ void SimulationRun::DoToDisplay(const Action& action, Chance& chance, size_t d) 
       if (!is.blanked && !chance.OneIn(6)) return;
       is.blanked = !is.blanked;
       Trace(absl::StrCat("display ", d, is.blanked ? " dark" : " light"));
-      // What is on its way when it gets dark is lost, and a genlock begins anew.
+      // A volume that is on its way when the display goes dark is lost, and a genlock starts again.
       judge_.Disturb(d, now());
       if (!seat.genlock.empty()) Disturb(d, now() + kJumpAftermath);
       screen.blank_changes = true;
@@ -173,7 +174,7 @@ void SimulationRun::Advance(sync::TimeNs delta) {
   }
 }
 
-// Nobody runs for a while: the machine slept, or had something else to do.
+// Nothing runs for a while: the machine was suspended, or busy.
 void SimulationRun::Jump(sync::TimeNs delta) {
   Step();
   if (!wrong_.empty()) return;

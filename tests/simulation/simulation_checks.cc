@@ -1,4 +1,4 @@
-// What must hold of what is seen.
+// The checks of what is seen.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -13,9 +13,10 @@ namespace {
 using sync::kMillisecond;
 using sync::kSecond;
 
-// A volume is drawn, sent and shown in this, whatever the device's pace, if nothing disturbs it.
+// A volume is drawn, sent and shown within this time, whatever the device's pace, if nothing
+// disturbs it.
 constexpr sync::TimeNs kAtRest = 2 * kSecond;
-// Faults end; then everything is shown in this.
+// Faults end; then everything is shown within this time.
 constexpr sync::TimeNs kSettles = 120 * kSecond;
 
 }  // namespace
@@ -40,7 +41,7 @@ void SimulationRun::CheckQuiet() {
       seen = seat.device->Seen();
       brightness = seat.device->brightness();
     });
-    // A device that has denied, lying, that it has a brightness, is dark by a black picture.
+    // A lying device that has denied having a brightness is darkened by a black picture.
     const bool by_picture = !is.blanked && judge_.screen(d).lied_until >= 0;
     if ((is.blanked || is.brightness == 0) && seen.has_value() &&
         !(by_picture &&
@@ -52,7 +53,7 @@ void SimulationRun::CheckQuiet() {
     if (seat.display->state() != display::DisplayState::kShowing) {
       Fail(absl::StrCat("display ", d, " does not show, though nothing disturbs it"));
     }
-    // A device that said that it has none is dimmed otherwise.
+    // A device that said that it has no brightness is dimmed in another way.
     if (judge_.screen(d).lied_until < 0 && std::abs(brightness - is.brightness) > 1e-4) {
       Fail(absl::StrCat("display ", d, " has brightness ", brightness, ", not ", is.brightness));
     }
@@ -60,7 +61,7 @@ void SimulationRun::CheckQuiet() {
   }
 }
 
-// The device shows what the plain scene looks like, drawn anew.
+// Checks that the device shows what the plain scene looks like when it is drawn again.
 void SimulationRun::CheckPicture(size_t d) {
   ++tally_.pictures_compared;
   const Seat& seat = world_->seats()[d];
@@ -81,7 +82,8 @@ void SimulationRun::CheckPicture(size_t d) {
   }
 }
 
-// Members of a genlock show the same volume at the same time, but for the time between their sweeps.
+// Checks that members of a genlock show the same volume at the same time, except for the time
+// between their sweeps.
 void SimulationRun::CheckGenlock() {
   if (!wrong_.empty()) return;
   const std::vector<Seat>& seats = world_->seats();
@@ -95,7 +97,7 @@ void SimulationRun::CheckGenlock() {
   const bool lit = first.has_value() && second.has_value() && !now_[0].blanked && !now_[1].blanked;
   const bool calm =
       judge_.screen(0).disturbed_until < now() && judge_.screen(1).disturbed_until < now();
-  // Each shows one of the volumes that look like it; there is one that both may be.
+  // Each shows one of the volumes that have its look; there is one that both may be.
   const bool apart =
       lit && calm && (first->second < second->first || second->second < first->first);
   if (!apart) {
@@ -178,7 +180,7 @@ void SimulationRun::OnWatched(size_t d, const absl::StatusOr<display::DecodedVol
   Trace(absl::StrCat("    display ", d, " is seen: volume ", volume->volume));
 }
 
-// Faults end, and everything is lit: then all is shown, and nobody is owed anything any more.
+// Faults end, and every display is lit: then everything is shown, and no outcome is outstanding.
 void SimulationRun::Settle() {
   Trace("everything settles");
   if (plain_.memory_full) FillMemory(false);
@@ -221,7 +223,7 @@ void SimulationRun::Settle() {
   CheckUndisturbed();
 }
 
-// Where no device was ever disturbed nothing was sent twice, and each was found once.
+// Checks that, where no device was ever disturbed, nothing was sent twice, and each was found once.
 void SimulationRun::CheckUndisturbed() {
   if (scenario_.device_faults || scenario_.transport_faults || scenario_.lies || scenario_.jumps) {
     return;
@@ -233,7 +235,7 @@ void SimulationRun::CheckUndisturbed() {
       Fail(absl::StrCat("display ", d, " was sent ", figures.slices_resent,
                         " slices again, and nothing was amiss"));
     }
-    // A genlock's member begins anew when it is lit again.
+    // A member of a genlock starts again when it is lit again.
     if (figures.attaches != 1 && world_->seats()[d].genlock.empty()) {
       Fail(absl::StrCat("display ", d, " was found ", figures.attaches, " times"));
     }
@@ -246,7 +248,7 @@ void SimulationRun::Leave() {
   EvictEverybody();
   if (!wrong_.empty()) return;
   const sync::TimeNs end = now() + kSettles;
-  // The scene is empty; now and then that is looked at, too.
+  // The scene is empty; some runs check that as well.
   const bool looks = scenario_.seed % 4 == 0;
   bool over = false;
   while (wrong_.empty() && !over) {

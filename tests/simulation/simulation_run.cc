@@ -14,14 +14,14 @@ using daemon::model::PlainScene;
 using sync::kMillisecond;
 using sync::kSecond;
 
-// How long after a disturbance a display may still lose something by it: its device is asked four times, half a
-// second each, before it is given up.
+// How long after a disturbance a display may still lose something because of it: its device is
+// asked four times, half a second each, before it is given up.
 constexpr sync::TimeNs kAftermath = 6 * kSecond;
-// What a device told of its clock is believed for two windows of 5 s.
+// A device's reports about its clock are believed for two windows of 5 s.
 constexpr sync::TimeNs kLieAftermath = 15 * kSecond;
-// And after an engine's failure.
+// The same, after an engine failure.
 constexpr sync::TimeNs kEngineAftermath = 2 * kSecond;
-// How far times that a device tells may lie from what they are.
+// How far the times that a device reports may be off.
 constexpr sync::TimeNs kTolerance = 2 * kMillisecond;
 
 std::vector<std::string> NamesOf(const Scenario& scenario) {
@@ -81,7 +81,7 @@ SimulationRun::SimulationRun(const Scenario& scenario, std::ostream* trace)
       if (now() < slow_engines_until_) return chance.Pick(80) * kMillisecond;
       return chance.OneIn(2) ? 0 : chance.Pick(2000) * sync::TimeNs{1000};
     };
-    // A timed commit is applied for the sweep before its time, by what is known of sweeps.
+    // A timed commit is applied for the sweep before its time, as far as the sweeps are known.
     const auto period =
         static_cast<sync::TimeNs>(kSecond / seat.display->info().volumes_per_second);
     plain_.early = std::max(plain_.early, period * 3 / 2 + kMillisecond);
@@ -123,7 +123,7 @@ daemon::model::RandomMessage SimulationRun::Compose(Chance& chance, uint64_t las
   for (daemon::Operation& operation : message.operations) {
     auto* commit = std::get_if<daemon::Commit>(&operation.op);
     if (commit == nullptr) continue;
-    // Of clients' clocks nothing is known: they jump.
+    // Nothing is known about the clocks of clients: they jump.
     switch (chance.Pick(6)) {
       case 0:
         commit->send_time_ns = now() + static_cast<int64_t>(chance.Next()) * 1000 - kSecond;
@@ -136,14 +136,14 @@ daemon::model::RandomMessage SimulationRun::Compose(Chance& chance, uint64_t las
       default:
         commit->send_time_ns = now() + 3600 * kSecond;
     }
-    // Whose device lies of its sweeps, its timed commits come at any time.
+    // With a device that lies about its sweeps, timed commits are applied at any time.
     if (scenario_.lies) commit->present_at_ns = 0;
     commit->durable = chance.OneIn(6);
   }
   return message;
 }
 
-// -------------------------------------------------------------------------------- what is told
+// -------------------------------------------------------------------------------- reports
 
 void SimulationRun::OnApplied(const Applied& commit) { judge_.OnApplied(commit, now()); }
 
@@ -159,7 +159,8 @@ void SimulationRun::OnPictured(uint64_t snapshot) {
 std::string SimulationRun::OnTold(uint64_t session, const daemon::Receipt& receipt,
                                   const CommitOutcome& outcome) {
   for (size_t d = 0; d < now_.size(); ++d) NoteDisturbances(d);
-  // What a cable damaged is sent again, and each time it takes another fault to damage it again.
+  // A packet that was damaged on a cable is sent again, and damaging it again takes another fault
+  // each time.
   if (outcome.reason.find("did not arrive") != std::string::npos && !scenario_.lies &&
       tally_.faults < display::voxlink::kMaxResends && !scenario_.transport_faults) {
     return absl::StrCat("LOST after ", tally_.faults, " faults: ", outcome.reason);
@@ -167,7 +168,7 @@ std::string SimulationRun::OnTold(uint64_t session, const daemon::Receipt& recei
   return judge_.Told(session, receipt, outcome, now());
 }
 
-// ---------------------------------------------------------------------------- what is disturbed
+// ---------------------------------------------------------------------------- disturbances
 
 void SimulationRun::Disturb(size_t d, sync::TimeNs until) {
   const std::vector<Seat>& seats = world_->seats();
@@ -209,7 +210,7 @@ void SimulationRun::AfterPipeline(size_t d) {
   judge_.Boarded(d, world_->seats()[d].display->state());
 }
 
-// ---------------------------------------------------------------------------- what is to be seen
+// ---------------------------------------------------------------------------- what is visible
 
 void SimulationRun::AfterDevice(size_t d) {
   if (!wrong_.empty()) return;
@@ -228,9 +229,8 @@ void SimulationRun::AfterDevice(size_t d) {
   if (shown == nullptr) return;
   const Look look = LookOf(shown->pictures);
   Trace(absl::StrCat("    display ", d, " shows ", look));
-  // Time goes from sweep to sweep: this one begins now.
-  // A member of a genlock whose device showed a volume that the others had dropped (genlock.h says when it may) goes back
-  // to theirs.
+  // Time goes from sweep to sweep: this one begins now. If the device of a genlock's member showed
+  // a volume that the others had dropped (genlock.h says when it may), it goes back to theirs.
   const bool strays = !seat.genlock.empty() && now() <= judge_.screen(d).disturbed_until;
   const std::string wrong = judge_.screen(d).eye.Sees(look, now(), strays);
   if (!wrong.empty()) Fail(absl::StrCat("display ", d, ": ", wrong));
@@ -266,7 +266,7 @@ void SimulationRun::OnFrame(size_t d, uint64_t volume, const daemon::testing::Sc
     const auto newest = std::prev(pictured_.upper_bound(snapshot));
     bool found = newest->second.whole == whole;
     if (!world_->seats()[d].genlock.empty()) {
-      // A genlock's round is of the snapshot that it began with.
+      // A round of a genlock shows the snapshot with which it began.
       found = false;
       for (auto it = pictured_.begin(); it != std::next(newest); ++it) {
         if (it->second.whole != whole) continue;

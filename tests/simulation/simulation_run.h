@@ -1,5 +1,6 @@
-// One scenario, from the first Open until nothing is held any more, with everything that must hold checked as it
-// goes: what clients are told by core_judge.h, what becomes of their commits by outcome_judge.h, what is seen by eye.h.
+// Runs one scenario, from the first Open until nothing is held any longer, and checks all
+// invariants as it goes: core_judge.h checks the messages to clients, outcome_judge.h the outcomes
+// of their commits, eye.h what is seen.
 #pragma once
 
 #include <cstdint>
@@ -20,17 +21,17 @@ namespace voxeld::simulation {
 struct Tally {
   uint64_t turns = 0, commits = 0, outcomes = 0, volumes = 0, pictures_compared = 0;
   uint64_t captures = 0, watched = 0, faults = 0;
-  sync::TimeNs time_ns = 0;  // that passed
+  sync::TimeNs time_ns = 0;  // simulated time that passed
   std::map<CommitOutcome::Kind, uint64_t> kinds;
 };
 
 class SimulationRun final : public daemon::model::CoreJudge {
  public:
-  // With `trace` everything that happens is written there.
+  // With `trace`, every event is written to it.
   explicit SimulationRun(const Scenario& scenario, std::ostream* trace = nullptr);
   ~SimulationRun() override;
 
-  // The first thing that was wrong; empty: nothing.
+  // Returns the first error; empty: none.
   std::string Run();
 
   Tally tally() const;
@@ -58,7 +59,7 @@ class SimulationRun final : public daemon::model::CoreJudge {
   bool IsOnDisk(uint64_t snapshot) const override { return world_->disk().written() >= snapshot; }
   bool Idle(size_t display) override;
 
-  // ---- simulation_run.cc: as it happens
+  // ---- simulation_run.cc: events
   sync::TimeNs now() { return world_->clock().Now(); }
   void BeforePipeline(size_t d);
   void AfterPipeline(size_t d);
@@ -67,12 +68,12 @@ class SimulationRun final : public daemon::model::CoreJudge {
   void OnFrame(size_t d, uint64_t volume, const daemon::testing::SceneModel& scene,
                std::span<const std::byte> bytes);
   void OnEngineFailed(size_t d, uint64_t volume, const absl::Status& status);
-  // What disturbs it goes on, or has just ended.
+  // A disturbance of the display continues, or has just ended.
   void NoteDisturbances(size_t d);
-  // And those that are in genlock with it.
+  // Disturbs the display and those that are in genlock with it.
   void Disturb(size_t d, sync::TimeNs until);
 
-  // ---- simulation_actions.cc: what is done to displays, and time
+  // ---- simulation_actions.cc: actions on displays and on time
   void RunScenario();
   void Do(const Action& action);
   void DoToDisplay(const Action& action, Chance& chance, size_t d);
@@ -86,8 +87,9 @@ class SimulationRun final : public daemon::model::CoreJudge {
   void Capture(size_t d, Chance& chance);
   void Watch(size_t d);
 
-  // ---- simulation_checks.cc: what must hold
-  // True once a display shows, and nothing has disturbed it or changed the scene for long enough.
+  // ---- simulation_checks.cc: checks
+  // Returns true once a display is showing, and nothing has disturbed it or changed the scene for
+  // long enough.
   bool Quiet(size_t d);
   void CheckQuiet();
   void CheckPicture(size_t d);
@@ -111,7 +113,7 @@ class SimulationRun final : public daemon::model::CoreJudge {
     std::optional<Look> watched;
     uint64_t watched_volume = 0;
     sync::TimeNs apart_since =
-        0;  // of a genlock: it shows something else than the first; 0: it does not
+        0;  // since when a member of a genlock shows something else than the first; 0: it does not
   };
   struct Pending {
     size_t display = 0;
@@ -128,11 +130,11 @@ class SimulationRun final : public daemon::model::CoreJudge {
   std::vector<DisplayNow> now_;
   std::vector<Pending> captures_;
   std::map<uint64_t, Pictured> pictured_;  // by snapshot
-  sync::TimeNs changed_ns_ = 0;            // when the newest snapshot came
+  sync::TimeNs changed_ns_ = 0;            // when the newest snapshot was applied
   sync::TimeNs slow_engines_until_ = 0;
   sync::TimeNs started_ns_ = 0;
   Tally tally_;
-  std::optional<World> world_;  // last: it goes first
+  std::optional<World> world_;  // declared last, so that it is destroyed first
 };
 
 }  // namespace voxeld::simulation

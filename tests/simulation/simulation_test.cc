@@ -1,4 +1,5 @@
-// The simulation itself: the same seed is the same run; what a seed comes to has met what it is to judge.
+// Tests of the simulation itself: the same seed gives the same run, and the runs reach the
+// situations that they are to judge.
 #include <gtest/gtest.h>
 
 #include <map>

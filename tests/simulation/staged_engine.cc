@@ -66,7 +66,7 @@ class StagedEngine final : public gpu::Engine {
       engine_->SubmitFrame(request, buffer, [&](const absl::StatusOr<gpu::FrameResult>& result) {
         if (result.ok() && stage_->on_frame) stage_->on_frame(request.frame, scene_, buffer.bytes);
         if (!result.ok()) return Answer(request.frame, result.status(), done);
-        // How long it took is no part of what a seed decides.
+        // How long drawing took is not determined by the seed.
         gpu::FrameResult same = *result;
         same.assemble_ns = same.slice_ns = same.copy_ns = 1000;
         done(same);
@@ -79,7 +79,7 @@ class StagedEngine final : public gpu::Engine {
   }
 
  private:
-  // What failed by itself: it had no memory (tests/simulation/allocations_test.cc).
+  // The call failed by itself: it was out of memory (tests/simulation/allocations_test.cc).
   template <typename DoneFunction>
   void Answer(uint64_t volume, const absl::Status& status, const DoneFunction& done) {
     gone_ = gone_ || absl::IsDataLoss(status);

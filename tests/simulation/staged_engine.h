@@ -1,5 +1,5 @@
-// The CPU's engine, whose calls end when a simulation lets them, or fail as it says. Its answers are posted, as
-// those of an engine with threads are.
+// The CPU engine, whose calls end when the simulation lets them, or fail on request. Its answers
+// are posted, as those of an engine with threads are.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@
 
 namespace voxeld::simulation {
 
-// Of one display; outlives its engines. Single-threaded.
+// The stage of one display's engines; outlives them. Single-threaded.
 struct EngineStage {
   struct Call {
     sync::TimeNs due = 0;
@@ -26,12 +26,12 @@ struct EngineStage {
   };
 
   sync::Clock* clock = nullptr;
-  std::function<sync::TimeNs()> takes;             // how long the next call does
-  std::optional<absl::Status> fail;                // the next frame ends in this, once
-  bool fail_staging = false;                       // AcquireStaging is refused, once
-  std::function<void(uint64_t volume)> on_submit;  // as it is asked for
+  std::function<sync::TimeNs()> takes;             // how long the next call takes
+  std::optional<absl::Status> fail;                // the next frame ends with this error, once
+  bool fail_staging = false;                       // the next AcquireStaging is refused, once
+  std::function<void(uint64_t volume)> on_submit;  // called when a volume is requested
   std::function<void(uint64_t volume, const absl::Status&)> on_failed;
-  // As it is drawn: from that scene, these bytes.
+  // Called when a volume is drawn, with its scene and bytes.
   std::function<void(uint64_t volume, const daemon::testing::SceneModel& scene,
                      std::span<const std::byte> bytes)>
       on_frame;
@@ -40,7 +40,7 @@ struct EngineStage {
   sync::TimeNs Next() const { return calls.empty() ? sync::kNever : calls.front().due; }
   // Carries out the next call.
   void Run();
-  // Whether a call of any is being carried out, in this thread.
+  // Returns whether a call of any stage is being carried out in this thread.
   static bool IsRunning();
 };
 

@@ -10,7 +10,7 @@
 namespace voxeld::simulation {
 namespace {
 
-constexpr int kMostTurns = 100'000;  // without time going on: somebody spins
+constexpr int kMostTurns = 100'000;  // turns without time advancing: more mean that something spins
 
 }  // namespace
 
@@ -45,7 +45,7 @@ World::World(uint32_t seed, const daemon::Limits& limits, const std::vector<Seat
   options.version = "simulation";
   options.threads = false;
   options.state = &disk_;
-  // An engine's device is the number of its display here.
+  // Here, the device of an engine is the number of its display.
   options.make_engine =
       [this](const gpu::EngineOptions& wanted) -> absl::StatusOr<std::unique_ptr<gpu::Engine>> {
     return MakeStagedEngine(seats_[static_cast<size_t>(wanted.device)].engine);

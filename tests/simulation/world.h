@@ -1,5 +1,6 @@
-// A whole daemon below gRPC with its devices, in one thread: the core's thread, one thread a display, each device
-// and each engine have their turns when chance says so, and time passes when nobody has anything to do.
+// A whole daemon below gRPC with its devices, in one thread: the core's thread, one thread for each
+// display, each device and each engine take turns in random order, and time advances when none of
+// them has anything to do.
 #pragma once
 
 #include <cstdint>
@@ -33,7 +34,8 @@ struct SeatOptions {
   std::vector<display::TransportFault> transport_faults;
 };
 
-// A display of the daemon, with what is behind it. The core owns the display and so the transport.
+// A display of the daemon, with its device and engine. The core owns the display and therefore the
+// transport.
 struct Seat {
   std::string name;
   std::string genlock;
@@ -46,7 +48,8 @@ struct Seat {
   std::shared_ptr<EngineStage> engine;
 };
 
-// What outlives the daemon is written here: one snapshot after another, the newest, each in its time.
+// The state that outlives the daemon is written here: one snapshot after another, always the
+// newest, each taking its time.
 class Disk final : public daemon::StateSink {
  public:
   Disk(sync::Clock& clock, Chance& chance) : clock_(clock), chance_(chance) {}
@@ -54,7 +57,7 @@ class Disk final : public daemon::StateSink {
   void Offer(daemon::SnapshotPtr snapshot, std::shared_ptr<const daemon::OwnerRecords> owners,
              bool at_once) override;
   sync::TimeNs Next() const { return due_; }
-  // The write ends; the snapshot that is on the disk.
+  // Ends the write. Returns the snapshot that is on the disk.
   uint64_t Run();
   uint64_t written() const { return written_; }
 
@@ -64,13 +67,13 @@ class Disk final : public daemon::StateSink {
   sync::Clock& clock_;
   Chance& chance_;
   uint64_t offered_ = 0, writing_ = 0, written_ = 0;
-  bool waits_ = false;  // somebody, for what was offered
+  bool waits_ = false;  // a caller waits for what was offered to be written
   sync::TimeNs due_ = sync::kNever;
 };
 
 class World {
  public:
-  // Who has a turn.
+  // The parts that take turns.
   enum class Who : uint8_t { kCore, kPipeline, kDevice, kEngine, kDisk };
   struct Hooks {
     std::function<void(size_t seat)> before_pipeline, after_pipeline, after_device;
@@ -80,7 +83,7 @@ class World {
         Hooks hooks);
   ~World();
 
-  // What was wrong with the options, or with the start; then there is nothing to run.
+  // The error of the options, or of the start; after an error there is nothing to run.
   const absl::Status& status() const { return status_; }
   daemon::Core& core() { return *core_; }
   sync::FakeClock& clock() { return clock_; }
@@ -89,13 +92,14 @@ class World {
   Chance& chance() { return chance_; }
 
   absl::Status Start();
-  // Turns, in an order that chance says, until nobody has anything to do now. False: it does not come to an end.
+  // Runs turns in random order until no part has anything to do now. Returns false if that never
+  // happens.
   bool RunToRest();
-  // Who has something to do now.
+  // Returns the parts that have something to do now.
   std::string Busy() const;
-  // When somebody has something to do next.
+  // Returns the time at which a part has something to do next.
   sync::TimeNs Next() const;
-  // Its device may have something to do: somebody has touched it.
+  // Notes that the seat's device may have something to do, since another part has used it.
   void Touch(size_t seat) { device_dirty_[seat] = true; }
 
   uint64_t turns() const { return turns_; }
@@ -114,7 +118,7 @@ class World {
   Disk disk_{clock_, chance_};
   absl::Status status_;
   std::vector<Seat> seats_;
-  std::vector<sync::TimeNs> next_thread_;  // 0: the core's
+  std::vector<sync::TimeNs> next_thread_;  // index 0 is the core's
   std::vector<sync::TimeNs> next_device_;
   std::vector<bool> device_dirty_;
   bool started_ = false;
