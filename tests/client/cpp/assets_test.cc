@@ -1,4 +1,5 @@
-// The client brings content, goes on where it broke off, and draws by what it brought.
+// Tests that the client uploads assets, continues an interrupted upload, and draws with the
+// uploaded content.
 #include "voxeld/assets.h"
 
 #include <gmock/gmock.h>
@@ -84,7 +85,7 @@ TEST_F(WithAssets, WhatWasStoppedGoesOnWhereItStopped) {
   const std::vector digests = {AssetOf(bytes).sha256};
   const auto stopped = Upload(bytes, [&](uint64_t sent, uint64_t) {
     if (sent < (2u << 20)) return true;
-    while (store_->List(digests).front().stored < (1u << 20)) continue;  // on its way
+    while (store_->List(digests).front().stored < (1u << 20)) continue;  // the upload is under way
     return false;
   });
   EXPECT_TRUE(absl::IsCancelled(stopped.status()));

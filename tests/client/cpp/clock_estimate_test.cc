@@ -11,7 +11,8 @@ namespace {
 TEST(ClockEstimator, TakesTheFastestOfTheLast) {
   ClockEstimator estimator;
   EXPECT_FALSE(estimator.Get().has_value());
-  // The server is 1,000,000 ahead; 40 there, 5 of work, 60 back: off by 10.
+  // The server's clock is 1,000,000 ahead; 40 on the way there, 5 of work, 60 on the way back: the
+  // estimate is off by 10.
   estimator.Add(100, 1'000'140, 1'000'145, 205);
   ASSERT_TRUE(estimator.Get().has_value());
   EXPECT_EQ(estimator.Get()->offset_ns, 999'990);
@@ -29,9 +30,9 @@ TEST(ClockEstimator, TakesTheFastestOfTheLast) {
 
 TEST(ClockEstimator, IgnoresWhatCannotBe) {
   ClockEstimator estimator;
-  estimator.Add(100, 10, 20, 90);    // heard before it was sent
+  estimator.Add(100, 10, 20, 90);    // received before it was sent
   estimator.Add(100, 20, 10, 200);   // answered before it was received
-  estimator.Add(100, 10, 500, 200);  // longer there than away
+  estimator.Add(100, 10, 500, 200);  // longer at the server than away in total
   EXPECT_FALSE(estimator.Get().has_value());
 }
 

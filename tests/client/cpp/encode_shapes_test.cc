@@ -1,4 +1,4 @@
-// What shapes, curves, text and colour scales say on the wire, read by protobuf.
+// Tests the wire encoding of shapes, curves, text and colour scales, as protobuf reads it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// What the wire writer writes, read by protobuf.
+// Tests the output of the wire writer, as protobuf reads it.
 #include "client/cpp/src/encode.h"
 
 #include <gmock/gmock.h>
@@ -129,7 +129,7 @@ TEST(Encode, LargeArraysThatAreOwnedAreNotCopied) {
   ASSERT_TRUE(rope.ok());
   ASSERT_EQ(rope->tail().size(), 1u);
   EXPECT_EQ(static_cast<const void*>(rope->tail()[0].shared.data()), where);
-  // And neither are they on their way into a message.
+  // Nor are they copied on their way into a message.
   Batcher batcher;
   batcher.Add({.layer = "l", .id = "i", .primitive = *rope, .label = {}});
   const std::vector<Batcher::Message> messages = batcher.Take();

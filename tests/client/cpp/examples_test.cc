@@ -1,4 +1,4 @@
-// The examples against the real daemon with a simulated display: each says what it should.
+// Runs the examples against the real daemon with a simulated display: each prints what it should.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -79,7 +79,7 @@ TEST_F(Examples, TwoSessions) {
 TEST(ExamplesWithoutAServer, SayWhereItWas) {
   const Folder folder;
   const std::string target = "unix:" + folder.path() + "/none";
-  // Reconnecting goes on until the example's patience ends.
+  // The example keeps reconnecting until its own time limit.
   const Ended ended = RunToEnd({Example("05_layers"), target});
   EXPECT_EQ(ended.code, 1);
   EXPECT_THAT(ended.output, HasSubstr("voxeld at " + target + " is not available"));

@@ -1,5 +1,5 @@
-// A transport whose other end is the test, in one thread: what is written is kept, and what the server
-// says is said by the test.
+// A transport whose other end is the test, in one thread: it records what is written, and the test
+// supplies the server's answers.
 #pragma once
 
 #include <memory>
@@ -31,7 +31,7 @@ class FakeStream final : public Stream {
   std::vector<FakeStream*>* const list_;
 };
 
-// Memory that is held or not, as the test says.
+// Memory whose Holds are granted or not, as the test decides.
 class FakeMemory final : public MemoryChannel {
  public:
   FakeMemory(MemoryChannel::Events* events, FakeMemory** place) : events_(events), place_(place) {
@@ -42,7 +42,7 @@ class FakeMemory final : public MemoryChannel {
   }
   void Hold(uint64_t id, Rope content) override { held.emplace_back(id, content.Flat()); }
   void Release(uint64_t id) override { released.push_back(id); }
-  // Of the newest Hold.
+  // Answers the newest Hold.
   void Answer(MemoryChannel::Answer answer) { events_->OnHold(held.back().first, answer); }
 
   std::vector<std::pair<uint64_t, std::string>> held;
@@ -61,14 +61,14 @@ class FakeTransport final : public Transport {
     memory_path = path + " " + token;
     return std::make_unique<FakeMemory>(events, &memory);
   }
-  FakeMemory* memory = nullptr;  // the newest, if it still is
+  FakeMemory* memory = nullptr;  // the newest, if it still exists
   std::string memory_path;       // and its token
-  // Of streams that still are: in the order of their starts.
+  // The streams that still exist, in the order of their starts.
   std::vector<FakeStream*> streams;
   uint64_t started = 0;
 };
 
-// A session over it, under a clock that stands still.
+// A session over the fake transport, with a clock that stands still.
 class SessionUnderTest {
  public:
   explicit SessionUnderTest(Options options = {});
@@ -83,7 +83,7 @@ class SessionUnderTest {
   uint64_t started() const { return transport_->started; }
   sync::FakeClock& clock() { return clock_; }
 
-  // Steps, and lets writes through, until nothing more happens.
+  // Steps the session, and lets writes complete, until nothing more happens.
   void Settle();
   void Advance(sync::TimeNs by) {
     clock_.Advance(by);
@@ -95,23 +95,24 @@ class SessionUnderTest {
   void SayAccepted(uint64_t frame, const std::vector<std::string>& displays = {});
   void SayRefused(uint64_t frame, const std::string& message);
   void SayPresented(uint64_t frame, const std::string& display);
-  // An Issue of the newest stream's request `index`, Open being the first.
+  // Sends an Issue for the newest stream's request `index`; Open is request 0.
   void SayIssue(size_t index, const std::string& layer, const std::string& id);
   void End(const absl::Status& status);
 
-  // Puts up a sphere of this id and commits it.
+  // Inserts a sphere with this id and commits it.
   uint64_t Put(const std::string& id);
-  // Commits an immediate frame of one sphere.
+  // Commits a draw batch of one sphere.
   absl::StatusOr<uint64_t> DrawFrame(const std::string& layer);
 
-  // Of the newest stream: "open", "layer/id …", "begin layer", "commit 3" and so on, since the last call.
+  // Returns what was written to the newest stream since the last call: "open", "layer/id …", "begin
+  // layer", "commit 3" and so on.
   std::vector<std::string> TakeWords();
 
  private:
   sync::FakeClock clock_;
   FakeTransport* transport_;
   std::unique_ptr<SessionCore> core_;
-  uint64_t told_ = 0;  // the stream whose words were taken
+  uint64_t told_ = 0;  // the stream whose words were taken last
   size_t told_count_ = 0;
 };
 

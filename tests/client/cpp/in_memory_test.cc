@@ -1,4 +1,4 @@
-// Requests whose payloads were moved are, with their ranges filled in again, what they were.
+// Requests whose payloads were moved are unchanged once their ranges are filled in again.
 #include "client/cpp/src/in_memory.h"
 
 #include <gmock/gmock.h>
@@ -19,7 +19,7 @@ std::vector<T> Counting(size_t count) {
   return values;
 }
 
-// `count` vertices; with colours an odd number of bytes.
+// Returns `count` vertices; with colours, they take an odd number of bytes.
 Vertices Cloud(size_t count) {
   return {.positions = Counting<float>(3 * count), .colors = Counting<uint8_t>(3 * count)};
 }
@@ -76,7 +76,7 @@ void FillIn(const std::string& memory, uint64_t id, v1::Primitive* primitive) {
   vertices->clear_indices_in();
 }
 
-// Moves it and moves it back. How many ranges there were.
+// Moves the payloads and moves them back. Returns the number of ranges.
 uint64_t RangesOf(const Rope& request) {
   const std::optional<InMemory> moved = MoveToMemory(request, 5);
   if (!moved) return 0;
@@ -92,7 +92,7 @@ uint64_t RangesOf(const Rope& request) {
          *back.mutable_define_object()->mutable_definition()->mutable_parts())
       FillIn(memory, 5, part.mutable_primitive());
   }
-  // Not EXPECT_EQ: nobody wants to read them.
+  // Not EXPECT_EQ: its output would be unreadable.
   EXPECT_TRUE(back.SerializeAsString() == Parse(request).SerializeAsString());
   return ranges_filled;
 }
@@ -142,7 +142,7 @@ TEST(InMemory, PayloadsAreNotCopied) {
 
 TEST(InMemory, WhatIsNoRequestIsLeftAlone) {
   Rope request = BatchOf({Upsert("p", Points{.vertices = Cloud(9'001)})});
-  request.Append(std::string("\x7f"));  // a wire type that there is not
+  request.Append(std::string("\x7f"));  // a wire type that does not exist
   EXPECT_FALSE(MoveToMemory(request, 1).has_value());
 }
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The client's install rules: installs it into a folder, builds an example against that alone, runs it.
+# Tests the client's install rules: installs it into a folder, builds an example against only that, and runs it.
 # installed_test.sh CMAKE BUILD SOURCE COMPILER
 set -euo pipefail
 cmake=$1 build=$2 source=$3 compiler=$4

@@ -1,5 +1,5 @@
-// What goes wrong between the client and a real server: content that it will not read, and another end
-// that has gone without a word.
+// Errors between the client and a real server: content that the server rejects, and a peer that
+// disappears without closing.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -30,7 +30,7 @@ class BehindARelay : public testing::Test {
   voxelctl::TempFolder folder_;
 };
 
-// Of 18 MB; max_message_bytes is 16 MiB.
+// Returns points of 18 MB; max_message_bytes is 16 MiB.
 Points TooMany() {
   return {.vertices = {.positions = std::vector<float>(3 * 1'200'000),
                        .colors = std::vector<uint8_t>(3 * 1'200'000)}};
@@ -40,7 +40,7 @@ TEST_F(BehindARelay, WhatTheServerWillNotReadIsRefusedAndEndsNoStream) {
   auto session =
       Session::Open({.address = "unix:" + path(), .first_pause = 5ms, .longest_pause = 20ms});
   ASSERT_TRUE(session.ok());
-  // While nobody has said what the limit is.
+  // Before the limit is known.
   ASSERT_TRUE((*session)->DefineObject("big", {{.shape = TooMany()}}).ok());
   const auto large = (*session)->Commit();
   ASSERT_TRUE(large.ok());
@@ -53,7 +53,7 @@ TEST_F(BehindARelay, WhatTheServerWillNotReadIsRefusedAndEndsNoStream) {
   EXPECT_TRUE(absl::IsFailedPrecondition(refused));
   EXPECT_THAT(std::string(refused.message()),
               HasSubstr("the object \"big\" takes a message of 18"));
-  // And when it is known.
+  // After the limit is known.
   Frame frame = layer.BeginFrame();
   frame.Draw("cloud", TooMany());
   const absl::Status drawn = frame.Commit().status();
@@ -86,7 +86,7 @@ TEST_F(BehindARelay, AnEndThatHasGoneIsNoticedWhileAMessageIsBeingWritten) {
   std::thread thread([&core] { core.Run(); });
   ASSERT_TRUE(core.WaitOpened(kPatience).ok());
   relay.FallSilent();
-  // More than any buffer on the way takes: it is never written whole.
+  // More than all buffers on the way can hold: it is never written whole.
   ASSERT_TRUE(core.StageUpsert("l", "a",
                                Points{.vertices = {.positions = std::vector<float>(3 * 1'000'000)}},
                                {})

@@ -1,4 +1,4 @@
-// Content in sealed memory: to the real daemon, and to local sockets that misbehave.
+// Tests content in sealed memory: with the real daemon, and with local sockets that misbehave.
 #include "client/cpp/src/local_socket.h"
 
 #include <fcntl.h>
@@ -85,7 +85,7 @@ TEST_F(WithMemory, EveryKindOfContentArrives) {
   EXPECT_TRUE(NothingIsHeld());
 }
 
-// The same picture of both ways is the same content.
+// The same image, uploaded in both ways, is the same content.
 TEST_F(WithMemory, ItIsTheSameAsThatOfTheStream) {
   ASSERT_TRUE(daemon_.Await(daemon::services::AllShowing));
   std::vector<std::string> pictures;
@@ -113,7 +113,7 @@ TEST_F(WithMemory, ItIsTheSameAsThatOfTheStream) {
 TEST_F(WithMemory, ManyFramesInMoreMemoryThanIsHeldAtOnce) {
   auto session = Open();
   const Layer layer = session->GetLayer("l");
-  constexpr int kFrames = 600;  // 256 memories are held at once
+  constexpr int kFrames = 600;  // at most 256 memories are held at once
   for (int i = 0; i < kFrames; ++i) {
     Frame frame = layer.BeginFrame();
     frame.Draw("a", Points{.vertices = Cloud(6'000)});
@@ -143,10 +143,10 @@ TEST_F(WithoutMemory, ItGoesOverTheStream) {
   EXPECT_EQ(daemon_.Entities().entities(0).vertices(), kVertices);
 }
 
-// A local socket that answers as the test says.
+// A local socket that answers as the test specifies.
 class Peer {
  public:
-  // Nothing: the connection is ended. An answer without anything: none is given.
+  // Returning nullopt ends the connection; an empty answer sends none.
   using Script = std::function<std::optional<v1::LocalAnswer>(const v1::LocalMessage&, int memory)>;
 
   Peer(const std::string& path, Script script) : script_(std::move(script)) {
@@ -158,7 +158,7 @@ class Peer {
     EXPECT_EQ(listen(listening_, 4), 0);
     thread_ = std::thread([this] { Serve(); });
   }
-  // After the channel has ended.
+  // Runs after the channel has ended.
   ~Peer() {
     shutdown(listening_, SHUT_RDWR);
     thread_.join();
@@ -232,7 +232,7 @@ class Channel : public testing::Test, protected MemoryChannel::Events {
  protected:
   std::string path() const { return folder_.Path("local"); }
   void Connect() { channel_ = ConnectLocalSocket(path(), "token", this); }
-  // Holds content of so many bytes.
+  // Holds content of `bytes` bytes.
   Answer Hold(uint64_t id, size_t bytes = 1000) { return Hold(id, Rope(std::string(bytes, 'x'))); }
   Answer Hold(uint64_t id, Rope content) {
     channel_->Hold(id, std::move(content));

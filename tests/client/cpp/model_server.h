@@ -20,7 +20,7 @@
 
 namespace voxeld::client {
 
-// A server's end of one stream after the other: it decodes with protobuf, and applies whole commits.
+// The server's end of successive streams: it decodes with protobuf, and applies whole commits.
 class ModelServer {
  public:
   void Lose() {
@@ -28,7 +28,7 @@ class ModelServer {
     frame_.reset();
   }
 
-  // Returns the frame id if it was a Commit.
+  // Returns the commit id if it was a Commit.
   std::optional<uint64_t> Take(const Rope& message) {
     v1::StreamRequest request;
     EXPECT_TRUE(request.ParseFromString(message.Flat()));

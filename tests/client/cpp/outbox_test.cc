@@ -1,5 +1,5 @@
-// The outbox against a plain model: a server that applies what it is sent, and lists of what was asked
-// for.
+// Tests the outbox against a plain model: a server that applies what it receives, and lists of what
+// was requested.
 #include "client/cpp/src/outbox.h"
 
 #include <gmock/gmock.h>
@@ -43,7 +43,7 @@ TEST(Outbox, AMessageMayExceedTheCreditOnlyByBeingSentWhileSomeIsLeft) {
   EXPECT_TRUE(outbox.Next(0).has_value()) << "all of it, for one byte";
   EXPECT_GT(outbox.sent_bytes(), 12'000u);
   EXPECT_FALSE(outbox.Next(0).has_value());
-  outbox.Credit(50);  // never less than it was
+  outbox.Credit(50);  // credit never decreases
   outbox.Credit(outbox.sent_bytes());
   EXPECT_FALSE(outbox.Next(0).has_value());
   outbox.Credit(outbox.sent_bytes() + 1);
@@ -81,7 +81,7 @@ TEST(Outbox, AFrameThatIsBeingSentIsSentWhole) {
   outbox.StreamOpened(1, 2);
   ModelServer server;
   ASSERT_TRUE(outbox.Add(FrameOf(1, "a")).ok());
-  server.Take(outbox.Next(0)->message);  // FrameBegin is out
+  server.Take(outbox.Next(0)->message);  // FrameBegin has been sent
   for (uint64_t frame = 2; frame < 10; ++frame) ASSERT_TRUE(outbox.Add(FrameOf(frame, "a")).ok());
   outbox.Credit(1 << 20);
   EXPECT_THAT(Drain(&outbox, &server), ElementsAre(1, 9));
@@ -101,8 +101,8 @@ TEST(Outbox, TimedFramesAreNotGivenUp) {
   EXPECT_THAT(Drain(&outbox, &server), ElementsAre(1, 2, 3, 4));
   outbox.Scheduled(1);
   outbox.Scheduled(3);
-  // The first one's time has passed: whether it was shown nobody knows. The third is sent again, and
-  // so is the second, of which nothing was heard.
+  // The first commit's time has passed: whether it was shown is unknown. The third is sent again,
+  // and so is the second, which was not answered.
   EXPECT_THAT(outbox.StreamLost(2000), ElementsAre(1));
   server.Lose();
   outbox.StreamOpened(1, 0);
@@ -120,7 +120,7 @@ TEST(Outbox, AFullBufferRefusesWhatIsRetainedAndLosesNothing) {
   outbox.StreamOpened(1, 0);
   ModelServer server;
   EXPECT_THAT(Drain(&outbox, &server), ElementsAre(1, 2));
-  // Alone in an empty outbox anything may come.
+  // An outbox that is otherwise empty accepts a commit of any size.
   ASSERT_TRUE(outbox.Add(Retained(4, "huge", 10'000)).ok());
 }
 
@@ -149,7 +149,7 @@ TEST(Outbox, WhatWasAppliedIsNotSentAgain) {
   Drain(&outbox, &server);
   EXPECT_NE(outbox.Answered(1), nullptr);
   EXPECT_EQ(outbox.Answered(1), nullptr);
-  const uint64_t second_commit = 4;  // a batch and a commit each
+  const uint64_t second_commit = 4;  // a batch and a commit for each
   ASSERT_TRUE(outbox.Add(Retained(5, "5")).ok());
   outbox.StreamLost(std::nullopt);
   server.Lose();
@@ -229,10 +229,10 @@ TEST(Outbox, AnEncodingAnewLeavesOutWhatWasGivenUp) {
                       {});
   both->frame_id = 1;
   ASSERT_TRUE(outbox.Add(both).ok());
-  ASSERT_TRUE(outbox.Add(FrameOf(2, "a")).ok());  // the first one's goes
+  ASSERT_TRUE(outbox.Add(FrameOf(2, "a")).ok());  // the batch of the first one is dropped
   EXPECT_TRUE(outbox.KeepTo(100).empty());
   outbox.StreamOpened(1, 0);
-  ASSERT_TRUE(outbox.Add(FrameOf(3, "b")).ok());  // and now its other
+  ASSERT_TRUE(outbox.Add(FrameOf(3, "b")).ok());  // and now its other batch
   ModelServer server;
   EXPECT_THAT(Drain(&outbox, &server), ElementsAre(1, 2, 3));
   EXPECT_EQ(server.frames_applied, 2u);
@@ -263,8 +263,8 @@ TEST(Outbox, RefusalsAreOfTheRequestsThatTheyName) {
   EXPECT_EQ(refusals.refused.size(), 1u);
 }
 
-// Everything at random: commits of all sorts, credit in small pieces, answers late, streams lost and
-// resumed or not.
+// Everything at random: commits of all sorts, credit in small pieces, late answers, lost streams
+// that are resumed or not.
 class OutboxAtRandom : public testing::TestWithParam<std::tuple<int, int>> {};
 
 TEST_P(OutboxAtRandom, KeepsWhatItPromises) {
@@ -275,8 +275,8 @@ TEST_P(OutboxAtRandom, KeepsWhatItPromises) {
   Outbox outbox(static_cast<uint64_t>(keep_frames), kBuffer);
   ModelServer server;
 
-  std::vector<std::string> retained;       // asked for and taken
-  std::map<std::string, uint64_t> newest;  // of each layer, that was taken
+  std::vector<std::string> retained;       // requested and accepted
+  std::map<std::string, uint64_t> newest;  // the newest accepted frame of each layer
   std::map<uint64_t, size_t> frames_of;    // commit → frames
   std::set<uint64_t> answered_set;
   std::vector<uint64_t> unanswered;
@@ -369,11 +369,11 @@ TEST_P(OutboxAtRandom, KeepsWhatItPromises) {
           open = false;
           lost_ever = true;
           if (below(2) == 0) {
-            // It is resumed: what was applied is known.
+            // The session is resumed: the client learns what was applied.
             EXPECT_EQ(outbox.Applied(server.last_commit).size(), unanswered.size());
             answered_set.insert(unanswered.begin(), unanswered.end());
           } else {
-            // It is not, and what was not answered is as if it had not arrived.
+            // It is not resumed, and what was not answered counts as not received.
             std::erase_if(server.commits, [&](uint64_t frame) {
               return std::count(unanswered.begin(), unanswered.end(), frame) > 0;
             });
@@ -385,7 +385,7 @@ TEST_P(OutboxAtRandom, KeepsWhatItPromises) {
     }
   }
   if (!open) connect();
-  // One last commit tells of all drops.
+  // One last commit reports all drops.
   auto last = Retained(++frame_id, "last");
   while (!outbox.Add(last).ok()) {
     outbox.Credit(credit += 1000);
@@ -400,17 +400,17 @@ TEST_P(OutboxAtRandom, KeepsWhatItPromises) {
   EXPECT_TRUE(outbox.empty());
   EXPECT_EQ(outbox.waiting_bytes(), 0u);
 
-  // Retained operations are never lost, and first come in the order in which they were asked for.
+  // Retained operations are never lost, and first arrive in the order in which they were requested.
   std::vector<std::string> first_time;
   std::set<std::string> seen;
   for (const std::string& id : server.retained) {
     if (seen.insert(id).second) first_time.push_back(id);
   }
   EXPECT_EQ(first_time, retained);
-  // The newest frame of each layer is there.
+  // The newest frame of each layer has arrived.
   for (const auto& [layer, frame] : newest)
     EXPECT_THAT(server.layers[layer], ElementsAre(absl::StrCat("f", frame)));
-  // What is dropped is said, and nothing else is missing.
+  // Drops are reported, and nothing else is missing.
   EXPECT_GE(server.client_drops, drops) << "those of commits that were lost are told again";
   std::set<uint64_t> arrived(server.commits.begin(), server.commits.end());
   for (const auto& [frame, count] : frames_of)

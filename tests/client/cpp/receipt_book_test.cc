@@ -66,7 +66,7 @@ TEST_F(ReceiptBookTest, ACommitIsSettledByEveryOutcome) {
   EXPECT_EQ(At(1).outcomes[0].latency_ns, 500);
   EXPECT_EQ(At(1).outcomes[0].stages.shown_ns, 5);
   EXPECT_EQ(At(1).outcomes[1].by_frame, 2u);
-  // An outcome may overtake Accepted.
+  // An outcome may arrive before Accepted.
   outcome = OutcomeOf(2, "a");
   outcome.mutable_outcome()->mutable_lost()->set_reason("unplugged");
   book_.Told(outcome, 2500);
@@ -75,7 +75,7 @@ TEST_F(ReceiptBookTest, ACommitIsSettledByEveryOutcome) {
   EXPECT_EQ(book_.unsettled(), 0u);
   EXPECT_THAT(book_.TakeChanged(), ElementsAre(1, 2));
   EXPECT_THAT(book_.TakeChanged(), IsEmpty());
-  // Answers to what it does not know change nothing.
+  // Answers for unknown commits change nothing.
   book_.Told(Accepted(77, {"a"}), 2700);
   EXPECT_THAT(book_.TakeChanged(), IsEmpty());
 
@@ -121,7 +121,7 @@ TEST_F(ReceiptBookTest, IssuesBelongToTheCommitOfTheirSequence) {
   issue.set_sequence(17);
   issue.set_message("no such");
   EXPECT_EQ(book_.Told(issue).frame, 2u);
-  issue.set_sequence(11);  // of no commit that was sent
+  issue.set_sequence(11);  // belongs to no commit that was sent
   EXPECT_EQ(book_.Told(issue).frame, 0u);
   EXPECT_THAT(At(1).issues, IsEmpty());
   ASSERT_THAT(At(2).issues, SizeIs(1));

@@ -21,7 +21,7 @@ sockaddr_un AddressOf(const std::string& path) {
 
 int NewSocket() { return socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0); }
 
-// False at the end.
+// Returns false at the end of the stream.
 bool Carry(int from, int to) {
   std::array<char, 65536> bytes;
   const ssize_t size = read(from, bytes.data(), bytes.size());
@@ -84,7 +84,7 @@ void Relay::Run() {
       const auto with = [from = from, to = to](const auto& pair) {
         return pair.first == from || pair.first == to;
       };
-      if (std::erase_if(carried_, with) == 0) continue;  // both ways ended at once
+      if (std::erase_if(carried_, with) == 0) continue;  // both directions ended at once
       close(from);
       close(to);
     }

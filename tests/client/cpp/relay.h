@@ -1,5 +1,5 @@
-// A relay between a client and a server on unix sockets, which can fall silent while both connections
-// stay open: the other end as it looks when its machine has gone.
+// A relay between a client and a server on Unix sockets, which can fall silent while both
+// connections stay open: this is how a peer looks when its machine has lost power.
 #pragma once
 
 #include <string>
@@ -10,13 +10,13 @@ namespace voxeld::client {
 
 class Relay {
  public:
-  // Listens at the path `here`, and carries everything to and from the one at `there`.
+  // Listens at the path `here`, and forwards everything to and from the socket at `there`.
   Relay(const std::string& here, const std::string& there);
   ~Relay();
   Relay(const Relay&) = delete;
   Relay& operator=(const Relay&) = delete;
 
-  // From when it returns on nothing is carried, nothing accepted, and nothing closed.
+  // Once it has returned, nothing is forwarded, accepted or closed.
   void FallSilent();
 
  private:

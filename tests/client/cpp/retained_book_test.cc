@@ -22,7 +22,7 @@ UpsertOperation Put(const std::string& layer, const std::string& id, const Shape
           .label = {}};
 }
 
-// One word for each operation.
+// Returns one word for each operation.
 std::vector<std::string> Words(const std::vector<Operation>& operations) {
   std::vector<std::string> words;
   for (const Operation& operation : operations) {
@@ -100,7 +100,7 @@ TEST_F(RetainedBookTest, ARefusalIsOfOneOperationAndNotOfAllOnItsEntity) {
         {.requests = {{7, 1}, {8, 1}}, .refused = {{8, "l", "a"}}});
   ASSERT_THAT(Restored(), ElementsAre("l", "l/a"));
   EXPECT_EQ(std::get<UpsertOperation>(book_.Restore(now_)[1]).transform, Affine());
-  // Of two that replace each other the other one; and what goes before does not shift it.
+  // If two entities replace each other, only the other is written; removals do not shift the order.
   Apply({Put("l", "b"), Put("l", "a", Sphere{}, 500), Put("l", "a", Sphere{}, 600),
          DeleteOperation{"l", What::kId, "b"}},
         {.requests = {{10, 2}, {11, 1}, {12, 1}}, .refused = {{11, "l", "a"}, {12, "l", ""}}});
@@ -155,7 +155,8 @@ TEST_F(RetainedBookTest, WhatIsOverIsForgotten) {
     ++now_;
     ASSERT_LE(book_.entities(), 102u);
   }
-  // Put up anew it lives on, and what was deleted meanwhile is no other's end.
+  // An entity that is inserted again lives on, and what was deleted in the meantime does not delete
+  // another.
   Apply({Put("l", "9999", Sphere{}, 1000), DeleteOperation{"l", What::kId, "again"},
          Put("l", "again")});
   now_ += 999;

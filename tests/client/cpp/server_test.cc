@@ -27,7 +27,7 @@ constexpr auto kPatience = 60s;
 
 class WithDaemon : public testing::Test {
  protected:
-  // Without pings: every message is the test's own.
+  // Opens a session without pings: every message is the test's own.
   std::unique_ptr<Session> Open(Options options = {}) {
     options.address = daemon_.target();
     options.ping_interval = Duration(0);
@@ -164,17 +164,17 @@ TEST_F(WithDaemon, AHundredThousandSmallEntitiesGoInBatches) {
   const Tally tally = session->GetTally();
   EXPECT_EQ(tally.accepted, kCommits);
   EXPECT_EQ(daemon_.Entities().total(), kCommits * kEach);
-  // Open; a commit and at most two batches each.
+  // One Open; one commit and at most two batches for each of the commits.
   EXPECT_LE(tally.messages_sent, 1 + 3 * kCommits);
 }
 
-// What needs the clock, credit and tokens of the server.
+// Tests that need the clock, credit and tokens of the server.
 TEST_F(WithDaemon, TheClockIsThatOfThisMachine) {
   auto session = Session::Open({.address = daemon_.target(), .ping_interval = 1ms});
   ASSERT_TRUE(session.ok());
   ASSERT_TRUE((*session)->WaitOpened(kPatience).ok());
   const Layer layer = (*session)->GetLayer("l");
-  // Answers come in turn: when this one is there, pongs are.
+  // Answers arrive in order: when this one has arrived, so have the pongs.
   for (int i = 0; i < 10'000 && !(*session)->clock().has_value(); ++i) {
     ASSERT_TRUE(layer.Put("a", Box{}).ok());
     const auto frame = (*session)->Commit();
@@ -188,7 +188,7 @@ TEST_F(WithDaemon, TheClockIsThatOfThisMachine) {
 }
 
 TEST_F(WithDaemon, CreditComesBackForAllThatIsApplied) {
-  // Much more than any credit, in many commits.
+  // Sends far more than any credit, in many commits.
   auto session = Open({.strict = true});
   const Layer layer = session->GetLayer("l");
   for (int i = 0; i < 200; ++i) {
@@ -241,7 +241,7 @@ TEST_F(WithDaemon, SessionsOfOneOwnerShareItsLayers) {
   EXPECT_TRUE(absl::IsNotFound((*lost)->WaitOpened(kPatience)));
 }
 
-// A transport whose streams the test can cut.
+// A transport whose streams the test can disconnect.
 class CutTransport final : public Transport {
  public:
   explicit CutTransport(const std::string& target) : inner_(*MakeGrpcTransport(target)) {}
@@ -282,7 +282,7 @@ TEST_F(WithDaemon, ACutConnectionIsResumed) {
   ASSERT_TRUE(core.WaitAccepted(frame, kPatience).ok());
   for (size_t round = 1; round <= 5; ++round) {
     cut.Cut();
-    // Some before it is noticed, some after.
+    // Some are sent before the disconnect is noticed, some after it.
     for (int i = 0; i < 20; ++i) {
       ASSERT_TRUE(core.Stage(TransformOperation{"l", "a", Affine::Scale(1 + 0.1 * i)}).ok());
       frame = *core.Commit(nullptr, {});
@@ -291,7 +291,8 @@ TEST_F(WithDaemon, ACutConnectionIsResumed) {
     while (changes.size() < 1 + 2 * round) changed.Wait(mutex);
     EXPECT_EQ(changes.back(), ConnectionChange::Kind::kResumed);
   }
-  // Commits are applied in their order. (Outcomes that went into a cut stream are lost with it.)
+  // Commits are applied in order. (Outcomes that were written to a disconnected stream are lost
+  // with it.)
   EXPECT_TRUE(core.WaitAccepted(frame, kPatience).ok());
   EXPECT_EQ(core.server()->session, session);
   const Tally tally = core.GetTally();

@@ -1,5 +1,5 @@
-// What a session holds and sends has bounds: messages that the server reads, what is staged, what waits
-// for callbacks.
+// Tests the bounds on what a session holds and sends: the size of messages, what is staged, and
+// what waits for callbacks.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -31,7 +31,7 @@ v1::Opened OpenedWithLimit(uint64_t max_message_bytes = kMessage) {
   return opened;
 }
 
-// Of about `bytes`.
+// Returns points of about `bytes`.
 Shape Cloud(size_t bytes) {
   return Points{.vertices = {.positions = std::vector<float>(bytes / 12 * 3)}};
 }
@@ -52,7 +52,7 @@ TEST(Bounds, WhatWasCommittedBeforeTheLimitWasKnownIsRefusedAndNotSent) {
     ASSERT_TRUE(session->Stage(*define).ok());
     ASSERT_EQ(*session->Commit(nullptr, {}), 1u);
     session.Put("small");
-    // Of many small ones only the message was too large.
+    // If there are many small ones, only the message was too large.
     for (int i = 0; i < 1000; ++i)
       ASSERT_TRUE(session->StageUpsert("l", absl::StrCat(i), Sphere{}, {}).ok());
     ASSERT_EQ(*session->Commit(nullptr, {}), 3u);
@@ -77,7 +77,7 @@ TEST(Bounds, WhatWasCommittedBeforeTheLimitWasKnownIsRefusedAndNotSent) {
 
 TEST(Bounds, AMessageOfExactlyTheLimitIsSentAndOneByteMoreIsNot) {
   SessionUnderTest session(Quiet());
-  // As long as its label makes it.
+  // Its size is determined by its label.
   const auto put = [&](size_t label) {
     EXPECT_TRUE(session->StageUpsert("l", "a", Sphere{}, {.label = std::string(label, 'x')}).ok());
     return session->Commit(nullptr, {});
@@ -87,7 +87,7 @@ TEST(Bounds, AMessageOfExactlyTheLimitIsSentAndOneByteMoreIsNot) {
   const size_t rest = session.stream().written[1].ByteSizeLong() - 1000;
   session.End(absl::UnavailableError("gone"));
   session.Advance(sync::kSecond);
-  // A sequence takes up to 11 bytes; those of here take two.
+  // A sequence takes up to 11 bytes; the ones here take two.
   session.SayOpened(OpenedWithLimit(1000 + rest + 9));
   EXPECT_EQ(session->FindReceipt(1)->state, Receipt::State::kSent);
   EXPECT_TRUE(absl::IsInvalidArgument(put(1001).status()));
@@ -96,7 +96,7 @@ TEST(Bounds, AMessageOfExactlyTheLimitIsSentAndOneByteMoreIsNot) {
 
 TEST(Bounds, ACommitLeavesOutNothingButWhatIsTooLarge) {
   SessionUnderTest session(Quiet());
-  // Staged while nothing was known.
+  // Staged before the limit was known.
   ASSERT_TRUE(session->StageUpsert("l", "before", Sphere{}, {}).ok());
   ASSERT_TRUE(session->StageUpsert("l", "big", Cloud(2 * kMessage), {}).ok());
   ASSERT_TRUE(session->StageUpsert("l", "after", Sphere{}, {}).ok());
@@ -125,7 +125,7 @@ TEST(Bounds, AFrameWithSomethingTooLargeIsRefusedWhole) {
   ASSERT_TRUE(session->Commit(nullptr, {}).ok());
   session.Settle();
   EXPECT_THAT(session.TakeWords(), ElementsAre("l/a", "commit 1"));
-  // What is too large may be staged; the frame is the caller's still.
+  // An operation that is too large may be staged; the frame remains the caller's.
   SessionUnderTest other(Quiet());
   ASSERT_TRUE(other->StageUpsert("l", "big", Cloud(2 * kMessage), {}).ok());
   other.SayOpened(OpenedWithLimit());
@@ -177,7 +177,7 @@ TEST(Bounds, ASlowReceiptCallbackHoldsUpCommitsAndLosesNone) {
   options.on_receipt = [&](const Receipt& receipt) { ++calls[receipt.frame]; };
   options.buffer_bytes = size_t{1} << 30;
   SessionUnderTest session(options);
-  // Nobody steps: it is as if the callback did not return.
+  // Nothing steps the session: it is as if the callback did not return.
   absl::StatusOr<uint64_t> number = 0;
   uint64_t taken = 0;
   while (number.ok() && taken < 2 * SessionCore::kMostUntold) {

@@ -1,4 +1,4 @@
-// A session whose server takes content in sealed memory.
+// Tests a session whose server accepts content in sealed memory.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -125,7 +125,7 @@ TEST(SessionMemory, WhatIsNotHeldIsSent) {
 
 TEST(SessionMemory, CreditIsForWhatIsWritten) {
   SessionUnderTest session(Quiet());
-  // Enough for what is written, not for what it stands for.
+  // Enough for what is written, but not for the content that it refers to.
   session.SayOpened(WithSocket(session.stream().bytes + 10'000));
   for (int i = 0; i < 20; ++i) {
     PutCloud(session, "a");
@@ -157,7 +157,8 @@ TEST(SessionMemory, AfterALossItIsHandedOverAnew) {
   session.Settle();
   EXPECT_THAT(session.TakeWords(),
               ElementsAre("l/sent", "commit 1", "l/being handed over", "commit 2"));
-  // A server without one gets it over the stream, as does one that restores.
+  // A server without a socket gets it over the stream, and so does one to which the session is
+  // restored.
   session.SayAccepted(1);
   session.End(absl::UnavailableError("gone"));
   session.Advance(sync::kSecond);

@@ -1,4 +1,4 @@
-// A session that loses its connection.
+// Tests a session that loses its connection.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -61,7 +61,7 @@ TEST_F(Reconnect, PausesGrowAndBeginAnewAfterASuccess) {
   session.Advance(100 * sync::kMillisecond);
   EXPECT_EQ(session.started(), before + 1);
   EXPECT_THAT(changes_, ElementsAre(Kind::kOpened, Kind::kLost));
-  // A stream that ends again without an answer to what it was sent is no success, unless it lasted.
+  // A stream that ends again without an answer does not count as a success, unless it lasted.
   for (const int64_t pause : {200, 400}) {
     session.SayOpened();
     session.Put("a");
@@ -103,7 +103,7 @@ TEST_F(Reconnect, ResumesAndSendsAgainWhatWasNotApplied) {
   ASSERT_TRUE(session.stream().written[4].has_commit());
   session.End(kGone);
   EXPECT_EQ(session->FindReceipt(2)->state, Receipt::State::kQueued);
-  session.Put("d");  // meanwhile
+  session.Put("d");  // in the meantime
   session.Advance(sync::kSecond);
   EXPECT_THAT(session.TakeWords(), ElementsAre("open resume token"));
   session.SayOpened(OpenedAgain(second_commit));
@@ -111,7 +111,7 @@ TEST_F(Reconnect, ResumesAndSendsAgainWhatWasNotApplied) {
   EXPECT_THAT(changes_, ElementsAre(Kind::kOpened, Kind::kLost, Kind::kResumed));
   EXPECT_EQ(session->FindReceipt(2)->state, Receipt::State::kAccepted);
   EXPECT_EQ(session->FindReceipt(3)->sendings, 2u);
-  // The outcome that the first connection owed.
+  // The outcome that is outstanding from the first connection.
   EXPECT_FALSE(session->FindReceipt(1)->settled);
   v1::StreamResponse response;
   v1::Receipt* receipt = response.add_receipts();
@@ -120,7 +120,7 @@ TEST_F(Reconnect, ResumesAndSendsAgainWhatWasNotApplied) {
   receipt->mutable_outcome()->mutable_presented();
   session.Say(response);
   EXPECT_TRUE(session->FindReceipt(1)->settled);
-  // A token serves once: the next resume has the new one.
+  // A token can be used once: the next resume uses the new one.
   session.End(kGone);
   session.Advance(sync::kSecond);
   EXPECT_THAT(session.TakeWords(), ElementsAre("open resume token2"));
@@ -159,7 +159,7 @@ TEST_F(Reconnect, WhatCannotBeResumedIsSentAgain) {
   session.Advance(sync::kSecond);
   EXPECT_THAT(session.TakeWords(), ElementsAre("open resume token"));
   session.End(absl::NotFoundError("no such session"));
-  // At once, and without the token.
+  // Immediately, and without the token.
   EXPECT_EQ(session.started(), 3u);
   EXPECT_THAT(session.TakeWords(), ElementsAre("open"));
   session.SayOpened(OpenedAgain());
@@ -171,7 +171,7 @@ TEST_F(Reconnect, WhatCannotBeResumedIsSentAgain) {
   EXPECT_EQ(last_.lost_outcomes, 1u);
   EXPECT_EQ(session->FindReceipt(1)->outcomes[0].kind, Outcome::Kind::kLost);
   EXPECT_EQ(session->GetTally().restored, 1u);
-  // All of it once more.
+  // All of it is sent again.
   session.SayAccepted(6);
   session.SayAccepted(4);
   session.SayAccepted(5);
@@ -199,7 +199,7 @@ TEST_F(Reconnect, ASessionThatIsResumedMayHaveLostItsLayers) {
     session.Advance(away_s * sync::kSecond);
     session.TakeWords();
     session.SayOpened(OpenedAgain(second_commit));
-    // What was applied unheard went with the layers.
+    // Commits that were applied but not reported were removed with the layers.
     if (kept) {
       EXPECT_THAT(session.TakeWords(), ElementsAre("l/c", "commit 3"));
       EXPECT_EQ(changes_.back(), Kind::kResumed);

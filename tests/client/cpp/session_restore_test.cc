@@ -1,5 +1,5 @@
-// What a session knows of its state after its connection was lost: what was applied unheard, what was
-// refused, what is put up again.
+// Tests what a session knows of its state after it lost its connection: what was applied but not
+// reported, what was refused, and what is inserted again.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -39,7 +39,7 @@ class Restore : public testing::Test {
     session.TakeWords();
     session.SayOpened(OpenedAgain(last_sequence));
   }
-  // The server has forgotten it. What it is sent then.
+  // The server has forgotten the session. Returns what it is sent then.
   static std::vector<std::string> BeginAnew(SessionUnderTest& session) {
     session.End(kGone);
     session.Advance(10 * sync::kSecond);
@@ -85,7 +85,7 @@ TEST_F(Restore, OutcomesOfWhatWasAppliedUnheardMayBeLostAsWell) {
   EXPECT_EQ(session->FindReceipt(1)->outcomes.at(0).kind, Outcome::Kind::kLost);
 }
 
-// 1 is refused and 2 accepted, and neither is heard.
+// 1 is refused and 2 accepted, and the client receives neither answer.
 TEST_F(Restore, ARefusalThatWasNotHeardIsNotTakenForAccepted) {
   Options options = Make();
   options.strict = true;
@@ -117,7 +117,7 @@ TEST_F(Restore, AnOutcomeTellsThatWhatWasNotHeardWasApplied) {
   session.SayPresented(3, "sim");
   EXPECT_TRUE(session->WaitSettled(Duration(0)).ok());
   EXPECT_EQ(session->GetTally().accepted, 3u);
-  // In the order of the commits, not of the outcomes.
+  // In the order of the commits, not that of the outcomes.
   EXPECT_THAT(BeginAnew(session), ElementsAre("layer l", "l/b l/a", "commit 4"));
 }
 
@@ -126,7 +126,7 @@ TEST_F(Restore, WithoutStrictnessEveryOneBeforeTheLastWasAccepted) {
   session.SayOpened();
   session.Put("a");
   session.Put("b");
-  // What was told before the cut counts.
+  // Answers from before the disconnect count.
   session.SayIssue(1, "l", "a");
   Resume(session, SequenceOfCommit(session, 2));
   EXPECT_EQ(session->FindReceipt(1)->state, Receipt::State::kAccepted);
@@ -193,7 +193,7 @@ TEST_F(Restore, AnUnansweredRestoreIsNotAddedToTheNext) {
     EXPECT_THAT(BeginAnew(session),
                 ElementsAre("layer l", "l/a", "commit " + std::to_string(round)));
   }
-  // Taken up with its layers it goes on, and is not begun anew.
+  // When it is resumed with its layers, the session continues, and is not restored from the start.
   Resume(session, 0);
   EXPECT_THAT(session.TakeWords(), ElementsAre("layer l", "l/a", "commit 9"));
 }

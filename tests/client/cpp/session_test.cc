@@ -1,4 +1,4 @@
-// One connection of a session: what is sent when, and what is told.
+// Tests one connection of a session: what is sent when, and what is reported.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -91,7 +91,7 @@ TEST(Session, CommitsCarryTheirTimeAndReceiptsComeBack) {
   options.on_receipt = [&](const Receipt& receipt) {
     told.push_back(absl::StrCat(receipt.frame, ":", static_cast<int>(receipt.state),
                                 receipt.settled ? "!" : ""));
-    // Callbacks may call back.
+    // Callbacks may call the session.
     EXPECT_TRUE((*self)->FindReceipt(receipt.frame).has_value());
     EXPECT_TRUE((*self)->StageUpsert("l", "again", Sphere{}, {}).ok());
   };

@@ -1,4 +1,4 @@
-"""A server as scene.proto has it, as plainly as can be: what the client is judged by. One thread, no gRPC."""
+"""A server that implements scene.proto as plainly as possible: the client is judged by it. One thread, no gRPC."""
 from __future__ import annotations
 
 from typing import Any, Iterator, Optional
@@ -6,14 +6,14 @@ from typing import Any, Iterator, Optional
 from voxeld.v1 import primitives_pb2, types_pb2
 from voxeld.v1 import scene_pb2 as pb
 
-REFUSED = "refuse this"  # the label of an entity that is to be refused
-NOTED = "note this"  # of one that is taken with an Issue
+REFUSED = "refuse this"  # the label of an entity that is refused
+NOTED = "note this"  # the label of one that is accepted with an Issue
 
 Scene = dict[str, dict[str, bytes]]  # layer → id → Entity, serialised; layers in the order of their creation
 
 
 class Refusal(Exception):
-    """Of one operation."""
+    """The refusal of one operation."""
 
     def __init__(self, layer: str, id: str, reason: Any, message: str = "refused") -> None:
         super().__init__(message)
@@ -21,11 +21,11 @@ class Refusal(Exception):
 
 
 class TooLarge(Exception):
-    """A message: a real server ends the stream with RESOURCE_EXHAUSTED."""
+    """The refusal of a message: a real server ends the stream with RESOURCE_EXHAUSTED."""
 
 
 class Session:
-    """What one session has in the scene, and what it is told after it was taken up."""
+    """The layers of one session in the scene, and what it is sent after it is resumed."""
 
     def __init__(self, owner: int = 0) -> None:
         self.owner = owner
@@ -50,8 +50,9 @@ class Session:
 
 
 class PlainServer:
-    """Sessions and streams. `window`: how many bytes may be sent and not applied; 0: credit is not spoken of. `owes`: after
-    a resume, whether outcomes are sent that were not."""
+    """Sessions and streams. `window`: how many bytes may be sent and not yet applied; 0: no flow control. `owes`: whether outstanding
+    outcomes are sent
+    after a resume."""
 
     def __init__(self, window: int = 0, displays: tuple[str, ...] = ("d",), max_message_bytes: int = 16 << 20,
                  max_uncommitted_bytes: int = 256 << 20, max_operations: int = 1_000_000, outcomes: bool = True) -> None:
@@ -59,12 +60,12 @@ class PlainServer:
         self.displays = displays
         self.limits = types_pb2.Limits(max_message_bytes=max_message_bytes, max_uncommitted_bytes=max_uncommitted_bytes,
                                        max_operations_per_commit=max_operations)
-        self.outcomes = outcomes  # whether they come at once; else they are owed
+        self.outcomes = outcomes  # whether outcomes are sent at once; otherwise they are outstanding
         self.sessions: dict[bytes, Session] = {}
         self.owners: dict[bytes, int] = {}
         self.tokens = 0
         self.now_ns = 1000
-        self.commits: list[int] = []  # every frame id that was applied, in order
+        self.commits: list[int] = []  # every commit id that was applied, in order
         self.commit_bytes: list[int] = []
         self.client_drops = 0
         self.frames_seen = 0
@@ -72,13 +73,13 @@ class PlainServer:
         self.timed: list[tuple[pb.Commit, int, list[tuple[int, pb.StreamRequest]]]] = []
 
     def forget(self) -> None:
-        """As after a restart."""
+        """Forgets all sessions, as after a restart."""
         self.sessions.clear()
         self.owners.clear()
         self.timed = []
 
     def begin(self) -> None:
-        """A new stream; the one before has ended."""
+        """Starts a new stream; the one before has ended."""
         self.session = None
         self.timed = []
         self.received = self.applied = 0
@@ -89,14 +90,14 @@ class PlainServer:
 
     def receive(self, message: bytes) -> list[pb.StreamResponse]:
         """Takes one request; raises LookupError where a real server ends the stream with NOT_FOUND."""
-        # A message may exceed what is left only by being sent while some is left.
+        # A message may exceed the remaining credit only if some credit was left when it was sent.
         assert not self.opened or not self.window or self.received < self.credit, (self.received, self.credit)
         if len(message) > self.limits.max_message_bytes:
             raise TooLarge(len(message))
         self.received += len(message)
         request = pb.StreamRequest.FromString(message)
         what = request.WhichOneof("op")
-        # A ping counts if it says so.
+        # A ping has a sequence if it counts as a request.
         assert not request.sequence or request.sequence > self.sequence
         self.sequence = request.sequence or self.sequence + (what != "ping")
         if not self.opened:
@@ -119,21 +120,21 @@ class PlainServer:
         return [self._commit(request.commit, self.sequence, staged)]
 
     def advance(self, now_ns: int) -> list[pb.StreamResponse]:
-        """Time passes; commits whose time comes are applied."""
+        """Advances the time; commits whose time has come are applied."""
         self.now_ns = now_ns
         due = [one for one in self.timed if one[0].present_at_ns <= now_ns]
         self.timed = [one for one in self.timed if one[0].present_at_ns > now_ns]
         return [self._commit(*one) for one in due]
 
     def give_credit(self) -> list[pb.StreamResponse]:
-        """For everything that has come: applied, or staged for a commit that has not."""
+        """Gives credit for everything that has been handled: applied, or staged for a commit that has not arrived."""
         if not self.window or self.credit >= self.received + self.window:
             return []
         self.credit = self.received + self.window
         return [pb.StreamResponse(credit_bytes=self.credit)]
 
     def pay(self) -> list[pb.StreamResponse]:
-        """The outcomes that are owed."""
+        """Sends the outstanding outcomes."""
         assert self.session is not None
         owed, self.session.owed = self.session.owed, []
         return [pb.StreamResponse(receipts=[receipt]) for receipt in owed]
@@ -143,7 +144,7 @@ class PlainServer:
             if request.resume_token not in self.sessions:
                 raise LookupError("no such session")
             self.session = self.sessions.pop(request.resume_token)
-            if not self.session.keeps:  # its layers went with its stream
+            if not self.session.keeps:  # its layers were removed with its stream
                 self.session.clear()
         elif request.owner_token:
             if request.owner_token not in self.owners:
@@ -202,7 +203,7 @@ class PlainServer:
                             issues.append(pb.Issue(sequence=at, layer=one.upsert.layer, id=one.upsert.id, applied=True))
                     except Refusal as refusal:
                         refuse(at, refusal)
-        if frame is not None:  # it has no end, and its layer is as it was
+        if frame is not None:  # the batch has no FrameEnd, and its layer is unchanged
             if held is None:
                 del self.session.scene[frame]
             else:
@@ -231,7 +232,7 @@ class PlainServer:
 
 
 def alone(request: pb.StreamRequest) -> Iterator[pb.StreamRequest]:
-    """A batch's upserts one by one."""
+    """Yields a batch's upserts one by one."""
     if request.WhichOneof("op") != "batch":
         yield request
     for upsert in request.batch.upserts:
@@ -244,7 +245,7 @@ def used_by(definition: bytes) -> set[str]:
 
 
 def reached(session: Session, start: str) -> set[str]:
-    """The objects in `start`, and in those."""
+    """Returns the objects in `start` and all objects that they reach."""
     seen: set[str] = set()
     ahead = [start]
     while ahead:
@@ -260,7 +261,7 @@ def drawn_by(entity: bytes) -> str:
 
 
 def apply(session: Session, request: pb.StreamRequest) -> None:
-    """An operation outside of frames, one upsert at a time; raises Refusal."""
+    """Applies an operation outside frames, one upsert at a time; raises Refusal."""
     what = request.WhichOneof("op")
     if what == "upsert":
         upsert = request.upsert

@@ -1,4 +1,4 @@
-"""The client against the real daemon, where it matters that it is real. The daemon's path is in VOXELD."""
+"""Tests the client against the real daemon where a fake one does not suffice. The daemon's path is in VOXELD."""
 import asyncio
 import os
 import random
@@ -41,7 +41,7 @@ class Daemon:
 
 
 class Relay:
-    """A socket in front of the daemon's whose connections can be cut. `late_s`: after which what comes passes, as on a slow network."""
+    """A socket in front of the daemon's, whose connections can be closed. `late_s`: the delay with which data passes, as on a slow network."""
 
     def __init__(self, path: str, behind: str, late_s: float = 0) -> None:
         self._behind = behind
@@ -227,7 +227,7 @@ class RealServer(unittest.TestCase):
         self.assertEqual({layer.layer: layer.opacity for layer in v.layers()}, {"l": 128, "live": 255, "main": 255})
 
     def scene(self, v: voxel.Connection) -> Any:
-        """All that says what is drawn; not when, nor by whom."""
+        """Returns everything that determines what is drawn; not when, nor by which session."""
         layers = []
         for layer in sorted(v.layers(), key=lambda one: one.number):
             for field in ("owner", "number", "bytes", "client_name"):
@@ -245,7 +245,7 @@ class RealServer(unittest.TestCase):
         layer, name = v.layer(rng.choice("abc")), rng.choice("xyz")
         kind = rng.randrange(11)
         if kind < 2:
-            layer.sphere(name, radius=rng.choice([0.1, 1e12]), color=rng.choice(["red", "lime"]))  # the one too large
+            layer.sphere(name, radius=rng.choice([0.1, 1e12]), color=rng.choice(["red", "lime"]))  # the one that is too large
         elif kind < 4:
             layer.instance(name, rng.choice("xyz"), transform=voxel.translate(rng.random(), 0, 0))
         elif kind == 4:

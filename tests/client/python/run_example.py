@@ -1,5 +1,6 @@
-"""A program against the real daemon with simulated displays on a unix socket; fails as the program does, and when the
-daemon refused anything or showed nothing. usage: run_example.py VOXELD PROGRAM [ARGUMENT]..."""
+"""Runs a program against the real daemon with simulated displays on a Unix socket; fails when the program fails, and when the daemon
+refused anything or
+showed nothing. usage: run_example.py VOXELD PROGRAM [ARGUMENT]..."""
 import os
 import subprocess
 import sys
@@ -8,10 +9,10 @@ from pathlib import Path
 
 import voxeld as voxel
 
-# What an example has refused on purpose, and how many pictures it leaves.
+# The operations that an example deliberately has refused, and the pictures that it leaves.
 REFUSED = {"08_receipts_and_errors": 2}
 PICTURES = {"04_point_cloud": ["tmp/galaxy.png"]}
-# Beside these; the first display is the one that examples capture.
+# These follow the display in FIRST_DISPLAY, if that is set; examples capture the first display.
 DISPLAYS = ["stack=simulated,geometry=planar,size=48x48x48", "rotor=simulated,geometry=rotor,size=48x48,slices=120"]
 
 

@@ -22,10 +22,10 @@ class Served:
         self.address = f"unix:{path}"
         self.cut = threading.Event()           # the next request ends its stream
         self.refuse: Optional[grpc.StatusCode] = None
-        self.credit = threading.Event()        # cleared: no more credit than there is
+        self.credit = threading.Event()        # cleared: no credit is given beyond the initial one
         self.credit.set()
-        self.insert: list[bytes] = []          # answers of no request, to be sent first
-        self.ended = threading.Semaphore(0)    # streams
+        self.insert: list[bytes] = []          # answers that belong to no request, to be sent first
+        self.ended = threading.Semaphore(0)    # counts ended streams
         self._server = grpc.server(futures.ThreadPoolExecutor(4))
         handler = grpc.stream_stream_rpc_method_handler(self._stream)
         self._server.add_generic_rpc_handlers(
@@ -53,7 +53,7 @@ class Served:
                 context.abort(grpc.StatusCode.NOT_FOUND, "no such session")
             except TooLarge:
                 context.abort(grpc.StatusCode.RESOURCE_EXHAUSTED, "the message is too large")
-            # A ping that used up the credit is still answered. Otherwise the client never sends what the test wants to hold up.
+            # A ping that used up the credit is still answered. Otherwise the client would never send what the test wants to block.
             is_ping = pb.StreamRequest.FromString(message).HasField("ping")
             if self.plain.window and self.plain.received >= self.plain.credit and not is_ping:
                 self.credit.wait(LONG)

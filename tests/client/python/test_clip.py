@@ -1,4 +1,4 @@
-"""What a layer is cut to, as it goes over the wire."""
+"""Tests the clip shape of a layer on the wire."""
 import unittest
 
 from voxeld import ClipBox, ClipCylinder, InvalidArray, InvalidValue, clip, translate

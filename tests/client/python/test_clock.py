@@ -36,8 +36,8 @@ class Clock(unittest.TestCase):
 
     def test_impossible_times_are_passed_over(self) -> None:
         clock = ClockEstimate()
-        clock.add(100, 50, 40, 200)    # answered before it came
-        clock.add(100, 50, 350, 200)   # took longer there than in all
+        clock.add(100, 50, 40, 200)    # answered before it was received
+        clock.add(100, 50, 350, 200)   # took longer at the server than in total
         self.assertFalse(clock.known())
 
 

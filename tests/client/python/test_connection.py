@@ -1,4 +1,4 @@
-"""Connections as their users have them: dropped, drawn on from tasks and callbacks, with more than goes out at once."""
+"""Tests connections in realistic use: dropped connections, drawing from tasks and callbacks, and commits larger than can be sent at once."""
 import asyncio
 import gc
 import os
@@ -17,7 +17,7 @@ import voxeld as voxel
 from voxeld import callbacks, transport
 from voxeld.v1 import scene_pb2 as pb
 
-THREE = np.zeros((200_000, 3), np.float32)  # goes out in three pieces
+THREE = np.zeros((200_000, 3), np.float32)  # is sent in three pieces
 ONE = np.zeros((1, 3), np.float32)
 
 
@@ -300,7 +300,7 @@ class Faults(Case):
             block.frame.wait(LONG)  # type: ignore[union-attr]
         after.wait(LONG)  # type: ignore[union-attr]
         self.assertEqual((self.ids(served), v.counts["streams_opened"]), (["after"], 1))
-        v.flush(LONG)  # which is for what is sent alone
+        v.flush(LONG)  # which applies only to what is sent
         v.close()
         self.assertEqual([issue.reason for issue in told], ["QUOTA_EXCEEDED"])
         self.assertRegex(str(told[0]), r"^commit: an operation of the commit has \d+ bytes .*max_message_bytes")
@@ -320,7 +320,7 @@ class Faults(Case):
             self.serve(plain)
             v = self.connect()
             v.sphere("a").frame.wait(LONG)  # type: ignore[union-attr]
-            # It says one thing and does another: there is no way to know what it cannot take.
+            # The server reports one limit and applies another: the client cannot know what it will reject.
             plain.limits.max_message_bytes = 100
             with mock.patch.object(type(v._session), "most_bytes", 1 << 62):
                 v.sphere("b", label="x" * 200)

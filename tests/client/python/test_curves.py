@@ -1,4 +1,4 @@
-"""What curves, arrows, text, frames, splats and gradients say on the wire, and what is wrong with them."""
+"""Tests the wire encoding of curves, arrows, text, frames, splats and gradients, and the errors for wrong arguments."""
 import unittest
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Expressions that are computed with say the operations that the text would."""
+"""Expressions built by computation produce the same operations as their text."""
 import unittest
 
 from voxeld import InvalidArray, InvalidValue, expressions, measured

@@ -1,4 +1,4 @@
-"""What shapes by their measures say on the wire, and what is wrong with measures."""
+"""Tests the wire encoding of shapes given by their measures, and the errors for wrong measures."""
 import unittest
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""What is said of arguments that a drawing call does not have."""
+"""Tests the errors for arguments that a drawing call does not have."""
 import inspect
 import pydoc
 import unittest
@@ -13,13 +13,13 @@ CALLS = sorted(name for name, method in inspect.getmembers(Draw, inspect.isfunct
 
 
 class Paper(Draw[dict[str, Any]]):
-    """Draws nothing, and gives back what it was asked for."""
+    """Draws nothing, and returns the arguments that it received."""
 
     def _draw(self, name: str, make: draw.Make, args: tuple[Any, ...], options: dict[str, Any], look: Look) -> dict[str, Any]:
         return {"name": name, "args": args, **options, "look": look}
 
 
-# As docs/primitives.md has them, and other libraries; what was meant.
+# A call, a word that docs/primitives.md or another library uses for the argument, and the option that was meant.
 MEANT = [("text", "alignment", "align"), ("lines", "topology", "mode"), ("lines", "thickness", "width"), ("points", "thickness", "width"),
          ("sphere", "thickness", "shell"), ("mesh", "thickness", "shell"), ("instance", "object", "of"), ("implicit", "colormap", "cmap"),
          ("implicit", "parameter_names", "parameters"), ("patch", "edge_a", "edges"), ("mesh", "indices", "faces"),

@@ -1,4 +1,4 @@
-"""The outbox against a plain model: lists, and the contract's words."""
+"""Tests the outbox against a plain model: lists, and the rules of its contract."""
 import random
 import unittest
 from typing import Optional
@@ -33,7 +33,7 @@ def must_show(number: int, *ops: operations.Operation) -> operations.Unit:
 
 
 class Model:
-    """Units as lists of labels: ("frame", layer, number) or ("put", …). The policy is applied by looking at everything."""
+    """Units as lists of labels: ("frame", layer, number) or ("put", …). The policy is applied by examining everything."""
 
     def __init__(self, keep: Optional[int]) -> None:
         self.keep = keep
@@ -78,7 +78,7 @@ class Policies(unittest.TestCase):
                         is_frame = rng.random() < 0.7
                         ops.append(frame(layer) if is_frame else puts(layer, str(at)))
                         labels[id(ops[-1])] = ("frame" if is_frame else "put", layer, number * 10 + at)
-                        self.addCleanup(lambda o: None, ops[-1])  # keeps it, and with it its id
+                        self.addCleanup(lambda o: None, ops[-1])  # keeps it alive, and so its id unique
                     gone = box.push(unit(number, *ops))
                     assert gone is not None
                     self.assertEqual({u.frame.id for u in gone}, model.push(number, [labels[id(o)] for o in ops]))

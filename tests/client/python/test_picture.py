@@ -13,7 +13,7 @@ from voxeld.v1 import types_pb2
 
 
 def decode_png(data: bytes) -> Any:
-    """A reader of its own for what the writer writes."""
+    """An independent reader for the writer's output."""
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     at, chunks = 8, {}
     while at < len(data):
@@ -61,7 +61,7 @@ class Places(unittest.TestCase):
         panel = pb.Rotor.Panel(pitch_u_mm=1, pitch_v_mm=1, eccentricity_mm=2, phase_turns=0.25)
         rotor = pb.Rotor(slices_per_turn=4, width_px=4, height_px=2, panels=[pb.Rotor.Panel(pitch_u_mm=1, pitch_v_mm=1), panel])
         self.assertEqual(self.lit(header(8, 4, 2, rotor=rotor), 0, 1, 3), [1.5, 0, 0.5])
-        self.assertEqual(self.lit(header(8, 4, 2, rotor=rotor), 2, 1, 3), [0, 1.5, 0.5])   # a quarter turn on
+        self.assertEqual(self.lit(header(8, 4, 2, rotor=rotor), 2, 1, 3), [0, 1.5, 0.5])   # a quarter turn further
         self.assertEqual(self.lit(header(8, 4, 2, rotor=rotor), 1, 0, 3), [-2, 1.5, -0.5])  # u along y, off along −x
         rotor.clockwise = True
         self.assertEqual(self.lit(header(8, 4, 2, rotor=rotor), 2, 1, 3), [0, -1.5, 0.5])

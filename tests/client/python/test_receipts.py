@@ -134,7 +134,7 @@ class Waiting(unittest.TestCase):
         book, frame = Book(), Frame(1)
         book.add(frame)
         why = pb.Receipt(frame_id=1, outcome=pb.Outcome(display="d"))
-        why.outcome.not_shown.ParseFromString(b"\x08\x63")  # a Why that nobody knows
+        why.outcome.not_shown.ParseFromString(b"\x08\x63")  # an unknown value of Why
         book.receipt(why)
         book.receipt(pb.Receipt(frame_id=1, outcome=pb.Outcome(display="e")))
         book.receipt(pb.Receipt(frame_id=1, accepted=pb.Accepted(displays=["d", "e"])))

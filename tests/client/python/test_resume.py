@@ -1,4 +1,4 @@
-"""What becomes of the scene and of commits when a stream ends, case by case; test_session has everything at random."""
+"""Tests the state of the scene and of commits after a stream ends, case by case; test_session has everything at random."""
 import unittest
 from typing import Any
 
@@ -33,7 +33,7 @@ class Case(unittest.TestCase):
             pass
 
     def again(self, forget: bool = False) -> None:
-        """The stream ends, and another is begun."""
+        """Ends the stream and starts another."""
         self.link.cut()
         if forget:
             self.server.forget()
@@ -50,7 +50,7 @@ class Case(unittest.TestCase):
 
 
 class Accepted(Case):
-    """Only what the server accepted is sent anew."""
+    """Only what the server accepted is sent again."""
 
     def test_a_refused_put_does_not_replace_the_good_one(self) -> None:
         self.start(PlainServer())
@@ -84,7 +84,7 @@ class Accepted(Case):
     def test_a_refused_frame_leaves_the_layer(self) -> None:
         self.start(PlainServer(max_operations=3))
         self.commit(puts("l", "x"))
-        # The batch, the frame's beginning and its entity are three; its end is one too many.
+        # The batch, the frame's beginning and its entity make three; the frame's end is one too many.
         self.commit(puts("m", "1"), puts_of("n", "2"), operations.Immediate("l", [puts("l", "z")]))
         self.link.settle()
         self.assertEqual(self.ids(), ["x"])
@@ -218,7 +218,7 @@ class Unanswered(Case):
     """Commits that had no answer when their stream ended."""
 
     def cut_with(self, *units: Any, applied: int) -> list[Frame]:
-        """They are sent, and no answer comes; the server has taken the first `applied` requests."""
+        """The commits are sent, and no answer arrives; the server has handled the first `applied` requests."""
         frames = [self.commit(*made) for made in units]
         for _ in range(applied):
             self.link.send()
@@ -360,7 +360,7 @@ class Issues(Case):
         self.send_all()
         self.link.answers += self.server.advance(9000)
         answers, self.link.answers = self.link.answers, []
-        # As if every issue were told at once, and receipts after.
+        # As if every issue were reported at once, and receipts later.
         for answer in answers:
             self.session.answer(pb.StreamResponse(issues=answer.issues), 0)
             del answer.issues[:]

@@ -1,9 +1,9 @@
-"""The client's state machine against a plain server, with connections that end at any moment."""
+"""Tests the client's state machine against a plain server, with connections that end at any moment."""
 import random
 import unittest
 
 from plain_server import REFUSED, PlainServer, Refusal, Scene, Session as ServerSession, alone, apply
-from test_outbox import frame, puts  # the same makers
+from test_outbox import frame, puts  # the same helper functions
 
 from voxeld import draw, operations, shapes, wire
 from voxeld.receipts import Frame, Issue
@@ -13,7 +13,7 @@ from voxeld.v1 import scene_pb2 as pb
 
 
 class Wire:
-    """A connection between the two, pumped by hand. What is on its way when it ends is gone."""
+    """A connection between the two, pumped by hand. What is on its way when the connection ends is lost."""
 
     def __init__(self, session: Session, server: PlainServer) -> None:
         self.session, self.server = session, server
@@ -21,7 +21,7 @@ class Wire:
         self.token_lost = False
         self.answers: list[pb.StreamResponse] = []
         self.now = 0
-        self.owner = 0  # that was told first
+        self.owner = 0  # the owner that was reported first
 
     def connect(self) -> None:
         self.server.begin()
@@ -37,7 +37,7 @@ class Wire:
 
     def cut(self) -> None:
         if self.up:
-            # A token serves once, and with Opened the next one is lost.
+            # A token can be used once, and the next one is lost with Opened.
             self.token_lost = self.token_lost or not self.session.open
             self.up = False
             self.answers = []
@@ -62,7 +62,7 @@ class Wire:
             self.owner = self.owner or self.session.info.owner
 
     def settle(self) -> None:
-        """Until nothing is left to do."""
+        """Pumps until nothing is left to do."""
         while True:
             self.deliver()
             if not self.send() and not self.answers:
@@ -70,7 +70,7 @@ class Wire:
 
 
 def puts_of(layer: str, id: str, label: str = "", uses: str = "", lifetime_ns: int = 0) -> operations.Puts:
-    """A sphere, or an instance of `uses`."""
+    """Returns a sphere, or an instance of `uses`."""
     shape = shapes.instance(uses) if uses else shapes.sphere((0, 0, 0), 1)
     look = draw.Look(label=label, lifetime=lifetime_ns / 1e9 if lifetime_ns else None)
     return operations.Puts([wire.put(layer, id, look.to_bytes(), shape[0], uses, look.lifetime_ns)])
@@ -85,7 +85,7 @@ def define(name: str, uses: set[str], parts: int = 0) -> operations.Define:
 
 
 class Expected:
-    """What the scene is to come to: every commit applied as it was made."""
+    """The expected scene: every commit applied as it was made."""
 
     def __init__(self, strict: bool = False) -> None:
         self.strict = strict
@@ -117,7 +117,7 @@ class Expected:
                 self.refused = True
 
     def random_operation(self, rng: random.Random, number: int, refusals: bool) -> operations.Operation:
-        """`refusals`: it may be one that is refused."""
+        """`refusals`: the operation may be one that is refused."""
         layer, one, kind = rng.choice("abc"), rng.choice("xyz"), rng.random()
         size = rng.choice([0, 100, number])
         known = sorted(self.session.objects)
@@ -158,13 +158,13 @@ def filled(scene: Scene) -> Scene:
 
 
 class Run:
-    """Commits, losses and restarts at random; then everything that must hold."""
+    """Runs commits, losses and restarts at random, and then checks everything that must hold."""
 
     def __init__(self, test: unittest.TestCase, seed: object, flow: str, window: int, losses: float, restarts: float) -> None:
         rng = random.Random(f"{seed}")
         keep = 2
         kept = rng.random() < 0.5
-        # What is given up or kept unseen must not decide what is refused.
+        # Commits that are dropped, or kept without being reported, must not decide what is refused.
         refusals = flow == "reliable" and not (kept and losses) and rng.random() < 0.7
         strict = refusals and rng.random() < 0.5
         session = Session(Settings(flow=flow, keep_frames=keep, on_disconnect="keep" if kept else "clear", strict=strict))

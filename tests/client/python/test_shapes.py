@@ -1,4 +1,4 @@
-"""What shapes say on the wire, and that pieces of large ones are the whole."""
+"""Tests the wire encoding of shapes, and that the pieces of large ones add up to the whole."""
 import pathlib
 import tempfile
 import unittest
@@ -29,7 +29,7 @@ def rgb(vertices: pb.Vertices) -> Any:
 
 
 def segments_of(primitive: pb.Primitive) -> list[tuple[bytes, bytes]]:
-    """Each segment by its two ends' bytes, position and colour."""
+    """Returns the position and colour of each segment as the bytes of its two ends."""
     v = primitive.segments.vertices
     ends = [p.tobytes() + (c.tobytes() if v.colors else b"")
             for p, c in zip(xyz(v), rgb(v) if v.colors else np.zeros(v.count))]
@@ -119,7 +119,7 @@ class Mesh(unittest.TestCase):
 
 
 class ColorsOfElements(unittest.TestCase):
-    """Of each segment or face its own colour: in every piece beside the element that it was given for."""
+    """Each segment or face has its own colour: in every piece, the colour is with the element that it was given for."""
 
     def test_of_segments(self) -> None:
         for mode, vertices, segments in (("strip", 200_000, 199_999), ("loop", 3, 3), ("loop", 200_000, 200_000),

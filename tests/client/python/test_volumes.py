@@ -53,7 +53,7 @@ class Points(unittest.TestCase):
         rotor = head.geometry.rotor
         rotor.slices_per_turn, rotor.width_px, rotor.height_px = 4, 2, 2
         rotor.panels.add(pitch_u_mm=2, pitch_v_mm=2, eccentricity_mm=3, tilt_deg=30)
-        # A quarter of a turn on: u is along y, the eccentricity along −x.
+        # A quarter turn further: u is along y, the eccentricity along −x.
         np.testing.assert_allclose(points(head, (1, 1, 1)), [[-3.5, 1, np.cos(np.pi / 6)]], atol=1e-6)
 
     def test_helices(self) -> None:
@@ -62,7 +62,8 @@ class Points(unittest.TestCase):
         helix.slices_per_turn, helix.width_px, helix.height_px = 4, 4, 4
         helix.pitch_u_mm = helix.pitch_v_mm = helix.span_turns = helix.blades = 1
         helix.height_mm, helix.radius_mm = 8, 5
-        # At 45° from where the blade begins it has risen by an eighth; a quarter of a turn later it begins there less.
+        # At 45° from where the blade begins, it has risen by an eighth; in the next slice, a quarter turn later, it is an eighth below the
+        # top.
         np.testing.assert_allclose(points(head, (0, 2, 2)), [[0.5, 0.5, -3]])
         np.testing.assert_allclose(points(head, (1, 2, 2)), [[0.5, 0.5, 3]])
         helix.left_handed = True

@@ -1,4 +1,4 @@
-"""What is shipped. PYTHONPATH begins with the wheel."""
+"""Tests the files that are shipped. PYTHONPATH begins with the wheel."""
 import os
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""The writer of wire bytes against protobuf's own parser and writer."""
+"""Tests the writer of wire bytes against protobuf's own parser and writer."""
 import random
 import unittest
 from typing import Any, Optional
@@ -23,7 +23,7 @@ def random_look(rng: random.Random) -> Look:
 
 
 class Expected:
-    """A primitive with vertices, and the same by protobuf's own hand."""
+    """A primitive with vertices, and the same written by protobuf."""
 
     def __init__(self, rng: random.Random) -> None:
         numpy = np.random.default_rng(rng.randrange(1 << 30))
@@ -84,7 +84,7 @@ class Writer(unittest.TestCase):
             upsert = expected_upsert(layer, id, look, case.message)
             self.assertEqual(pb.StreamRequest.FromString(put.request), pb.StreamRequest(upsert=upsert))
             self.assertEqual(pb.Upsert.FromString(put.request[put.start:]), upsert)
-            # No byte more or less than protobuf's: they differ in the order of fields alone.
+            # Exactly as many bytes as protobuf writes: they differ only in the order of fields.
             self.assertEqual(len(put.request), pb.StreamRequest(upsert=upsert).ByteSize())
 
     def test_batches_hold_the_same_in_the_same_order(self) -> None:
