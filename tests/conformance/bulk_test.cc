@@ -1,4 +1,4 @@
-// Geometries in bulk memory: read where they lie, held as long as they are.
+// Tests geometries in bulk memory: engines read them in place, and hold them as long as they exist.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -42,7 +42,7 @@ std::vector<float> Positions(uint64_t seed) {
   return positions;
 }
 
-// A delta, and what goes with it.
+// A delta, and the bulk memory that it refers to.
 struct Bulk {
   template <typename Write>
   Bulk(size_t size, Write&& write) : bytes(size) {
@@ -61,7 +61,7 @@ DrawableRecord DrawableOf(uint64_t geometry) {
   return {.id = geometry, .geometry = geometry, .layer = 1};
 }
 
-// Dots, and the drawable that shows them; `arrays` in bulk memory or not.
+// Inserts dots, and the drawable that shows them; `arrays` are in bulk memory or not.
 Bulk Put(uint64_t id, const GeometryArrays& arrays) {
   const GeometryRecord record = Record(id);
   const size_t size =
@@ -92,7 +92,7 @@ GeometryArrays InPool(BulkPool& pool, uint64_t id) {
   return arrays;
 }
 
-// Writes over every place that is free.
+// Overwrites every free place.
 void Spoil(BulkPool& pool) {
   std::vector<BulkBlock> blocks;
   for (int i = 0; i < 50; ++i) {
@@ -124,7 +124,8 @@ TEST_P(EngineBulk, BulkMemoryIsHeldUntilItsGeometryIsDropped) {
     Bulk put = Put(1, InPool(*pool, 1));
     ASSERT_TRUE(engine.ApplyBytes(put.bytes, std::move(put.referred)).ok());
   }
-  for (uint64_t seed = 1; seed <= 3; ++seed) {  // all is drawn anew from what is held
+  for (uint64_t seed = 1; seed <= 3; ++seed) {  // everything is drawn again from what the engine
+                                                // holds
     const Target target = SmallTarget(seed);
     ASSERT_TRUE(engine.SetTarget(target).ok() && other.SetTarget(target).ok());
     Spoil(*pool);
@@ -167,7 +168,7 @@ TEST_P(EngineBulk, BulkMemoryComesAndGoes) {
     ASSERT_TRUE(engine.Frame().ok() && other.Frame().ok());
     ASSERT_TRUE(engine.pictures() == other.pictures()) << id;
   }
-  EXPECT_LE(most, 20 * 8192u);  // places are used again
+  EXPECT_LE(most, 20 * 8192u);  // places are reused
   Bulk reset(DeltaWriter::kSizeOfReset, [](DeltaWriter& writer) { writer.Reset(); });
   ASSERT_TRUE(engine.ApplyBytes(reset.bytes).ok());
   ASSERT_EQ(engine.Frame().status(), absl::OkStatus());
@@ -223,7 +224,7 @@ TEST(BulkLedger, HoldsWhatIsReadInPlace) {
   EXPECT_EQ(pool->used_bytes(), 2 * 2432u);
   apply(in_place, Bulk(DeltaWriter::kSizeOfReset, [](DeltaWriter& w) { w.Reset(); }), false);
   EXPECT_EQ(pool->used_bytes(), 0u);
-  // What the CPU draws is read in place by every engine.
+  // Every engine reads in place the geometries that the CPU draws.
   GeometryRecord record = Record(4);
   record.drawn_by = DrawnBy::kCpu;
   apply(copying,

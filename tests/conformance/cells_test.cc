@@ -1,4 +1,4 @@
-// Sparse voxels with a lattice of their own: points as cells, under transforms.
+// Tests sparse voxels with a lattice of their own: points drawn as cells, under transforms.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -27,14 +27,15 @@ class Cells : public EngineConformance {
     geometry_.colors.push_back(rgb);
     geometry_.record.vertex_count = static_cast<uint32_t>(geometry_.colors.size());
   }
-  // Turned by 30° about two axes, `edge` voxels a cell, with the origin at a place that is no voxel's corner or centre.
+  // Turns by 30° about two axes, with `edge` voxels a cell; the origin is neither a corner nor a
+  // centre of a voxel.
   void Turn(double edge) {
     const double c = std::cos(std::numbers::pi / 6), s = std::sin(std::numbers::pi / 6);
     const double turn[9] = {c, -s * c, s * s, s, c * c, -c * s, 0, s, c};
     for (int i = 0; i < 9; ++i) transform_.m[i / 3 * 4 + i % 3] = edge * turn[i];
     for (int a = 0; a < 3; ++a) transform_.m[a * 4 + 3] = 19.8125 + a * 0.203125;
   }
-  // All voxels, as the engine and the oracle have them.
+  // Draws all voxels with the engine, and checks them against the oracle.
   std::vector<uint32_t> Draw() { return DrawnLikeOracle(SceneOf(geometry_, transform_), target_); }
   static uint64_t Count(const std::vector<uint32_t>& voxels, uint32_t rgb) {
     return static_cast<uint64_t>(std::count(voxels.begin(), voxels.end(), rgb));
@@ -51,7 +52,7 @@ INSTANTIATE_TEST_SUITE_P(Engines, Cells, testing::ValuesIn(EngineCases()),
 TEST_P(Cells, AreVoxelsWhereTheLatticesAreOne) {
   Add(3, 4, 5, kRed);
   Add(4, 4, 5, kGreen);
-  Add(3.75f, 8.5f, 5.25f, kRed);  // of the cell (3, 8, 5)
+  Add(3.75f, 8.5f, 5.25f, kRed);  // in the cell (3, 8, 5)
   const std::vector<uint32_t> voxels = Draw();
   const auto at = [&](int32_t x, int32_t y, int32_t z) {
     return voxels[static_cast<size_t>((z * kSide + y) * kSide + x)];
@@ -73,7 +74,8 @@ TEST_P(Cells, AreCubesOfTheTransformsSize) {
   EXPECT_EQ(voxels[(11 * kSide + 8) * kSide + 8], kGreen);
 }
 
-// A turned block of cells, one colour and the other in turns, has neither gaps nor voxels beside it: it is the solid box.
+// A turned block of cells with alternating colours has neither gaps nor voxels outside: it equals
+// the solid box.
 TEST_P(Cells, SideBySideLeaveNoGaps) {
   constexpr int32_t kCells = 4;
   Turn(3.7);

@@ -1,4 +1,4 @@
-// Layers that are drawn in a part of the scene only.
+// Tests layers that are drawn only in a part of the scene.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,9 +12,9 @@
 namespace voxeld::gpu::conformance {
 namespace {
 
-constexpr uint64_t kSlab = 32 * 32;  // of the box below, a voxel thick
+constexpr uint64_t kSlab = 32 * 32;  // the voxels of a slab of the box below, one voxel thick
 
-// A stack of slices, a voxel a pixel: 48 × 48 × 32, so 3 × 3 × 2 tiles of 16.
+// Returns a stack of slices with one voxel a pixel: 48 × 48 × 32, so 3 × 3 × 2 tiles of 16.
 Target StackTarget(const Affine& view = {}) {
   Target target;
   display::PlanarStack stack;
@@ -29,7 +29,7 @@ Target StackTarget(const Affine& view = {}) {
   return target;
 }
 
-// Layer 1 with a solid box of 32³ voxels, from (0, 0, 0) on.
+// Returns a scene with layer 1, which has a solid box of 32³ voxels from (0, 0, 0) on.
 SceneModel BoxScene() {
   SceneModel scene;
   scene.layers[1].id = 1;
@@ -63,7 +63,8 @@ Affine Inverse(const Affine& map) {
 
 class EngineClip : public EngineConformance {
  protected:
-  // What is lit of a scene under a view, by the engine; by the oracle it is the same.
+  // Returns how many voxels of a scene the engine lights under a view, and checks that the oracle
+  // lights the same.
   uint64_t Lit(const SceneModel& scene, const Target& target) {
     return CountLit(DrawnLikeOracle(scene, target));
   }
@@ -81,7 +82,7 @@ TEST_P(EngineClip, BoxesCutByPlanesHaveTheVoxelsCountedByHand) {
   EXPECT_EQ(LitWith({}), 32 * kSlab);
   EXPECT_EQ(LitWith({{1, 0, 0, -10}}), 22 * kSlab);
   EXPECT_EQ(LitWith({{-1, 0, 0, 10}}), 10 * kSlab);
-  // A centre in the plane is inside, from either side; however long the normal is.
+  // A centre in the plane is inside, whichever way the normal points and however long it is.
   EXPECT_EQ(LitWith({{0, 1, 0, -10.5}}), 22 * kSlab);
   EXPECT_EQ(LitWith({{0, -1, 0, 10.5}}), 11 * kSlab);
   EXPECT_EQ(LitWith({{0, 0, 1e200, -10.5e200}}), 22 * kSlab);
@@ -91,7 +92,7 @@ TEST_P(EngineClip, BoxesCutByPlanesHaveTheVoxelsCountedByHand) {
   // The corner with i + j + k ≤ 10: C(13, 3).
   EXPECT_EQ(LitWith({{-1, -1, -1, 11.5}}), 286u);
   EXPECT_EQ(LitWith({{-1, -1, -1, 11.4}}), 220u);
-  // Together: what is inside all of them.
+  // Several planes: a voxel must be inside all of them.
   EXPECT_EQ(LitWith({{1, 0, 0, -10}, {-1, 0, 0, 20}, {0, 1, 0, -31}}), 10u * 32);
   EXPECT_EQ(LitWith({{1, 0, 0, -20}, {-1, 0, 0, 10}}), 0u);
   const std::vector<ClipPlane> eight = {{1, 0, 0, -8},  {-1, 0, 0, 24},  {0, 1, 0, -8},
@@ -109,7 +110,8 @@ TEST_P(EngineClip, RegionsHaveTheVoxelsCountedByHand) {
   layer.has_region = 1;
   layer.region = {{4, 4, -5}, {8, 9, 50}};
   EXPECT_EQ(Lit(scene, StackTarget()), 4u * 5 * 32);
-  layer.region = {{4.5, 4.5, 4.5}, {8.5, 9.5, 4.75}};  // faces through centres: inside
+  layer.region = {{4.5, 4.5, 4.5}, {8.5, 9.5, 4.75}};  // faces through centres: those voxels are
+                                                       // inside
   EXPECT_EQ(Lit(scene, StackTarget()), 5u * 6 * 1);
   layer.region = {{4.6, 4, 4}, {5.4, 8, 8}};  // between two centres
   EXPECT_EQ(Lit(scene, StackTarget()), 0u);
@@ -119,7 +121,7 @@ TEST_P(EngineClip, RegionsHaveTheVoxelsCountedByHand) {
   EXPECT_EQ(Lit(scene, StackTarget()), 22u * 32 * 10);
 }
 
-// The planes are the scene's: they move with the view and stay when the layer moves.
+// Planes are given in the scene: they move with the view, and stay when the layer moves.
 TEST_P(EngineClip, PlanesLieInTheScene) {
   // MILLIMETRES: voxel = mm + (24, 24, ½).
   Affine millimetres;
@@ -172,11 +174,11 @@ TEST_P(EngineClip, ClippedVoxelsAreNotCoveredSoThatBelowShows) {
   };
   EXPECT_EQ(count(0xFFFFFF), 10 * kSlab);
   EXPECT_EQ(count(0xFF0000), 22 * kSlab);
-  // A layer that erases does so only inside.
+  // A layer that erases does so only inside its clip.
   above.blend = BlendMode::kErase;
   EXPECT_EQ(count(0xFFFFFF), 10 * kSlab);
   EXPECT_EQ(count(0xFF0000), 0u);
-  // What an entity erases within its layer, and what the CPU draws.
+  // The same for an entity that erases within its layer, and for what the CPU draws.
   above.blend = BlendMode::kOver;
   scene.geometries[2].record.drawn_by = DrawnBy::kCpu;
   scene.drawables[3] = {.id = 3, .geometry = 1, .layer = 2, .priority = 1, .erase = 1};
@@ -193,7 +195,7 @@ TEST_P(EngineClip, ChangesDrawTheTilesOfTheLayerAndNoOthers) {
   scene.geometries[2] = SolidBox(2, {40, 40, 8}, {4, 4, 4}, 0x00FF00);
   scene.drawables[2] = {.id = 2, .geometry = 2, .layer = 2};
   EngineDriver engine = Make();
-  // Of 16×16×16 voxels, or of 32×32×16.
+  // Tiles of 16×16×16 voxels, or of 32×32×16.
   const uint32_t tiles = engine.engine().info().kind == EngineKind::kCuda ? 2 : 8;
   DeltaBuffer whole;
   whole.PutWhole(scene);
@@ -218,7 +220,7 @@ TEST_P(EngineClip, ChangesDrawTheTilesOfTheLayerAndNoOthers) {
   frame = put(layer);
   EXPECT_EQ(frame.tiles_drawn, tiles);
   EXPECT_EQ(frame.lit_voxels, 14 * kThin + 64);
-  layer.planes[1] = {9, 9, 9, 9};  // beyond plane_count: means nothing
+  layer.planes[1] = {9, 9, 9, 9};  // beyond plane_count: ignored
   EXPECT_EQ(put(layer).tiles_drawn, 0u);
   layer.has_region = 1;
   layer.region = {{0, 0, 0}, {16, 16, 16}};
@@ -227,7 +229,7 @@ TEST_P(EngineClip, ChangesDrawTheTilesOfTheLayerAndNoOthers) {
   EXPECT_EQ(frame.lit_voxels, 4u * 10 * 10 + 64);
   layer.region.max[2] = 8;
   EXPECT_EQ(put(layer).lit_voxels, 4u * 10 * 2 + 64);
-  // Hidden, it costs nothing however it changes.
+  // While the layer is hidden, its changes cost nothing.
   layer.visible = 0;
   EXPECT_EQ(put(layer).lit_voxels, 64u);
   layer.plane_count = 0;
@@ -238,7 +240,7 @@ TEST_P(EngineClip, ChangesDrawTheTilesOfTheLayerAndNoOthers) {
   frame = put(layer);
   EXPECT_EQ(frame.tiles_drawn, tiles);
   EXPECT_EQ(frame.lit_voxels, 20 * kThin + 64);
-  // Entities that come later are cut as well.
+  // Entities that are inserted later are clipped as well.
   SetPlanes(layer, {{0, 0, 1, -25}});
   EXPECT_EQ(put(layer).lit_voxels, kThin + 64);
   DeltaBuffer moved;
@@ -264,7 +266,7 @@ TEST_P(EngineClip, ANewViewMovesThePlanes) {
   ASSERT_TRUE(engine.SetTarget(StackTarget(half)).ok());
   ExpectLikeOracle(engine, scene, StackTarget(half));
   EXPECT_EQ(CountLit(engine.Voxels()), 11u * 16 * 16);
-  // A view without an inverse shows nothing of what is clipped.
+  // A view without an inverse shows nothing of a clipped layer.
   Affine flat;
   flat.m[0] = 0;
   flat.m[3] = 5;
@@ -286,7 +288,7 @@ TEST_P(EngineClip, ANewViewMovesThePlanes) {
   EXPECT_EQ(CountLit(engine.Voxels()), 1u);
 }
 
-// A view of each mode, turned anyhow; scenes and planes that lie in the volume under it.
+// A view of each mode, with any rotation, and scenes and planes that lie in its volume.
 TEST_P(EngineClip, RandomPlanesUnderEveryKindOfViewEqualTheOracle) {
   constexpr int kSize = 24;
   const uint64_t seed = SeedOr(6000);
@@ -321,7 +323,7 @@ TEST_P(EngineClip, RandomPlanesUnderEveryKindOfViewEqualTheOracle) {
     const Affine back = Inverse(target.view);
     for (auto& [id, layer] : scene.layers) {
       layer.transform = Compose(back, layer.transform);
-      // What was written for voxels, in the scene: n·A and d + n·t.
+      // The plane, given for voxels, in the scene: n·A and d + n·t.
       for (uint32_t p = 0; p < layer.plane_count; ++p) {
         const ClipPlane v = layer.planes[p];
         const double* m = target.view.m;
@@ -363,12 +365,12 @@ TEST_P(EngineClip, RandomPlanesUnderEveryKindOfViewEqualTheOracle) {
             << " verdicts rounding gave " << near << "\n";
   EXPECT_GT(lit, 5000u);
   EXPECT_GT(unclipped, lit + 3000);
-  // Those of planes through centres, mostly: the others are the definition's own.
+  // Most of these are planes through centres: the other verdicts come from the definition itself.
   EXPECT_LT(near * 50, verdicts);
 }
 
-// Two layers parted by a plane, one on either side: each voxel is in one of them, and in both only
-// where its centre is in the plane.
+// Two layers separated by a plane, one on either side: each voxel is in one of them, and in both
+// only if its centre is in the plane.
 TEST_P(EngineClip, APlaneAndItsOppositeLeaveNothingOut) {
   const uint64_t seed = SeedOr(7000);
   SceneModel scene;

@@ -16,8 +16,8 @@
 
 namespace voxeld::gpu::conformance {
 
-// Where an engine's voxels first differ from what they must be, for people; empty if nowhere.
-// Voxels that no slice looks at may be 0.
+// Returns a readable description of where an engine's voxels first differ from the required ones;
+// empty if nowhere. Voxels that no slice looks at may be 0.
 inline std::string FirstDifference(const std::vector<uint32_t>& got, const DenseVolume& want,
                                    const Target& target) {
   const std::vector<uint8_t> seen = OracleSeen(want, target);
@@ -33,7 +33,7 @@ inline std::string FirstDifference(const std::vector<uint32_t>& got, const Dense
   return "";
 }
 
-// `size` voxels a side, each a pixel of a stack of slices.
+// Returns a target of `size` voxels a side, each a pixel of a stack of slices.
 inline Target CubeTarget(int32_t size) {
   Target target;
   display::PlanarStack stack;
@@ -60,7 +60,7 @@ inline ModelGeometry SolidBox(uint64_t id, std::array<float, 3> center, std::arr
   return g;
 }
 
-// Alone in a layer.
+// Returns a scene with this geometry alone in a layer.
 inline SceneModel SceneOf(const ModelGeometry& g, const Affine& transform = Affine()) {
   SceneModel scene;
   scene.layers[1].id = 1;
@@ -81,7 +81,7 @@ class EngineConformance : public testing::TestWithParam<EngineCase> {
   EngineDriver Make(EngineOptions options = {.threads = 2}) {
     return EngineDriver(GetParam(), std::move(options));
   }
-  // A scene drawn whole must be what the oracle draws.
+  // Checks that a scene, drawn whole, equals the oracle's.
   void ExpectLikeOracle(EngineDriver& engine, const SceneModel& scene, const Target& target) {
     const absl::StatusOr<FrameResult> frame = engine.Frame();
     ASSERT_TRUE(frame.ok()) << frame.status();
@@ -91,7 +91,8 @@ class EngineConformance : public testing::TestWithParam<EngineCase> {
     EXPECT_EQ(frame->lit_voxels, CountLit(voxels));
     ASSERT_TRUE(engine.pictures() == OraclePictures(want, target)) << "pictures differ";
   }
-  // Its voxels, drawn whole by a new engine; by the oracle they are the same.
+  // Returns the target's voxels, drawn whole by a new engine, and checks that the oracle's are the
+  // same.
   std::vector<uint32_t> DrawnLikeOracle(const SceneModel& scene, const Target& target) {
     EngineDriver engine = Make();
     DeltaBuffer whole;

@@ -1,6 +1,6 @@
-// What engines draw in other ways where there is much of it, or where it is small, full or empty:
-// many solids about each size at which ways change, meshes that fill tiles or leave them out, grids
-// of numbers around tiles and at their rims.
+// Tests cases that engines draw in other ways because there are many items, or because they are
+// small, full or empty: numbers of solids around each threshold, meshes that fill tiles or leave
+// them empty, and grids of samples around tiles and at their edges.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -19,7 +19,7 @@ class CrowdedRegions : public EngineConformance {
   double Random(double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random_);
   }
-  // A turn about some axis, after which each of the shape's own axes is stretched.
+  // Rotates about a random axis, and then stretches each of the shape's own axes.
   void Turn(Affine& map, double least, double most) {
     double axis[3], length = 0;
     for (double& a : axis) {
@@ -43,7 +43,7 @@ class CrowdedRegions : public EngineConformance {
     scene_.layers[id].order = static_cast<int32_t>(id);
   }
 
-  // Nine geometries: each kind as a thin surface, one that covers, and solid.
+  // Inserts nine geometries: each kind as a thin surface, as a covering one, and solid.
   void PutSolids() {
     for (uint64_t id = 1; id <= 9; ++id) {
       GeometryRecord& g = scene_.geometries[id].record;
@@ -65,8 +65,8 @@ class CrowdedRegions : public EngineConformance {
     return d;
   }
 
-  // Of `samples` along each axis, a little fewer along others; waves, of floats here and there no
-  // number at all.
+  // Inserts a grid with `samples` along one axis and a little fewer along the others; its values
+  // are waves, and floats are NaN or −∞ here and there.
   void PutGrid(SampleFormat format, uint32_t samples) {
     SampleHead head = {};
     for (uint32_t a = 0; a < 3; ++a) head.size[a] = samples - a;
@@ -117,14 +117,14 @@ class CrowdedRegions : public EngineConformance {
 INSTANTIATE_TEST_SUITE_P(Engines, CrowdedRegions, testing::ValuesIn(EngineCases()),
                          [](const auto& info) { return info.param.name; });
 
-// Regions have 32×32×16 voxels: here some are whole, some end with the volume.
+// Regions have 32×32×16 voxels: here some are whole, and some end with the volume.
 TEST_P(CrowdedRegions, SolidsOfEverySize) {
   constexpr int32_t kSide = 52;
   PutSolids();
   for (const uint64_t layer : {1, 2}) PutLayer(layer);
   scene_.layers[2].opacity = 160;
   for (uint64_t id = 1; id <= 240; ++id) {
-    // From less than a voxel to far more than what is small.
+    // From less than a voxel to far above the threshold for small ones.
     const double size = id % 4 == 0 ? 0.3 : id % 4 == 1 ? 3 : id % 4 == 2 ? 6 : 9;
     DrawableRecord& d = PutSolid(id, 1 + id % 2, 0.5 * size, size);
     for (int a = 0; a < 3; ++a) d.transform.m[a * 4 + 3] = Random(-3, kSide + 3);
@@ -132,7 +132,7 @@ TEST_P(CrowdedRegions, SolidsOfEverySize) {
   EXPECT_GT(CountLit(DrawnLikeOracle(scene_, CubeTarget(kSide))), 10'000u);
 }
 
-// More of them than a block of threads has room for at once, and than one has threads.
+// More than fit into a block of threads at once, and more than a block has threads.
 TEST_P(CrowdedRegions, ManySolidsInOneRegion) {
   constexpr int32_t kSide = 40;
   PutSolids();
@@ -149,9 +149,10 @@ TEST_P(CrowdedRegions, FilledMeshesWithFullTilesAndNone) {
   constexpr uint32_t kCorners[6][6] = {{0, 1, 3, 0, 3, 2}, {4, 5, 7, 4, 7, 6}, {0, 1, 5, 0, 5, 4},
                                        {2, 3, 7, 2, 7, 6}, {0, 2, 6, 0, 6, 4}, {1, 3, 7, 1, 7, 5}};
   PutLayer(1);
-  // Two boxes far apart, tiles between them; one over both; one in one tile; one beyond the volume.
+  // Two boxes far apart, with tiles between them; one over both; one in a single tile; one beyond
+  // the volume.
   const struct {
-    uint64_t id;  // of its geometry
+    uint64_t id;  // the id of its geometry
     float corner[2][3];
   } boxes[] = {{1, {{1, 2, 3}, {40.4f, 50, 36}}},
                {1, {{70, 60.2f, 65}, {83, 81, 79.6f}}},

@@ -1,4 +1,5 @@
-// Layers of many solids that move as one, with everything that may happen between two moves.
+// Tests layers of many solids that move as one, with every change that may happen between two
+// moves.
 #include <algorithm>
 #include <cstdint>
 #include <random>
@@ -30,7 +31,7 @@ class Crowds : public EngineConformance {
       scene_.layers[layer].order = static_cast<int32_t>(layer);
     }
     for (uint64_t id = 1; id <= kMany; ++id) Put(id, 1);
-    Put(kMany + 1, 2);  // one that is alone
+    Put(kMany + 1, 2);  // one that moves alone
   }
 
   double Random(double low, double high) {
@@ -47,7 +48,7 @@ class Crowds : public EngineConformance {
     }
     return d;
   }
-  // All of it, drawn once.
+  // Draws the whole scene once.
   void PutUp(EngineDriver& engine, const SceneModel& scene, const Target& target) {
     ASSERT_TRUE(engine.SetTarget(target).ok());
     DeltaBuffer whole;
@@ -55,7 +56,7 @@ class Crowds : public EngineConformance {
     ASSERT_TRUE(engine.Apply(whole).ok());
     ExpectLikeOracle(engine, scene, target);
   }
-  // Turns, stretches and shifts it, by a little.
+  // Turns, stretches and shifts it a little.
   LayerRecord& Move(uint64_t id) {
     LayerRecord& layer = scene_.layers[id];
     for (int a = 0; a < 3; ++a) {
@@ -65,7 +66,7 @@ class Crowds : public EngineConformance {
     }
     return layer;
   }
-  // Of one frame: what has come to pass since the last one.
+  // Makes the changes of one frame.
   void Change(DeltaBuffer& delta) {
     switch (random_() % 9) {
       case 0:
@@ -75,7 +76,7 @@ class Crowds : public EngineConformance {
         if (scene_.drawables.erase(id) > 0) delta.Drop(Op::kDropDrawable, id);
         return;
       }
-      case 2:  // goes to the other layer, or comes from there
+      case 2:  // moves to the other layer, or comes from there
         return delta.Put(Put(1 + random_() % kMany, 1 + random_() % 2));
       case 3:
         scene_.layers[1].visible ^= 1;
@@ -85,7 +86,7 @@ class Crowds : public EngineConformance {
         return delta.Put(scene_.layers[1]);
       case 5:
         return delta.Put(Move(2));
-      case 6: {  // flat: nothing of it has an inverse
+      case 6: {  // flat: none of its transforms has an inverse
         LayerRecord& layer = Move(1);
         for (int i = 0; i < 3; ++i) layer.transform.m[8 + i] *= 1e-310;
         return delta.Put(layer);
@@ -115,7 +116,7 @@ TEST_P(Crowds, MoveLikeTheOracle) {
   }
 }
 
-// A look that changes, however often, moves none of them; nor does hiding and showing.
+// Changes of style, however many, move no solid; nor do hiding and showing.
 TEST_P(Crowds, LookOtherwiseWhereTheyAre) {
   const Target target = CubeTarget(kSide);
   EngineDriver engine = Make();
@@ -172,7 +173,7 @@ TEST_P(Crowds, HiddenOnesThatMoveDrawNothingAnew) {
   }
 }
 
-// One masks another layer, seen or not, and is masked itself.
+// A layer masks another, whether it is visible or not, and is masked itself.
 TEST_P(Crowds, MaskAndAreMasked) {
   const Target target = CubeTarget(kSide);
   scene_.geometries[4] = SolidBox(4, {24, 24, 24}, {40, 36, 30}, 0x3060FF);
@@ -185,7 +186,7 @@ TEST_P(Crowds, MaskAndAreMasked) {
     DeltaBuffer delta;
     LayerRecord& crowd = Move(1);
     crowd.visible = move % 3 != 1;
-    crowd.has_mask = move > 2 ? 1 : 0;  // now and then by the one that it masks
+    crowd.has_mask = move > 2 ? 1 : 0;  // now and then by the layer that it masks
     crowd.mask = 3;
     delta.Put(crowd);
     ASSERT_TRUE(engine.Apply(delta).ok());
@@ -199,7 +200,8 @@ TEST_P(Crowds, AreForgottenAndComeAnew) {
   PutUp(engine, scene_, target);
   for (int round = 0; round < 3; ++round) {
     SCOPED_TRACE(round);
-    // A move that is never drawn, and then all of it anew, or only what is alone.
+    // A move that is never drawn, followed by a change of everything, or only of the solid that
+    // moves alone.
     DeltaBuffer delta;
     delta.Put(Move(1));
     delta.Reset();
@@ -218,7 +220,7 @@ TEST_P(Crowds, AreForgottenAndComeAnew) {
   }
 }
 
-// More of them than there is room for lists of their own, at first where none of them is seen.
+// More layers than there is room for lists of their own; at first none of them is visible.
 TEST_P(Crowds, MayBeOfManyLayers) {
   constexpr uint64_t kLayers = 40;
   const Target target = CubeTarget(kSide);
@@ -266,7 +268,7 @@ TEST_P(Crowds, StayRightWhateverHappensToThem) {
       DeltaBuffer delta;
       Change(delta);
       if (delta.bytes().empty()) continue;
-      ASSERT_TRUE(engine.Apply(delta).ok());  // several may come before they are drawn
+      ASSERT_TRUE(engine.Apply(delta).ok());  // several may be applied before they are drawn
     }
     if (frame % 16 == 15) {
       for (double& m : target.view.m) m *= 1.0625;

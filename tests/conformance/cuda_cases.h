@@ -1,4 +1,4 @@
-// The CUDA engine in this process, in its several ways.
+// The CUDA engine in this process, with several tunings.
 #pragma once
 
 #include <string>
@@ -9,7 +9,8 @@
 
 namespace voxeld::gpu::conformance {
 
-// Unless `few`, each of its ways by itself. `formulas`: of the first, the others compile none.
+// Returns one case, or, unless `few`, one for each way of drawing. `formulas` is for the first; the
+// others compile none.
 inline std::vector<EngineCase> CudaCases(const std::string& name, bool few,
                                          cuda::CompileFormulas formulas) {
   const auto tuned = [&](const char* how, const cuda::Tuning& tuning) {
@@ -19,7 +20,7 @@ inline std::vector<EngineCase> CudaCases(const std::string& name, bool few,
   };
   cuda::Tuning plain;
   plain.compile_formulas = formulas;
-  // In groups, as large scenes are.
+  // With groups, as large scenes have.
   cuda::Tuning groups;
   groups.few_items = 0;
   groups.group_bytes = 1;
@@ -27,7 +28,7 @@ inline std::vector<EngineCase> CudaCases(const std::string& name, bool few,
   groups.points_each = 1;
   groups.least_crowd = 1;
   groups.compile_formulas = cuda::CompileFormulas::kNever;
-  // With no list at all; and with none that stays.
+  // Without any list; and without lists that are kept.
   cuda::Tuning tight = groups, passes = groups;
   passes.points_each = 4;
   tight.index_bytes = 1;

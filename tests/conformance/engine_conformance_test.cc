@@ -1,4 +1,5 @@
-// Any engine against the oracle, and against itself in parts, threads and steps.
+// Compares each engine with the oracle, and with itself when work is split into parts, threads and
+// steps.
 #include <algorithm>
 #include <optional>
 #include <utility>
@@ -140,7 +141,7 @@ TEST_P(EngineConformance, ThousandDeltasEqualTheSceneDrawnWhole) {
     const absl::StatusOr<FrameResult> frame = engine.Frame();
     ASSERT_TRUE(frame.ok()) << frame.status();
     EXPECT_EQ(frame->frame, engine.frame());
-    // The numbers say exactly which pictures changed.
+    // The picture numbers say exactly which pictures changed.
     bool changed = before.empty();
     for (size_t p = 0; p < changed_in.size() && !before.empty(); ++p) {
       const auto at = static_cast<ptrdiff_t>(p * size);
@@ -156,7 +157,7 @@ TEST_P(EngineConformance, ThousandDeltasEqualTheSceneDrawnWhole) {
     const std::vector<uint32_t> voxels = engine.Voxels();
     EXPECT_EQ(frame->lit_voxels, CountLit(voxels));
     lit += frame->lit_voxels;
-    // By an engine that has forgotten all, now and then by a new one.
+    // Drawn by an engine that has forgotten everything, now and then by a new one.
     if (step % 50 == 1) whole.emplace(Make({.threads = 1, .inline_execution = true}));
     ASSERT_TRUE(whole->SetTarget(target).ok());
     DeltaBuffer everything;
@@ -170,7 +171,7 @@ TEST_P(EngineConformance, ThousandDeltasEqualTheSceneDrawnWhole) {
   }
   EXPECT_EQ(compared, DeltasWanted());
   std::cout << lit << " voxels lit in all frames\n";
-  // Few deltas, as under a tool, may light next to nothing.
+  // A few deltas, as when run under a tool, may light next to nothing.
   EXPECT_GT(lit, DeltasWanted() < 1000 ? 0u : static_cast<uint64_t>(DeltasWanted()) * 10);
   ASSERT_EQ(engine.Frame().status(), absl::OkStatus());
   const DenseVolume want = OracleVoxels(scene, target);
@@ -186,7 +187,7 @@ TEST_P(EngineConformance, NewTargetsDrawTheSameSceneAnew) {
   DeltaBuffer delta;
   delta.PutWhole(scene);
   EngineDriver engine = Make();
-  ASSERT_TRUE(engine.Apply(delta).ok());  // may come before the first target
+  ASSERT_TRUE(engine.Apply(delta).ok());  // may precede the first target
   for (int i = 0; i < 12; ++i) {
     SCOPED_TRACE(i);
     const Target target = generator.RandomTarget();

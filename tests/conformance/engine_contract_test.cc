@@ -1,4 +1,4 @@
-// What gpu/engine.h promises about calls, errors, buffers, and cost.
+// Tests the contract of gpu/engine.h on calls, errors, buffers, and cost.
 #include <algorithm>
 #include <limits>
 #include <map>
@@ -9,7 +9,7 @@
 namespace voxeld::gpu::conformance {
 namespace engine_contract_test {
 
-// A stack of slices, a voxel a pixel: 48 × 48 × 32, so 3 × 3 × 2 tiles of 16.
+// Returns a stack of slices with one voxel a pixel: 48 × 48 × 32, so 3 × 3 × 2 tiles of 16.
 Target StackTarget() {
   Target target;
   display::PlanarStack stack;
@@ -108,7 +108,7 @@ TEST_P(EngineContract, OnlyChangedTilesAndTheirSlicesAreDrawn) {
   const FrameResult frame = MustFrame();
   EXPECT_TRUE(frame.changed);
   EXPECT_EQ(frame.tiles_drawn, 1u);
-  // Those that look at 16 layers of voxels, and a neighbour or two.
+  // Pictures that look at 16 layers of voxels, and one or two neighbours.
   EXPECT_LE(frame.pictures_drawn, 18u);
   int changed = 0;
   for (uint64_t number : engine_.changed_in()) changed += number == 2;
@@ -126,7 +126,7 @@ TEST_P(EngineContract, LayerChangesDrawOnlyTheTilesOfTheLayer) {
   FrameResult frame = MustFrame();
   EXPECT_EQ(frame.tiles_drawn, 1u);
   EXPECT_EQ(frame.lit_voxels, 1u);
-  // Hidden, it costs nothing however it changes.
+  // While the layer is hidden, its changes cost nothing.
   layer.order = 7;
   Put(layer);
   scene_.drawables[1].transform.m[3] = 2;
@@ -210,7 +210,7 @@ TEST_P(EngineContract, AMalformedDeltaChangesNothing) {
   std::map<std::string, DeltaBuffer> bad;
   const auto begin = [&](const char* name) -> DeltaBuffer& {
     DeltaBuffer& delta = bad[name];
-    delta.Drop(Op::kDropDrawable, 1);  // would be seen
+    delta.Drop(Op::kDropDrawable, 1);  // would be visible
     return delta;
   };
   begin("unknown drawable").Drop(Op::kDropDrawable, 9);
@@ -232,7 +232,7 @@ TEST_P(EngineContract, AMalformedDeltaChangesNothing) {
     EXPECT_EQ(frame.tiles_drawn, 0u);
     EXPECT_TRUE(engine_.pictures() == pictures);
   }
-  // Cut off anywhere, too.
+  // Truncated at any place, too.
   const DeltaBuffer whole = Whole(TwoDots());
   for (size_t size = 1; size < whole.bytes().size(); size += 8) {
     if (size % 16 == 0) continue;
@@ -268,7 +268,8 @@ TEST_P(EngineContract, StagingIsLimitedAndComesBack) {
   }
   EXPECT_EQ(engine.engine().AcquireStaging(4097).status().code(),
             absl::StatusCode::kResourceExhausted);
-  // What has been applied holds none of it, however often it is replaced.
+  // The engine holds none of the memory after a delta has been applied, however often it is
+  // replaced.
   for (int i = 0; i < 3; ++i) {
     DeltaBuffer delta;
     delta.Reset();
@@ -323,14 +324,14 @@ TEST_P(EngineContract, BadTargetsAreRefusedAndTheOldOneStays) {
   EXPECT_FALSE(MustFrame().changed);
 }
 
-// Brighter or darker, pictures that stay as they were keep their numbers.
+// When the tone changes, pictures that stay as they were keep their numbers.
 TEST_P(EngineContract, ANewToneKeepsBlackPictures) {
   MustFrame();
   Target darker = target_;
   for (display::Tone::Curve& curve : darker.tone.lut) {
     for (uint16_t& light : curve) light /= 2;
   }
-  // By hand, since the driver's SetTarget forgets what its buffer holds.
+  // Without the driver, since its SetTarget forgets what its buffer holds.
   std::vector<std::byte> bytes(target_.layout.bytes());
   std::vector<uint64_t> numbers(target_.layout.pictures());
   ASSERT_TRUE(engine_.SetTarget(darker).ok());
@@ -357,7 +358,7 @@ TEST_P(EngineContract, VoxelsOfAnyBoxCanBeRead) {
   EXPECT_EQ(answer.code(), absl::StatusCode::kInvalidArgument);
 }
 
-// Each call is answered once, in order, also when the engine goes in the middle.
+// Each call is answered once, in order, also when the engine is destroyed in between.
 TEST_P(EngineContract, EveryCallIsAnsweredOnceAndInOrder) {
   std::vector<int> answers;
   {

@@ -9,7 +9,7 @@
 namespace voxeld::gpu::conformance {
 namespace {
 
-// An answer that is waited for.
+// Waits for the answer of an asynchronous call.
 template <typename T>
 class Answer {
  public:

@@ -1,4 +1,4 @@
-// An engine whose calls wait for their answers, as tests want them.
+// An engine whose calls block until they are answered, for tests.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +31,7 @@ class EngineDriver {
   absl::Status Apply(const DeltaBuffer& delta);
   absl::Status ApplyBytes(std::span<const std::byte> delta, std::vector<BulkBlock> referred = {});
 
-  // A frame in a buffer of its own, which holds the frame before.
+  // Draws a frame into a buffer of its own, which holds the previous frame.
   absl::StatusOr<FrameResult> Frame();
   absl::StatusOr<FrameResult> Frame(const FrameRequest& request, FrameBuffer buffer);
   std::vector<uint32_t> Voxels();  // of the whole grid

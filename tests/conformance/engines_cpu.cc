@@ -5,14 +5,14 @@ namespace voxeld::gpu::conformance {
 std::vector<EngineCase> EngineCases() {
   return {
       CaseOf("cpu", EngineKind::kCpu, false),
-      // Most of a scene in passes, of few items.
+      // Draws most of a scene in passes of few items.
       {"cpu_tight",
        [](EngineOptions options) {
          options.kind = EngineKind::kCpu;
          options.index_bytes = 1 << 16;
          return CreateEngine(options);
        }},
-      // Most of it unlisted.
+      // Keeps most of a scene out of the lists.
       {"cpu_unlisted",
        [](EngineOptions options) {
          options.kind = EngineKind::kCpu;

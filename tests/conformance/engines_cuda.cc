@@ -1,4 +1,4 @@
-// Of a program of its own, for machines with a GPU.
+// The engines of a separate program, for machines with a GPU.
 #include "tests/conformance/cuda_cases.h"
 
 namespace voxeld::gpu::conformance {

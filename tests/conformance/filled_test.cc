@@ -1,4 +1,5 @@
-// What meshes enclose, against what can be counted or worked out without them. Random ones are among the random scenes.
+// Compares the voxels inside meshes with counts that are known or computed without them. Random
+// meshes are among the random scenes.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -66,7 +67,7 @@ ModelGeometry Filled() {
   return mesh;
 }
 
-// Bands from pole to pole, every second triangle turned.
+// Returns a ball: bands from pole to pole, with every second triangle reversed.
 ModelGeometry Ball(double radius, double middle) {
   constexpr uint32_t kBands = 90, kAround = 180;
   ModelGeometry mesh = Filled();
@@ -93,7 +94,8 @@ TEST_P(FilledMeshes, ABallHasItsVolumeAndIsWhereItIs) {
   const std::vector<uint32_t> voxels = Draw(Ball(kRadius, kMiddle));
   const double volume = 4.0 / 3 * std::numbers::pi * kRadius * kRadius * kRadius;
   EXPECT_NEAR(static_cast<double>(CountLit(voxels)), volume, 0.01 * volume);
-  // Its facets lie up to 0.02 voxels below the ball's surface, snapped corners move less than 0.01.
+  // Its facets lie up to 0.02 voxels below the ball's surface; snapping moves corners by less than
+  // 0.01.
   for (int z = 0; z < kSize; ++z) {
     for (int y = 0; y < kSize; ++y) {
       for (int x = 0; x < kSize; ++x) {
@@ -145,15 +147,15 @@ TEST_P(FilledMeshes, WhatIsInTheOtherIsHollowAndWhatIsOutsideOfTheVolumeCounts) 
   AddCube(mesh, 10, 20);
   AddCube(mesh, 12, 14);
   EXPECT_EQ(CountLit(Draw(mesh)), 40u * 40 * 40 - 10 * 10 * 10 + 2 * 2 * 2);
-  // Far larger than what is multiplied in 64 bits.
+  // Far larger than the products that fit in 64 bits.
   ModelGeometry all = Filled();
   AddCube(all, -3e8, 3e8);
   EXPECT_EQ(CountLit(Draw(all)), uint64_t{kSize} * kSize * kSize);
 }
 
 TEST_P(FilledMeshes, RowsThatAreNotClosedHaveNoInside) {
-  // Without its side at x = 30 a cube has none at all; without that at z = 5 nothing changes, as rows lie
-  // along x.
+  // Without its side at x = 30, a cube has no inside; without the side at z = 5 nothing changes,
+  // since rows lie along x.
   ModelGeometry cube = Filled();
   AddCube(cube, 5, 30);
   ModelGeometry open = cube;
@@ -162,7 +164,7 @@ TEST_P(FilledMeshes, RowsThatAreNotClosedHaveNoInside) {
   EXPECT_EQ(CountLit(Draw(open)), 0u);
   open.indices.assign(cube.indices.begin() + 6, cube.indices.end());
   EXPECT_EQ(CountLit(Draw(open)), 25u * 25 * 25);
-  // Nor where the side that is missing lies outside of the volume.
+  // Nor does it have one if the missing side is outside the volume.
   ModelGeometry large = Filled();
   AddCube(large, -5, 300);
   EXPECT_EQ(CountLit(Draw(large)), uint64_t{kSize} * kSize * kSize);

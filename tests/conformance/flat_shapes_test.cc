@@ -1,5 +1,5 @@
-// Flat shapes as what they are, places in a plane and within a rim, and ellipsoids and arrows by their true distances; in double
-// precision, on every engine.
+// Compares flat shapes with their definition, places in a plane and within a rim, and ellipsoids
+// and arrows with their true distances; in double precision, on every engine.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -25,9 +25,10 @@ using implicit::Length;
 
 constexpr int32_t kSize = 48;
 constexpr double kMargin = 6e-3;  // voxels: origins are snapped to 2⁻⁸ voxel
-constexpr double kRim = 2e-2;     // the same, of what lies aslant over a rim
+constexpr double kRim = 2e-2;     // the same, where something lies obliquely over a rim
 
-// Of a place, from what is meant: its height over the plane; in the plane how far inside of the rim, negative outside.
+// The relation of a point to a flat shape: its height over the plane, and how far inside the rim it
+// lies in the plane; negative outside.
 struct InPlane {
   double height, depth;
 };
@@ -42,15 +43,16 @@ double SegmentDistance(const Vector& p, const Vector& a, const Vector& b) {
   return Length(p - (a + t * (b - a)));
 }
 
-// The axis that is nearest to a direction.
+// Returns the axis that is nearest to a direction.
 Vector NearestAxis(const Vector& v) {
   const double x = std::fabs(v.x), y = std::fabs(v.y), z = std::fabs(v.z);
   if (x > std::max(y, z)) return {1, 0, 0};
   return y > z ? Vector{0, 1, 0} : Vector{0, 0, 1};
 }
 
-// What is over the plane belongs to the place in it that it comes to along `fall`.
-// By the even-odd rule: how often a ray in the plane meets the curves. `u` and `v` are unit vectors in it, at right angles.
+// A point over the plane belongs to the place that it reaches in the plane along `fall`. Inside is
+// decided by the even-odd rule: how often a ray in the plane meets the curves. `u` and `v` are
+// orthogonal unit vectors in the plane.
 InPlane InPolygon(const Vector& p, const std::vector<Vector>& points,
                   const std::vector<uint32_t>& ends, const Vector& u, const Vector& v,
                   const Vector& fall) {
@@ -109,7 +111,8 @@ std::vector<FlatCase> FlatCases(const GeometryRecord& look) {
            {11, 5},
            {9, 11}},
           {4, 7, 10});
-  // A star drawn in one go, whose middle is outside; and a bow, whose two halves turn either way.
+  // A star drawn in one stroke, whose middle is outside; and a bow whose two halves have opposite
+  // orientation.
   std::vector<std::array<double, 2>> star;
   for (int i = 0; i < 5; ++i)
     star.push_back({17 * std::sin(i * 2.513274123), 17 * std::cos(i * 2.513274123)});
@@ -142,7 +145,7 @@ TEST_P(FlatShapes, EndAtTheirRims) {
         const Placement placed = Placed(0.7, 0.95, kSize / 2, 0.3);
         const Drawn drawn = Draw(c.geometry, placed.map);
         const double half = thickness / 2.0;
-        // A neighbour on the other side of the plane is no nearer.
+        // A neighbour on the other side of the plane must not be nearer.
         const double most =
             std::max(half, rule == SurfaceRule::kThin ? 0.5 : kHalfDiagonal) + kMargin;
         uint64_t lit = 0, far = 0, beyond = 0, missing = 0;
@@ -165,7 +168,7 @@ TEST_P(FlatShapes, EndAtTheirRims) {
   }
 }
 
-// No step leads from one side of the plane to the other through what is well within the rim.
+// Well within the rim, no step leads through dark voxels from one side of the plane to the other.
 TEST_P(FlatShapes, HaveNoHolesWithinTheirRims) {
   for (const SurfaceRule rule : {SurfaceRule::kThin, SurfaceRule::kCover}) {
     for (const FlatCase& c : FlatCases({.rule = rule})) {
@@ -202,8 +205,8 @@ class RoundShapes : public PlacedShapes {
 INSTANTIATE_TEST_SUITE_P(Engines, RoundShapes, testing::ValuesIn(EngineCases()),
                          [](const auto& info) { return info.param.name; });
 
-// The true distance from an ellipsoid around the origin: the greatest root of Σ (r·p / (t + r²))² = 1 gives the nearest place,
-// r²·p / (t + r²); by bisection. Negative inside.
+// Returns the true distance from an ellipsoid around the origin: the greatest root of Σ (r·p / (t +
+// r²))² = 1 gives the nearest place, r²·p / (t + r²); found by bisection. Negative inside.
 double EllipsoidDistance(const Vector& p, const Vector& radii) {
   const auto sum = [&](double t) {
     double all = 0;
@@ -230,8 +233,8 @@ TEST_P(RoundShapes, EllipsoidsShellsAreAsThickAsTheyAreSaidToBe) {
       const Drawn drawn = Draw(
           FieldGeometry(Ellipsoid{{}, radii}, {.rule = rule, .thickness = thickness}), placed.map);
       const double half = thickness / 2.0;
-      // To first order |P| / |∇P| is the distance: as P is convex, it is never more than that outside, and inside more by what the
-      // surface bends.
+      // To first order, |P| / |∇P| is the distance: since P is convex, it is never greater than the
+      // distance outside, and inside it is greater by the surface's bend.
       const double bend = half * half / (2 * placed.scale * 12 * 12 / 22);
       uint64_t lit = 0, far = 0, missing = 0;
       drawn.ForEach([&](int32_t x, int32_t y, int32_t z) {
@@ -250,7 +253,7 @@ TEST_P(RoundShapes, EllipsoidsShellsAreAsThickAsTheyAreSaidToBe) {
   }
 }
 
-// From the outline of an arrow in the half-plane of its axis: (across, along).
+// Returns the distance from the outline of an arrow in the half-plane of its axis: (across, along).
 double ArrowDistance(double across, double along,
                      const std::vector<std::array<double, 2>>& outline) {
   double nearest = 1e9;
@@ -294,7 +297,7 @@ TEST_P(RoundShapes, ArrowsAreShaftsWithHeads) {
           return;
         }
         wrong += !here && std::fabs(d) < half - kMargin;
-        // Shells are mitred past edges: of the head's rim, and of its tip.
+        // Shells are mitred beyond edges: those of the head's rim, and of its tip.
         const bool rim = std::hypot(across - 9, along - (length - 13)) < 8 || along > length - 2 ||
                          std::hypot(across - 4, along) < 5;
         far += here && !rim && std::fabs(d) > half + kHalfDiagonal + kMargin;

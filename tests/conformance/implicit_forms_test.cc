@@ -1,6 +1,7 @@
-// Every built-in surface that is drawn by the general method equals its own implicit form, an expression that is read as a client's
-// is. What differs from that lies where kError decides: whether a voxel is within the shell, or which of two neighbours on either
-// side is nearer; and of rims that are closed curves, where kRimError does.
+// Every built-in surface that is drawn by the general method equals its own implicit form, an
+// expression that is parsed like a client's. They may differ only where kError decides whether a
+// voxel is within the shell, or which of two neighbours on either side is nearer; and, for rims
+// that are closed curves, where kRimError does.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -26,13 +27,14 @@ namespace voxeld::gpu::conformance {
 namespace implicit_forms_test {
 
 constexpr int32_t kSize = 48;
-// Voxels: a dozen roundings of 2⁻²⁴ (docs/expressions.md) of numbers below 100. Places are snapped to 2⁻⁸ voxel
-// (gpu/primitives/solid.h), so the origin is at such a one.
+// In voxels: a dozen roundings of 2⁻²⁴ (docs/expressions.md) of numbers below 100. Places are
+// snapped to 2⁻⁸ voxel (gpu/primitives/solid.h), so the origin is a multiple of that.
 constexpr double kError = 1e-4;
-// Voxels: what a polygon's rim is said to keep to (gpu/primitives/polygon.h).
+// In voxels: the accuracy that gpu/primitives/polygon.h states for a polygon's rim.
 constexpr double kRimError = 0.02;
 
-// An expression as it is written, so that one function gives both text and numbers.
+// Builds an expression in the form in which it is written, so that one function gives both text and
+// numbers.
 struct Words {
   std::string text;
   Words(std::string words) : text(std::move(words)) {}                // NOLINT
@@ -90,7 +92,7 @@ Form Flat(std::string name, const Shape& shape, Surface p, Bound bound) {
   form.solid = false;
   return form;
 }
-// Of the two squares, one within the other, that HollowSquare makes.
+// The expression for the two squares, one within the other, that HollowSquare makes.
 template <typename Surface>
 Form Hollow(std::string name, bool solid, std::function<FieldShape(Graph&)> make, Surface p) {
   struct None {
@@ -103,7 +105,7 @@ Form Hollow(std::string name, bool solid, std::function<FieldShape(Graph&)> make
   form.bound_error = kRimError;
   return form;
 }
-// A shape of two closed curves: squares of 15 and 7 from middle to side, z a quarter of x.
+// A shape of two closed curves: squares of 15 and 7 from middle to side; z is a quarter of x.
 template <typename Shape>
 FieldShape HollowSquare(Graph& g, Shape shape) {
   std::vector<Vector> points;
@@ -134,14 +136,14 @@ std::vector<Form> Forms() {
             [](auto x, auto y, auto z) {
               return Max(Norm(x - 1.0, y - 2.0) - 8.0, Abs(z - 2.0) - 11.0);
             }),
-      // A right-angled triangle of 10, 24 and 26 goes around its axis.
+      // A right-angled triangle with sides 10, 24 and 26, rotated about its axis.
       Solid("cone", Cone{{1, 2, -9}, {1, 2, 15}, 10, 0},
             [](auto x, auto y, auto z) {
               const auto across = Norm(x - 1.0, y - 2.0);
               return Max(Max((24.0 * across + 10.0 * (z - 15.0)) / 26.0, across - 10.0),
                          Abs(z - 3.0) - 12.0);
             }),
-      // Along (3, 4, 12), which is 13 long; its radius falls by 5 in 12.
+      // Along (3, 4, 12), which is 13 long; its radius decreases by 5 in 12.
       Solid("slanting cone", Cone{{-1.5, -2, -6}, {1.5, 2, 6}, 12, 12 - 65.0 / 12},
             [](auto x, auto y, auto z) {
               const auto along = (3.0 * x + 4.0 * y + 12.0 * z) / 13.0;
@@ -151,13 +153,13 @@ std::vector<Form> Forms() {
                   Max((12.0 * across + 5.0 * (along + 6.5)) / 13.0 - 144 / 13.0, across - 12.0),
                   Abs(along) - 6.5);
             }),
-      // Balls at both ends, and what is between these.
+      // Balls at both ends, and the body between them.
       Solid("capsule", Cone{{0, 0, -8}, {0, 0, 10}, 9, 9, true},
             [](auto x, auto y, auto z) {
               const auto balls = Min(Norm(x, y, z + 8.0), Norm(x, y, z - 10.0)) - 9.0;
               return Min(balls, Max(Norm(x, y) - 9.0, Abs(z - 1.0) - 9.0));
             }),
-      // Its mantle's normal is (24, 7) / 25.
+      // The normal of its side is (24, 7) / 25.
       Solid("capsule with two radii", Cone{{0, 0, -12}, {0, 0, 13}, 12, 5, true},
             [](auto x, auto y, auto z) {
               const auto across = Norm(x, y), foot = z + 12.0 - across * (7 / 24.0);
@@ -171,7 +173,7 @@ std::vector<Form> Forms() {
                   Max(Abs((x - 1.0) * (20 / root) - y * (6 / root)) - 240 / root, Abs(y) - 10.0),
                   Abs(z + 1.0) - 8.0);
             }),
-      // A head of 12 by 9, which the shaft goes into by half.
+      // A head of 12 by 9, into which the shaft reaches half-way.
       Solid("arrow", Arrow{{0, 0, -16}, {0, 0, 16}, 4, 12, 9},
             [](auto x, auto y, auto z) {
               const auto across = Norm(x, y);
@@ -207,7 +209,7 @@ std::vector<Form> Forms() {
   };
 }
 
-// What a rule says of a voxel; nothing where kError decides.
+// Decides whether a voxel is lit; nullopt where kError decides.
 class Rule {
  public:
   Rule(const Form& form, const Placement& placed, const GeometryRecord& look)

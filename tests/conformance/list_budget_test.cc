@@ -1,4 +1,4 @@
-// Scenes for whose lists, by region and by tile, the CUDA engine may not take enough memory.
+// Tests scenes whose lists, by region and by tile, need more memory than the CUDA engine may take.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -33,7 +33,7 @@ Target StackOf(int32_t width, int32_t height, int32_t slices) {
   return target;
 }
 
-// Of one or two colours each, here and there beyond the volume.
+// Inserts lines of one or two colours each, some of them beyond the volume.
 void PutLines(SceneModel& scene, uint64_t id, uint64_t layer, uint32_t lines, float length,
               const display::VoxelGrid& grid) {
   std::mt19937_64 random(id);
@@ -60,10 +60,10 @@ void PutLines(SceneModel& scene, uint64_t id, uint64_t layer, uint32_t lines, fl
   scene.drawables[id] = {.id = id, .geometry = id, .layer = layer, .priority = 1};
 }
 
-// Of one or two colours each, less than `extent` wide.
+// Inserts triangles of one or two colours each, less than `extent` wide.
 void PutTriangles(SceneModel& scene, uint64_t id, uint64_t layer, uint32_t triangles, float extent,
                   const display::VoxelGrid& grid) {
-  // What goes to and fro as a line does is a triangle with a third corner.
+  // A line followed to and fro is a triangle with a third corner.
   PutLines(scene, id, layer, triangles, extent / 2, grid);
   ModelGeometry& g = scene.geometries[id];
   std::mt19937_64 random(id);
@@ -82,14 +82,14 @@ void PutTriangles(SceneModel& scene, uint64_t id, uint64_t layer, uint32_t trian
   g.record.vertex_count = 3 * triangles;
 }
 
-// Ends of such lines.
+// Inserts the end points of such lines.
 void PutPoints(SceneModel& scene, uint64_t id, uint64_t layer, uint32_t points,
                const display::VoxelGrid& grid) {
   PutLines(scene, id, layer, points / 2, 20, grid);
   scene.geometries[id].record.kind = PrimitiveKind::kPoints;
 }
 
-// Thick ones: in pairs with the tiles that they touch.
+// Inserts thick lines: they are listed in pairs with the tiles that they touch.
 void PutCapsules(SceneModel& scene, uint64_t id, uint64_t layer, uint32_t lines, float length,
                  const display::VoxelGrid& grid) {
   PutLines(scene, id, layer, lines, length, grid);
@@ -115,7 +115,7 @@ EngineCase CaseWith(const cuda::Tuning& tuning, const cuda::FaultPlan& faults = 
           }};
 }
 
-// A scene as it should be drawn.
+// The expected result of a scene.
 struct Drawn {
   DeltaBuffer delta;
   DenseVolume voxels;
@@ -137,13 +137,13 @@ void ExpectDrawn(EngineDriver& engine, const SceneModel& scene, const Target& ta
 
 constexpr uint64_t kPlenty = uint64_t{1} << 30;
 
-// What is put into a scene of two layers and drawn under several budgets.
+// Items that are put into a scene of two layers and drawn under several budgets.
 struct Kind {
   const char* name;
   void (*put)(SceneModel& scene, const display::VoxelGrid& grid);
   int32_t slices;
   std::vector<uint64_t> budgets;
-  uint64_t lists;      // that are larger than all budgets, and than this
+  uint64_t lists;      // whose bytes are more than all budgets, and more than this
   uint32_t for_lists;  // calls that take memory for them, of few
 };
 void PrintTo(const Kind& kind, std::ostream* out) { *out << kind.name; }
@@ -200,7 +200,7 @@ const Kind kKinds[] = {
      7},
 };
 
-// Of a budget, what may be kept.
+// The part of a budget that may be kept.
 constexpr double kShares[] = {0.0, 0.5};
 
 class ListBudgetOf : public testing::TestWithParam<Kind> {
@@ -242,7 +242,7 @@ TEST_P(ListBudgetOf, WhateverItIsTheSameIsDrawnAndNoMoreMemoryTaken) {
   }
 }
 
-// Lists of some stay, others' do not fit; then they have room.
+// The lists of some stay and those of others do not fit; then they have room.
 TEST(ListBudget, SomeLinesWithinItAndSomeNot) {
   const Target target = StackOf(70, 60, 150);
   SceneModel scene;
@@ -290,7 +290,7 @@ TEST(ListBudget, SomeLinesWithinItAndSomeNot) {
   expect("without those in front");
 }
 
-// Points whose lists do not fit leave, one drawable after the other, and have room at last.
+// Points whose lists do not fit are removed, one drawable after the other, until the lists fit.
 TEST(ListBudget, PointsThatLeaveUntilTheyFit) {
   const Target target = StackOf(70, 60, 100);
   SceneModel scene;
@@ -318,7 +318,7 @@ TEST(ListBudget, PointsThatLeaveUntilTheyFit) {
   }
 }
 
-// There they go with the thin lines.
+// There they are drawn with the thin lines.
 TEST(ListBudget, PointsInMoreRegionsThanCanBeSorted) {
   const Target target = StackOf(16'384, 1, 833);  // 114,688
   SceneModel scene;
@@ -352,7 +352,7 @@ TEST(ListBudget, SomeTrianglesAndPairsWithinItAndSomeNot) {
 
   PutTriangles(scene, 3, 1, 6'000, 12, grid);
   PutTriangles(scene, 4, 2, 2'000, 12, grid);
-  PutCapsules(scene, 5, 1, 1'500, 6, grid);  // of more than one go
+  PutCapsules(scene, 5, 1, 1'500, 6, grid);  // more than one batch takes
   PutCapsules(scene, 6, 3, 60, 40, grid);
   for (uint64_t id = 10; id < 40; ++id) {
     const auto at = static_cast<float>(id);
@@ -396,15 +396,15 @@ TEST(ListBudget, SomeTrianglesAndPairsWithinItAndSomeNot) {
   expect("with some triangles again", fresh);
 }
 
-// Where there is no room to sweep out of the index of pairs what has gone, it is made anew.
+// Without room to remove old entries from the index of pairs, it is rebuilt.
 TEST(ListBudget, WhatHasGoneLeavesItsRoom) {
   const Target target = StackOf(40, 30, 70);
   const display::VoxelGrid& grid = target.geometry.grid;
-  constexpr uint32_t kCloud = 70'000;  // more than goes unswept
+  constexpr uint32_t kCloud = 70'000;  // more than may be removed without cleaning up
   SceneModel scene;
   PutCapsules(scene, 1, 1, 30, 8, grid);
   PutCapsules(scene, 2, 2, kCloud, 2, grid);
-  scene.layers[2].visible = 0;  // costs pairs, and no drawing
+  scene.layers[2].visible = 0;  // costs pairs, but no drawing
   EngineDriver engine(CaseWith({.few_items = 0, .index_bytes = 6'000'000, .index_share_kept = 0.9}),
                       {.threads = 1});
   ASSERT_TRUE(engine.SetTarget(target).ok());
@@ -424,7 +424,7 @@ TEST(ListBudget, WhatHasGoneLeavesItsRoom) {
       EXPECT_GT(greatest, 4'000'000u) << "the cloud needs no pairs";
     }
     EXPECT_LE(frame->memory_bytes, greatest + 8'000'000);
-    // Another cloud in place of this one, and something to be seen.
+    // Another cloud in place of this one, and something visible.
     const uint64_t cloud = round == 0 ? 2 : 100 + round - 1, ball = 200 + round;
     scene.drawables.erase(cloud);
     scene.geometries.erase(cloud);
@@ -441,7 +441,7 @@ TEST(ListBudget, WhatHasGoneLeavesItsRoom) {
   }
 }
 
-// The target, the scene and a frame, each made again if it is refused.
+// The target, the scene and a frame, each repeated if it is refused.
 struct Played {
   uint32_t refused = 0, lost = 0;
   bool as_wanted = false;
@@ -464,12 +464,12 @@ Played Play(const Target& target, const Drawn& want, const cuda::FaultPlan& faul
   return played;
 }
 
-// Each call of CUDA in its turn finds no memory, once. Where that was to be had for a list, or was for
-// its making, nothing is refused.
+// Each CUDA call in turn finds no memory, once. If that memory was for a list, or for building one,
+// nothing is refused.
 TEST_P(ListBudgetOf, ADeviceWithoutMemoryForListsRefusesNothing) {
   const Target target = StackOf(40, 30, 20);
   SceneModel scene = SceneOn(target);
-  // A few of each.
+  // Keeps a few of each.
   for (auto& [id, g] : scene.geometries) {
     if (g.positions.empty()) continue;
     constexpr uint32_t kVertices = 120;

@@ -1,4 +1,4 @@
-// Layers that are seen only where another covers.
+// Tests layers that are visible only where another layer covers.
 #include <algorithm>
 #include <cstdint>
 #include <vector>
@@ -11,7 +11,8 @@ namespace mask_test {
 constexpr uint32_t kRed = 0xFF0000, kBlue = 0x0000FF;
 constexpr uint64_t kSide = 40, kFace = kSide * kSide, kMaskFace = 20 * 20;
 
-// Layer 1, red, fills all. Layer 2, below it and blue, is a box in the middle, in 8 tiles, none of them full. Layer 3 is empty.
+// Layer 1, red, fills everything. Layer 2, below it and blue, is a box in the middle, in 8 tiles,
+// none of them full. Layer 3 is empty.
 class Masks : public EngineConformance {
  protected:
   Masks() {
@@ -28,7 +29,8 @@ class Masks : public EngineConformance {
     layer(id).mask = by;
   }
 
-  // Voxels of one colour when the scene is drawn whole, as the oracle has them.
+  // Returns the number of voxels of one colour when the scene is drawn whole; checks them against
+  // the oracle.
   uint64_t Count(uint32_t rgb) { return Count(DrawnLikeOracle(scene_, target_), rgb); }
   static uint64_t Count(const std::vector<uint32_t>& voxels, uint32_t rgb) {
     return static_cast<uint64_t>(std::count(voxels.begin(), voxels.end(), rgb));
@@ -58,9 +60,9 @@ TEST_P(Masks, HowAMaskLooksMakesNoDifference) {
   layer(2).order = 9;
   layer(2).blend = BlendMode::kErase;
   EXPECT_EQ(Count(kRed), 20 * kMaskFace);
-  Mask(2, 3);  // so that itself it is not seen
+  Mask(2, 3);  // so that it is not visible itself
   EXPECT_EQ(Count(kRed), 20 * kMaskFace);
-  scene_.geometries[2].record.color = 0;  // black covers
+  scene_.geometries[2].record.color = 0;  // black covers too
   EXPECT_EQ(Count(kRed), 20 * kMaskFace);
 }
 
@@ -103,7 +105,7 @@ TEST_P(Masks, WhatIsNotInItIsNotErasedFromBelow) {
   EXPECT_EQ(Count(kBlue), 12 * kMaskFace);
 }
 
-// Every step as a delta of its own, to one engine.
+// Every step is a delta of its own, for one engine.
 TEST_P(Masks, ChangesOfEitherShow) {
   EngineDriver engine = Make();
   ASSERT_TRUE(engine.SetTarget(target_).ok());
@@ -129,7 +131,7 @@ TEST_P(Masks, ChangesOfEitherShow) {
   EXPECT_EQ(put_layer(1), 20 * kMaskFace);
   layer(2).visible = 0;
   EXPECT_EQ(put_layer(2), 20 * kMaskFace);
-  scene_.drawables[2].transform.m[3] = 15;  // a part of it leaves the volume
+  scene_.drawables[2].transform.m[3] = 15;  // a part of it is outside the volume
   EXPECT_EQ(put_drawable(2), 15 * kMaskFace);
   layer(2).transform.m[3] = -15;
   EXPECT_EQ(put_layer(2), 20 * kMaskFace);
@@ -152,7 +154,7 @@ TEST_P(Masks, ChangesOfEitherShow) {
     scene_.layers.erase(2);
     EXPECT_EQ(red_after(delta), 0u);
     scene_.layers[2] = mask;
-    EXPECT_EQ(put_layer(2), 0u);  // there again, and empty
+    EXPECT_EQ(put_layer(2), 0u);  // exists again, and is empty
     scene_.drawables[2] = drawable;
     EXPECT_EQ(put_drawable(2), 20 * kMaskFace / 2);
   }
@@ -160,7 +162,7 @@ TEST_P(Masks, ChangesOfEitherShow) {
   EXPECT_EQ(put_layer(1), kSide * kFace);
 }
 
-// What draws where nobody sees it costs nothing.
+// A layer that draws where nothing is visible costs nothing.
 TEST_P(Masks, AHiddenMaskOfNoneIsNotDrawn) {
   layer(2).visible = 0;
   EngineDriver engine = Make();

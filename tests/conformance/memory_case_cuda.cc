@@ -1,4 +1,4 @@
-// For machines with a GPU that nothing else uses meanwhile.
+// For machines with a GPU that nothing else uses at the same time.
 #include <cuda_runtime_api.h>
 #include <gtest/gtest.h>
 #include <stdlib.h>
@@ -9,7 +9,8 @@
 namespace voxeld::gpu::conformance {
 namespace {
 
-// Kernels are loaded with the context, not when they first run: their memory is not a scene's.
+// Kernels are loaded with the context, not when they first run: their memory does not belong to a
+// scene.
 const bool kLoadedAtOnce = setenv("CUDA_MODULE_LOADING", "EAGER", 1) == 0;
 
 }  // namespace

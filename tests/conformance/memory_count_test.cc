@@ -68,7 +68,7 @@ SceneModel Dots(SceneGenerator& chance, size_t count) {
   return scene;
 }
 
-// 160³ voxels, 1,000 tiles.
+// Returns a target of 160³ voxels, 1,000 tiles.
 Target LargeTarget() {
   constexpr int kEdge = 160;
   Target target;
@@ -92,7 +92,7 @@ ModelGeometry SphereThatFills() {
 // The CPU keeps 256 blocks for tiles that will be lit.
 constexpr uint64_t kSpareTiles = 256 * 18 * 1024;
 
-// Drawables of one shape that erase, so that nothing is lit, which would take memory too.
+// Returns drawables of one shape that erase, so that nothing is lit, which would take memory too.
 SceneModel Erasers(const ModelGeometry& shape, uint64_t count) {
   SceneModel scene;
   scene.layers[1].id = 1;

@@ -1,5 +1,6 @@
-// Many small triangles, which an engine may draw another way than a few large ones: over every edge of
-// volumes that no tile's size divides, beside lines, in several layers, and as they change.
+// Tests many small triangles, which an engine may draw in another way than a few large ones: across
+// every edge of volumes that are not multiples of a tile, beside lines, in several layers, and
+// while they change.
 #include <algorithm>
 #include <cmath>
 #include <iostream>
@@ -27,8 +28,8 @@ class Meshes : public EngineConformance {
  protected:
   Meshes() { std::cout << "VOXELD_SEED=" << seed_ << "\n"; }
 
-  // Triangles of up to `extent` voxels here and there in the grid and around it; some flat, some whose
-  // corners lie where voxels meet.
+  // Returns triangles of up to `extent` voxels in the grid and around it; some are flat, and some
+  // have corners where voxels meet.
   ModelGeometry Mesh(uint64_t id, SurfaceRule rule, uint32_t triangles, double extent,
                      const display::VoxelGrid& grid) {
     ModelGeometry g;
@@ -73,7 +74,7 @@ class Meshes : public EngineConformance {
     return g;
   }
 
-  // Meshes of both rules in one layer; small ones, and some that are larger than a region.
+  // Returns meshes of both rules in one layer; small ones, and some that are larger than a region.
   SceneModel OneLayer(const display::VoxelGrid& grid, uint32_t triangles) {
     SceneModel scene;
     scene.layers[1].id = 1;
@@ -127,7 +128,7 @@ TEST_P(Meshes, SlicedAnotherWayEqualTheOracle) {
   ExpectLikeOracle(engine, scene, target);
 }
 
-// One region and one triangle in it, or a thousand: whoever shares them out.
+// One region and one triangle in it, or a thousand: for every way to distribute them.
 TEST_P(Meshes, FewAndManyInAPlaceEqualTheOracle) {
   const Target target = StackOf(32, 32, 16, display::PixelFormat::kBitPlanes);
   for (const uint32_t triangles : {1u, 3u, 9u, 40u, 1000u}) {
@@ -144,7 +145,7 @@ TEST_P(Meshes, FewAndManyInAPlaceEqualTheOracle) {
   }
 }
 
-// More vertices than are looked through one by one.
+// More vertices than are examined one by one.
 TEST_P(Meshes, LargeOnesWithOneLargeTriangleEqualTheOracle) {
   const Target target = StackOf(100, 40, 30, display::PixelFormat::kBitPlanes);
   SceneModel scene;
@@ -157,7 +158,7 @@ TEST_P(Meshes, LargeOnesWithOneLargeTriangleEqualTheOracle) {
   ASSERT_TRUE(engine.SetTarget(target).ok());
   ASSERT_TRUE(engine.Apply(Whole(scene)).ok());
   ExpectLikeOracle(engine, scene, target);
-  // From one corner of the volume to the other: too large to be drawn as the small ones are.
+  // From one corner of the volume to the other: too large to be drawn in the way of the small ones.
   DeltaBuffer delta;
   for (const uint64_t id : {1, 2}) {
     ModelGeometry& g = scene.geometries[id + 2] = scene.geometries[id];
@@ -173,7 +174,7 @@ TEST_P(Meshes, LargeOnesWithOneLargeTriangleEqualTheOracle) {
   ExpectLikeOracle(engine, scene, target);
 }
 
-// The same triangles by maps that make them large, small, far away, flat, and small again.
+// The same triangles under transforms that make them large, small, far away, flat, and small again.
 TEST_P(Meshes, MapsDecideWhatIsSmall) {
   const Target target = StackOf(70, 40, 30, display::PixelFormat::kRgb888);
   SceneModel scene = OneLayer(target.geometry.grid, 60);
@@ -195,8 +196,8 @@ TEST_P(Meshes, MapsDecideWhatIsSmall) {
   }
 }
 
-// Layers that show each other, are cut, erase and are moved, of meshes and lines; drawables that come,
-// go and move in batches of their own.
+// Layers of meshes and lines that mask each other, are clipped, erase and are moved; drawables that
+// are inserted, removed and moved in batches.
 TEST_P(Meshes, AsTheyChangeInLayersEqualTheOracle) {
   const Target target = StackOf(75, 50, 37, display::PixelFormat::kRgb888);
   const display::VoxelGrid& grid = target.geometry.grid;

@@ -35,7 +35,7 @@ struct LayerVoxel {
   }
 };
 
-// The voxel of the point, and those with centres within a ball, fading, or a cube.
+// Plots the point's own voxel, and those with centres within a ball, fading, or within a cube.
 void PlotSplat(const Units& at, uint32_t rgb, int64_t radius, Splat splat, const DenseVolume& grid,
                const Plot& plot) {
   PlotLine({at, at, rgb, rgb, LineSampling::kThin}, grid, plot);
@@ -62,7 +62,8 @@ void PlotSplat(const Units& at, uint32_t rgb, int64_t radius, Splat splat, const
   }
 }
 
-// The voxel of the middle of the cell that a point lies in, and those with centres in the cell.
+// Plots the voxel of the middle of the cell in which a point lies, and those with centres in the
+// cell.
 void PlotCell(const float* position, uint32_t rgb, const Affine& map, const DenseVolume& grid,
               const Plot& plot) {
   float middle[3], lower[3];
@@ -87,7 +88,8 @@ void PlotCell(const float* position, uint32_t rgb, const Affine& map, const Dens
   }
 }
 
-// What a curve is cut into, which tests of the cutting judge, drawn as any segments and triangles.
+// Plots the segments and triangles into which a curve is divided. Separate tests judge the
+// division.
 void PlotCurved(const ModelGeometry& g, const Affine& map, const DenseVolume& grid, uint32_t tint,
                 const Plot& plot) {
   GeometryView view;
@@ -177,7 +179,8 @@ void PlotGeometry(const ModelGeometry& g, const Affine& map, const DenseVolume& 
   if (IsCurved(record.kind)) return PlotCurved(g, map, grid, tint, plot);
   std::vector<Units> at;
   std::vector<uint32_t> colors;
-  // Behind the vertices' colours, if they have any: where they are on the texture, and it.
+  // The texture follows the vertices' colours, if they have any: first the coordinates, then the
+  // texture itself.
   const bool colored = record.color_mode == ColorMode::kPerVertex;
   const size_t places = colored ? record.vertex_count : 0;
   const auto on_texture = [&](size_t first) {
@@ -196,7 +199,7 @@ void PlotGeometry(const ModelGeometry& g, const Affine& map, const DenseVolume& 
   for (size_t corner = 0; corner < corners; ++corner) {
     const size_t vertex = record.index_count ? g.indices[corner] : corner;
     at.push_back(OracleSnap(map, &g.positions[vertex * 3]));
-    // Vertices are tinted, and colours between them mixed of what comes out.
+    // Vertices are tinted first; the colours between them are mixed from the results.
     colors.push_back(OracleTint(colored ? g.colors[vertex] : record.color, tint));
   }
   const int64_t radius = OracleRadius(record, map);
@@ -241,7 +244,7 @@ void PlotGeometry(const ModelGeometry& g, const Affine& map, const DenseVolume& 
 
 namespace {
 
-// What a layer covers, as its clip leaves it, whether it is seen or not.
+// Returns the voxels that a layer covers after clipping, whether it is visible or not.
 std::vector<LayerVoxel> CoveredBy(const LayerRecord& layer, const SceneModel& scene,
                                   const Target& target, const DenseVolume& volume) {
   std::vector<LayerVoxel> voxels(volume.rgb.size());
@@ -282,7 +285,7 @@ DenseVolume OracleVoxels(const SceneModel& scene, const Target& target) {
   order.reserve(scene.layers.size());
   for (const auto& [id, layer] : scene.layers) order.push_back(&layer);
   std::stable_sort(order.begin(), order.end(), [](const LayerRecord* a, const LayerRecord* b) {
-    return a->order < b->order;  // ids ascend already
+    return a->order < b->order;  // ids already ascend
   });
   for (const LayerRecord* layer : order) {
     if (!layer->visible || (layer->has_mask && !scene.layers.contains(layer->mask))) continue;

@@ -1,5 +1,5 @@
-// What every engine must produce, drawn plainly: dense volumes,
-// direct loops, no code of the engine's.
+// The output that every engine must produce, drawn plainly: dense volumes, direct loops, none of
+// the engine's code.
 #pragma once
 
 #include <cstddef>
@@ -25,17 +25,17 @@ struct DenseVolume {
   }
 };
 
-// The blended voxels of a scene.
+// Returns the blended voxels of a scene.
 DenseVolume OracleVoxels(const SceneModel& scene, const Target& target);
 
-// For each voxel, 1 if it is in some pixel's footprint.
-// An engine may leave out what no slice looks at.
+// Returns, for each voxel, 1 if it is in some pixel's footprint. An engine may leave out voxels
+// that no slice looks at.
 std::vector<uint8_t> OracleSeen(const DenseVolume& volume, const Target& target);
 
-// Bits of green, red, blue from the top, bit by bit.
+// Interleaves the bits of green, red and blue, from the top.
 uint32_t Interleaved(uint32_t rgb);
 
-// All pictures of the volume, as target.layout has them.
+// Returns all pictures of the volume in the layout of target.layout.
 std::vector<std::byte> OraclePictures(const DenseVolume& volume, const Target& target);
 
 }  // namespace voxeld::gpu::conformance

@@ -5,7 +5,7 @@
 
 namespace voxeld::gpu::conformance {
 
-// From the left: products and sums in the order in which a matrix product is written.
+// Products and sums from the left, in the order in which a matrix product is written.
 static double Dot3(const double* row, double x, double y, double z) {
   const double factors[3] = {x, y, z};
   double sum = row[0] * factors[0];

@@ -7,7 +7,7 @@
 namespace voxeld::gpu::conformance {
 namespace {
 
-// Gauss-Jordan with the greatest pivots. False if there is no inverse.
+// Gauss-Jordan elimination with the greatest pivots. Returns false if no inverse exists.
 bool Invert(const Affine& view, long double inverse[3][4]) {
   long double rows[3][7] = {};
   for (int r = 0; r < 3; ++r) {
@@ -30,7 +30,7 @@ bool Invert(const Affine& view, long double inverse[3][4]) {
       for (int k = 0; k < 7; ++k) rows[r][k] -= times * rows[c][k];
     }
   }
-  // Beside the identity now: the inverse, and what it makes of −t.
+  // The identity has become the left part; the right part is the inverse, and its product with −t.
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 4; ++c) inverse[r][c] = rows[r][3 + c];
   }
@@ -41,22 +41,22 @@ double Greatest(double x, double y, double z) {
   return std::max(std::max(std::fabs(x), std::fabs(y)), std::fabs(z));
 }
 
-// The nearest whole number, halves away from zero, within ±2^bits.
+// Returns the nearest integer, halves away from zero, within ±2^bits.
 __int128 Rounded(double value, int bits) {
   const double limit = std::ldexp(1.0, bits);
   if (std::fabs(value) >= limit) return static_cast<__int128>(std::copysign(limit, value));
   return static_cast<__int128>(std::copysign(std::floor(std::fabs(value) + 0.5), value));
 }
 
-// The published rounding of a plane: doubles, in their order. False if it has no place in voxel
-// space.
+// Applies the published rounding of a plane: doubles, in the given order. Returns false if it has
+// no place in voxel space.
 bool Round(const double plane[4], const Affine& view, __int128 out[4]) {
   const auto m = [&](int i, int j) { return view.m[(i % 3) * 4 + j % 3]; };
   const double determinant = (m(0, 0) * (m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1)) -
                               m(0, 1) * (m(1, 0) * m(2, 2) - m(1, 2) * m(2, 0))) +
                              m(0, 2) * (m(1, 0) * m(2, 1) - m(1, 1) * m(2, 0));
   if (determinant == 0 || !std::isfinite(determinant)) return false;
-  // The plane by a power of two, so that its normal's greatest component is in [½, 1).
+  // Scales the plane by a power of two, so that its normal's greatest component is in [½, 1).
   double p[4];
   const int scene_scale = std::ilogb(Greatest(plane[0], plane[1], plane[2])) + 1;
   for (int i = 0; i < 4; ++i) p[i] = std::scalbn(plane[i], -scene_scale);
@@ -86,7 +86,7 @@ bool Round(const double plane[4], const Affine& view, __int128 out[4]) {
 
 OracleClip::OracleClip(const LayerRecord& layer, const Target& target) {
   const display::VoxelGrid& grid = target.geometry.grid;
-  // Four times the error that gpu/clip.h states for the rounding: there are doubles before it.
+  // Four times the error that gpu/clip.h states for the rounding: doubles come before it.
   least_distance_ = std::ldexp(static_cast<long double>(grid.nx + grid.ny + grid.nz + 1), -36);
   invertible_ = Invert(target.view, inverse_);
   for (uint32_t i = 0; i < layer.cylinder_count; ++i) {
@@ -121,7 +121,7 @@ OracleClip::OracleClip(const LayerRecord& layer, const Target& target) {
   }
 }
 
-// The published rounding: the inverse of view ∘ unit by cofactors, in doubles.
+// Applies the published rounding: the inverse of view ∘ unit by cofactors, in doubles.
 OracleClip::Cylinder OracleClip::CylinderOf(const ClipCylinder& cylinder, const Affine& view) {
   Cylinder out;
   double m[3][4];

@@ -1,5 +1,5 @@
-// The inside of triangles, voxel by voxel, in whole numbers of any size: the row's line is moved by 2⁻⁶⁰ unit along y
-// and by 2⁻¹²⁰ along z, so that it meets no edge.
+// Computes the inside of triangles, voxel by voxel, in integers of any size: the row's line is
+// moved by 2⁻⁶⁰ unit along y and by 2⁻¹²⁰ unit along z, so that it meets no edge.
 #include <boost/multiprecision/cpp_int.hpp>
 
 #include "tests/conformance/oracle_shapes.h"
@@ -9,20 +9,20 @@ namespace {
 
 using Number = boost::multiprecision::cpp_int;
 
-// In 2⁻¹²⁰ unit.
+// Coordinates in 2⁻¹²⁰ unit.
 struct Point {
   Number y, z;
 };
 
 Point PointOf(const Units& at) { return {Number(at.v[1]) << 120, Number(at.v[2]) << 120}; }
 
-// Which side of the line from a to b a point is on.
+// Returns on which side of the line from a to b a point lies.
 int SideOf(const Point& a, const Point& b, const Point& p) {
   const Number side = (b.y - a.y) * (p.z - a.z) - (b.z - a.z) * (p.y - a.y);
   return side.sign();
 }
 
-// Whether the line through a voxel's centre along x, moved a little, meets the triangle.
+// Returns whether the line along x through a voxel's centre, moved a little, meets the triangle.
 bool Meets(const OracleTriangle& t, int64_t y, int64_t z) {
   const Point p{((Number(y) * 256 + 128) << 120) + (Number(1) << 60),
                 ((Number(z) * 256 + 128) << 120) + 1};
@@ -31,7 +31,7 @@ bool Meets(const OracleTriangle& t, int64_t y, int64_t z) {
   return sides[0] != 0 && sides[0] == sides[1] && sides[1] == sides[2];
 }
 
-// Whether the triangle's plane is at a voxel's centre, or before it along x.
+// Returns whether the triangle's plane is at a voxel's centre, or before it along x.
 bool IsBefore(const OracleTriangle& t, int64_t x, int64_t y, int64_t z) {
   Number e[2][3], d[3];
   const int64_t centre[3] = {x * 256 + 128, y * 256 + 128, z * 256 + 128};

@@ -7,10 +7,11 @@
 namespace voxeld::gpu::conformance {
 namespace {
 
-// In units of 2⁻¹⁶ voxel, as display/geometry/footprint.h has it: whole numbers, held exactly.
+// Returns a length in units of 2⁻¹⁶ voxel, as display/geometry/footprint.h defines it: integers,
+// represented exactly.
 double ToUnits(double mm, double pitch_mm) { return std::floor(mm / pitch_mm * 65536 + 0.5); }
 
-// Cells of an axis that are in a light's box, and the one that the light is in; −1: none.
+// The cells of an axis that are in a light's box, and the cell that contains the light; −1: none.
 struct Cells {
   std::vector<int32_t> box;
   int32_t own = -1;

@@ -1,5 +1,6 @@
-// What the oracle's pixels stand for. A stack's and a rotor's footprints are display/geometry's, which
-// has an oracle of its own; a lattice's are found here once more, voxel by voxel.
+// The footprints of the oracle's pixels. Those of a stack and of a rotor come from
+// display/geometry, which has an oracle of its own; those of a lattice are computed here again,
+// voxel by voxel.
 #pragma once
 
 #include <cstdint>

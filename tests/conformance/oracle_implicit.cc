@@ -1,5 +1,6 @@
-// gpu/implicit/field.h's definition, voxel by voxel: the program is run by a plain interpreter, with
-// gradients by the rules of differentiation, in the order of operations that dual.h states.
+// Implements gpu/implicit/field.h's definition voxel by voxel: a plain interpreter runs the
+// program, with gradients by the rules of differentiation, in the order of operations that dual.h
+// states.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -20,7 +21,7 @@ struct Jet {
   float v = 0, d[3] = {};
 };
 
-// One operation; `n` is its immediate. Without `gradients` they are left at 0.
+// Applies one operation; `n` is its immediate operand. Without `gradients`, they stay 0.
 Jet Apply(Op op, const Jet& a, const Jet& b, int32_t n, bool gradients) {
   const auto jet_of = [gradients](float v, auto f) {
     Jet jet{v};
@@ -99,7 +100,7 @@ class OracleField {
 
   bool drawable() const { return drawable_; }
 
-  // P of every voxel, and of those around the grid.
+  // Computes P for every voxel, and for those around the grid.
   void FindSurface() {
     surface_.reserve(static_cast<size_t>(nx_ * ny_ * nz_));
     for (int64_t z = -1; z < nz_ - 1; ++z) {
@@ -194,7 +195,7 @@ class OracleField {
     return surface_[static_cast<size_t>(((z + 1) * ny_ + y + 1) * nx_ + x + 1)];
   }
 
-  // Of a ray along the first of the two axes that are left, from the point to +∞.
+  // Counts the crossings of a ray along the first of the two remaining axes, from the point to +∞.
   int Crossings(const float q[3]) const {
     const uint32_t u = (header_.ring_axis + 1) % 3, v = (header_.ring_axis + 2) % 3;
     int crossings = 0;

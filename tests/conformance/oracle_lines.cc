@@ -10,7 +10,7 @@ namespace {
 
 using Int128 = __int128;
 
-// Rounded towards −∞; b > 0.
+// Returns a / b rounded towards −∞; b > 0.
 Int128 Floor(Int128 a, Int128 b) { return a >= 0 ? a / b : -((-a + b - 1) / b); }
 
 int64_t Cell(int64_t units) { return static_cast<int64_t>(Floor(units, 256)); }
@@ -49,14 +49,14 @@ int64_t StepsOf(const OracleLine& line) {
   return static_cast<int64_t>(low);
 }
 
-// Coordinate `a` of voxel_k, as the definition has it.
+// Returns coordinate `a` of voxel_k according to the definition.
 int64_t StepCell(const OracleLine& line, int a, Int128 k, Int128 n) {
   const Int128 d = line.e.v[a] - line.s.v[a];
   return static_cast<int64_t>(Floor(line.s.v[a] * n + d * k, 256 * n));
 }
 
-// The first k in [0, n] for which coordinate `a`, followed in its own direction, has reached
-// `bound`; n + 1 if none.
+// Returns the first k in [0, n] for which coordinate `a`, followed in its own direction, has
+// reached `bound`; n + 1 if none has.
 Int128 FirstReaching(const OracleLine& line, int a, Int128 n, int64_t bound) {
   const bool up = line.e.v[a] >= line.s.v[a];
   Int128 low = -1, high = n + 1;
@@ -71,7 +71,7 @@ Int128 FirstReaching(const OracleLine& line, int a, Int128 n, int64_t bound) {
 void PlotSteps(const OracleLine& line, int64_t n, const DenseVolume& grid, const Plot& plot) {
   const int64_t size[3] = {grid.nx, grid.ny, grid.nz};
   Int128 first = 0, last = n;
-  if (n > 100000) {  // too far to walk: by bisection over the same definition
+  if (n > 100000) {  // too many steps: found by bisection over the same definition
     for (int a = 0; a < 3; ++a) {
       const bool up = line.e.v[a] >= line.s.v[a];
       first = std::max(first, FirstReaching(line, a, n, up ? 0 : size[a] - 1));
@@ -85,7 +85,7 @@ void PlotSteps(const OracleLine& line, int64_t n, const DenseVolume& grid, const
   }
 }
 
-// When a coordinate crosses a face: units / length of the way, then the axis.
+// Where a coordinate crosses a face: the distance along the way as units / length, then the axis.
 struct Crossing {
   Int128 units, length;
   int axis;
@@ -95,7 +95,8 @@ bool operator<(const Crossing& a, const Crossing& b) {
   return left != right ? left < right : a.axis < b.axis;
 }
 
-// A cell is on the way iff the last face crossed to reach it comes before the first to leave it.
+// A cell is on the way if and only if the last face crossed to reach it comes before the first one
+// crossed to leave it.
 void PlotCells(OracleLine line, const DenseVolume& grid, const Plot& plot) {
   const auto key = [](const Units& p) { return std::tuple(p.v[0], p.v[1], p.v[2]); };
   if (key(line.e) < key(line.s)) {

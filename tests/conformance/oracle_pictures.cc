@@ -1,4 +1,5 @@
-// Pictures of a dense volume, pixel by pixel: a footprint's colour, its light, dithered, in the display's bytes.
+// Draws pictures of a dense volume, pixel by pixel: a footprint's colour, its light, dithered, in
+// the display's bytes.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -31,14 +32,14 @@ uint32_t PixelOf(const DenseVolume& volume, const OracleFootprints& footprints, 
   return sampling == display::Sampling::kMax ? best : red << 16 | green << 8 | blue;
 }
 
-// A pixel, and a part of the time in which it is shown.
+// A pixel, and the part of the time in which it is shown.
 struct Moment {
   int32_t slice = 0;
   int u = 0, v = 0;
   int part = 0, parts = 1;
 };
 
-// Which levels light becomes.
+// Converts light to levels.
 class Toner {
  public:
   explicit Toner(const Target& target) : target_(target) {
@@ -73,7 +74,7 @@ class Toner {
         return static_cast<uint64_t>((2 * b + 1) * 65535 / 128);
       }
       case display::Dither::kBlueNoise: {
-        // A slice further is the golden section of 4096 ranks further.
+        // The next slice is shifted by the golden section of 4096 ranks.
         const int64_t rank = noise_[static_cast<size_t>(at.v % 64 * 64 + at.u % 64)];
         const int64_t b = (rank + int64_t{at.slice} * 2531 + at.part * 4096 / at.parts) % 4096;
         return static_cast<uint64_t>((2 * b + 1) * 65535 / 8192);
@@ -87,7 +88,7 @@ class Toner {
   display::FootprintTable table_;
 };
 
-// Where bits of pictures go.
+// Writes bits to their places in pictures.
 class Painter {
  public:
   Painter(const Target& target, std::vector<std::byte>& bytes)
@@ -97,7 +98,7 @@ class Painter {
         width_(static_cast<size_t>(layout_.width)),
         height_(static_cast<size_t>(layout_.height)) {}
 
-  // A pixel's colour in sub-frame at.part of at.parts.
+  // Writes a pixel's colour in sub-frame at.part of at.parts.
   void Paint(uint32_t rgb, const Moment& at) {
     picture_ = (static_cast<size_t>(at.slice) * static_cast<size_t>(at.parts) +
                 static_cast<size_t>(at.part)) *

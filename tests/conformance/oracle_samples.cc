@@ -1,4 +1,4 @@
-// gpu/primitives/samples.h's definition, voxel by voxel, without bricks.
+// Implements gpu/primitives/samples.h's definition voxel by voxel, without bricks.
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -12,8 +12,8 @@ namespace {
 
 constexpr float kNothing = std::numeric_limits<float>::infinity();
 
-// The words, by their numbers: 0 to 2 sizes, 3 format, 4 filter, 5 by level, 6 low, 7 scale, 8 level, 9 words
-// of bricks; from 12 on the table.
+// The words by their indices: 0 to 2 sizes, 3 format, 4 filter, 5 by level, 6 low, 7 scale, 8
+// level, 9 words of bricks; from 12 on the table.
 struct Words {
   const std::vector<uint32_t>& all;
 
@@ -26,7 +26,7 @@ struct Words {
     return value;
   }
   uint32_t entry(size_t i) const { return all[12 + i]; }
-  // Four channels, or the number four times.
+  // Returns the four channels, or the number four times.
   std::array<float, 4> At(int64_t x, int64_t y, int64_t z) const {
     const size_t i = static_cast<size_t>((z * size(1) + y) * size(0) + x),
                  begin = 12 + 256 + all[9];
@@ -45,7 +45,8 @@ struct Words {
   }
 };
 
-// What a place has: the eight samples around it, corner by corner, and how far it is between them.
+// The neighbourhood of a place: the eight samples around it, corner by corner, and its position
+// between them.
 struct Around {
   std::array<float, 4> corner[8];
   float t[3];
@@ -55,7 +56,7 @@ struct Around {
     for (size_t c = 0; c < 4; ++c) {
       float v[8];
       for (size_t i = 0; i < 8; ++i) v[i] = corner[i][c];
-      // One axis after another.
+      // Interpolates along one axis after another.
       for (size_t i = 0; i < 4; ++i) v[i] = v[2 * i] + (v[2 * i + 1] - v[2 * i]) * at[0];
       for (size_t i = 0; i < 2; ++i) v[i] = v[2 * i] + (v[2 * i + 1] - v[2 * i]) * at[1];
       mean[c] = v[0] + (v[1] - v[0]) * at[2];

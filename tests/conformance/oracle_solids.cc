@@ -6,7 +6,7 @@
 namespace voxeld::gpu::conformance {
 namespace {
 
-// gpu/primitives/solid.h's definition, a second time.
+// A second implementation of gpu/primitives/solid.h's definition.
 struct OracleSolid {
   PrimitiveKind kind;
   OracleFrame frame;
@@ -32,7 +32,7 @@ struct OracleSolid {
   }
 };
 
-// False if there is no inverse.
+// Returns false if no inverse exists.
 bool Set(const GeometryRecord& g, const Affine& map, OracleSolid& s) {
   const double p3 = g.params[3], p4 = g.params[4], p5 = g.params[5];
   Affine local;
@@ -101,7 +101,7 @@ bool SetOracleFrame(const Affine& map, bool keep_thin, OracleFrame& frame) {
   return true;
 }
 
-// From the left, the lesser and the greater product of each axis.
+// The lesser and the greater product of each axis, added from the left.
 void OracleDomain(const GeometryRecord& g, const Affine& map, int64_t low[3], int64_t high[3]) {
   for (int a = 0; a < 3; ++a) {
     double least = map.m[a * 4 + 3], most = least;

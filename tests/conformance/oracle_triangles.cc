@@ -30,8 +30,8 @@ struct Tri {
   Vec n;
 };
 
-// Whether the line through `q` along `a`, not parallel to the triangle, passes through it, rim
-// included: the signed volumes that it spans with the edges have no two signs.
+// Returns whether the line through `q` along `a`, not parallel to the triangle, passes through it,
+// rim included: the signed volumes that it spans with the edges do not have two different signs.
 bool LineMeets(const Tri& t, const Vec& q, int a) {
   bool positive = false, negative = false;
   for (int i = 0; i < 3; ++i) {
@@ -44,7 +44,8 @@ bool LineMeets(const Tri& t, const Vec& q, int a) {
 
 int Side(const Tri& t, const Vec& q) { return Sign(Dot(t.n, q - t.p[0])); }
 
-// THIN: the triangle meets the segment from `low` one voxel along `a`, its far end excluded.
+// THIN: returns whether the triangle meets the segment from `low` one voxel along `a`, without its
+// far end.
 bool MeetsHalfOpen(const Tri& t, const Vec& low, int a) {
   if (t.n[a] == 0 || !LineMeets(t, low, a)) return false;
   Vec high = low;
@@ -60,7 +61,8 @@ bool MeetsClosed(const Tri& t, const Vec& low, int a) {
   return Side(t, low) * Side(t, high) <= 0;
 }
 
-// A closed segment and a closed box: the parts of the way inside each slab have a common point.
+// Tests a closed segment against a closed box: the parts of the way inside each slab have a common
+// point.
 bool SegmentMeetsBox(const Vec& s, const Vec& e, const Vec& corner) {
   Int128 in_num = 0, in_den = 1, out_num = 1, out_den = 1;
   for (int a = 0; a < 3; ++a) {
@@ -82,8 +84,8 @@ bool SegmentMeetsBox(const Vec& s, const Vec& e, const Vec& corner) {
   return in_num * out_den <= out_num * in_den;
 }
 
-// Two closed convex sets meet iff an edge of the triangle meets the box
-// or an edge of the box the triangle.
+// Two closed convex sets meet if and only if an edge of the triangle meets the box, or an edge of
+// the box the triangle.
 bool MeetsBox(const Tri& t, const Vec& corner) {
   for (int i = 0; i < 3; ++i) {
     if (SegmentMeetsBox(t.p[i], t.p[(i + 1) % 3], corner)) return true;
@@ -101,7 +103,7 @@ bool MeetsBox(const Tri& t, const Vec& corner) {
   return false;
 }
 
-// What multiplies colours there: a texel of the level that suits the triangle.
+// Returns the factor for colours at a place: a texel of the level that suits the triangle.
 uint32_t TexelOf(const OracleTriangle& t, double u, double v) {
   uint64_t begin = 0, width = t.texture.width, height = t.texture.height;
   const auto at = [&](int corner, int k) {
@@ -109,7 +111,7 @@ uint32_t TexelOf(const OracleTriangle& t, double u, double v) {
            static_cast<long double>(t.texture.at[0][k]);
   };
   const long double share = std::fabs(at(1, 0) * at(2, 1) - at(1, 1) * at(2, 0));
-  long double faces = 0;  // of the voxels that its largest shadow holds, twice
+  long double faces = 0;  // twice the number of voxels in its largest shadow
   for (int a = 0; a < 3; ++a) {
     const auto edge = [&](int corner, int axis) {
       return static_cast<long double>(t.v[corner].v[axis % 3] - t.v[0].v[axis % 3]) / 256;
@@ -123,7 +125,7 @@ uint32_t TexelOf(const OracleTriangle& t, double u, double v) {
     width = std::max<uint64_t>(width / 2, 1);
     height = std::max<uint64_t>(height / 2, 1);
   }
-  // How far along a side of the picture, in (0, 1] but for 0 itself.
+  // Returns the position along a side of the picture, in (0, 1], or 0 for 0 itself.
   const auto along = [](double place, uint64_t count) -> uint64_t {
     if (std::isnan(place) || std::fabs(place) >= 1e12) return 0;
     double part = place - std::floor(place);
@@ -139,7 +141,7 @@ uint32_t ColorOfCorner(const OracleTriangle& t, int i) {
                                         static_cast<double>(t.texture.at[i][1])));
 }
 
-// As it is rounded: each half by itself.
+// Returns the rounded value: each half is rounded by itself.
 double Rounded(Int128 value) {
   return static_cast<double>(static_cast<uint64_t>(value >> 64)) * 0x1p64 +
          static_cast<double>(static_cast<uint64_t>(value));
@@ -214,7 +216,7 @@ void PlotTriangle(const OracleTriangle& t, const DenseVolume& grid, const Plot& 
     }
   }
   if (flat) return;
-  // What the triangle meets is no further away than its corners.
+  // Voxels that the triangle meets are at most as far away as its corners.
   const int64_t size[3] = {grid.nx, grid.ny, grid.nz};
   int64_t begin[3], end[3];
   for (int a = 0; a < 3; ++a) {
@@ -247,11 +249,11 @@ Real3 Across(const Real3& a, const Real3& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-// As thick_triangle.h has it, a second time; thick_triangles_test.cc says in other words what it
-// means.
+// A second implementation of thick_triangle.h; thick_triangles_test.cc checks its meaning in
+// another way.
 struct ThickOracle {
   OracleTriangle given;
-  OracleTriangle t;  // corners in order
+  OracleTriangle t;  // with the corners in order
   Real3 edge[3], side[3], normal;
   double normal2, radius;
 
@@ -280,7 +282,7 @@ struct ThickOracle {
     }
   }
 
-  // The colour of a voxel, or nothing.
+  // Returns the colour of a voxel, or nullopt.
   std::optional<uint32_t> At(int64_t x, int64_t y, int64_t z) const {
     const int64_t centre[3] = {x * 256 + 128, y * 256 + 128, z * 256 + 128};
     Real3 w[3];
@@ -327,7 +329,7 @@ struct ThickOracle {
   uint32_t ColorBy(const Real3& weights) const {
     const bool textured = t.texture.texels != nullptr;
     if (!textured && t.color[0] == t.color[1] && t.color[1] == t.color[2]) return t.color[0];
-    // All but the weights that are none are added up in the order of the corners.
+    // All weights that are not zero are added in the order of the corners.
     const double sum = (weights[0] + weights[1]) + weights[2];
     uint32_t rgb = 0;
     for (int shift = 0; shift < 24; shift += 8) {

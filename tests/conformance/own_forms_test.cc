@@ -1,6 +1,7 @@
-// Boxes, spheres and cylinders, which have coverage of their own, against the same shapes by the general method, and by the
-// expressions that they are, on every engine: the same solids but where a centre lies on the surface; surfaces that are nowhere farther apart
-// than a voxel. What is far from the surface is worked out in double precision.
+// Compares boxes, spheres and cylinders, which have coverage code of their own, with the same
+// shapes drawn by the general method and by their expressions, on every engine: the same solids,
+// except where a centre lies on the surface, and surfaces that are nowhere more than a voxel apart.
+// Distances far from the surface are computed in double precision.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -27,10 +28,11 @@ constexpr double kMargin = 1e-2;  // voxels: origins are snapped to 2⁻⁸ voxe
 struct Form {
   std::string name;
   PrimitiveKind kind;
-  std::array<float, 3> measures;  // params[3] and on
+  std::array<float, 3> measures;  // params[3] and the following
   std::function<FieldShape(Graph&)> make;
   std::string text;
-  std::function<double(const Vector&)> distance;  // signed; past edges that of the planes
+  std::function<double(const Vector&)> distance;  // signed; beyond edges, the distance from the
+                                                  // planes
 };
 
 std::vector<Form> Forms() {
@@ -116,7 +118,7 @@ class OwnForms : public EngineConformance {
   EngineDriver engine_;
 };
 
-// A turn about z, then x, and a place off the grid, so that few centres lie on a surface.
+// A rotation about z, then x, and a place off the grid, so that few centres lie on a surface.
 Affine Turned(double a, double b) {
   Affine map;
   const double ca = std::cos(a), sa = std::sin(a), cb = std::cos(b), sb = std::sin(b);
@@ -182,7 +184,7 @@ TEST_P(OwnForms, SurfacesAreWithinAVoxelOfOneAnother) {
       look.rule = rule;
       const std::vector<uint32_t> surfaces[3] = {
           DrawOwn(form, look, map), DrawGeneral(form, look, map), DrawText(form, look, map)};
-      // A neighbour on the other side is as far away at most.
+      // A neighbour on the other side is at most as far away.
       const double most = (rule == SurfaceRule::kThin ? 1 : std::sqrt(3.0)) + kMargin;
       for (int which = 0; which < 3; ++which) {
         ForEachVoxel([&](int32_t x, int32_t y, int32_t z) {

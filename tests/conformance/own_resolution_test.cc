@@ -1,5 +1,5 @@
-// Displays whose pixels are voxels, which an engine may draw another way: many thin lines, over every
-// edge of volumes that no tile's size divides.
+// Tests displays whose pixels are voxels, which an engine may draw in another way: many thin lines,
+// across every edge of volumes that are not multiples of a tile.
 #include <cstdlib>
 #include <random>
 
@@ -22,7 +22,7 @@ Target StackOf(int32_t width, int32_t height, int32_t slices, display::PixelForm
   return target;
 }
 
-// Lines and points in one layer, of one or two colours each, some of no length.
+// Returns lines and points in one layer, of one or two colours each, some of zero length.
 SceneModel RandomLines(uint64_t seed, uint32_t lines, const display::VoxelGrid& grid) {
   std::mt19937_64 random(seed);
   SceneModel scene;
@@ -116,7 +116,7 @@ TEST_P(OwnResolution, PartsJoinedEqualTheWhole) {
   EXPECT_TRUE(joined == want);
 }
 
-// A line within a voxel has both its ends' colours there, and the greater shows.
+// A line within a voxel has the colours of both its ends there, and the greater one shows.
 TEST_P(OwnResolution, ALineWithinAVoxelShowsTheGreaterColour) {
   const Target target = StackOf(32, 32, 16, display::PixelFormat::kRgb888);
   SceneModel scene;
@@ -138,7 +138,7 @@ TEST_P(OwnResolution, ALineWithinAVoxelShowsTheGreaterColour) {
   EXPECT_EQ(CountLit(voxels), 1u);
 }
 
-// A strip of one corner has no lines: it goes after those that came with it.
+// A strip with one corner has no lines: it is removed after those that were inserted with it.
 TEST_P(OwnResolution, DrawablesWithoutLinesComeAndGo) {
   const Target target = StackOf(32, 32, 16, display::PixelFormat::kRgb888);
   SceneModel scene = RandomLines(Seed() + 3, 4, target.geometry.grid);
@@ -159,8 +159,8 @@ TEST_P(OwnResolution, DrawablesWithoutLinesComeAndGo) {
   }
 }
 
-// What was drawn for a reader of voxels is told with the next frame, also if the target is set in
-// between; and nothing of it stays where a target is sliced another way.
+// Changes drawn for a reader of voxels are reported with the next frame, also if the target is set
+// in between; and nothing of them stays when a target is sliced in another way.
 TEST_P(OwnResolution, ChangesBetweenTargetsAreTold) {
   Target target = StackOf(48, 48, 20, display::PixelFormat::kBitPlanes);
   const SceneModel before = RandomLines(Seed() + 2, 50, target.geometry.grid);

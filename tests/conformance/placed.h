@@ -1,4 +1,4 @@
-// Shapes alone, turned and off the grid, to be held against what is known of them in double precision.
+// Single shapes, turned and off the grid, for comparison with known properties in double precision.
 #pragma once
 
 #include <array>
@@ -23,7 +23,7 @@ using implicit::Vector;
 
 inline constexpr double kHalfDiagonal = 0.8660254037844386;
 
-// A turn, a scale and a place.
+// A rotation, a scale and a translation.
 struct Placement {
   Affine map;
   double scale = 1;
@@ -36,7 +36,7 @@ struct Placement {
     }
     return {v[0], v[1], v[2]};
   }
-  // A turn's inverse is its transpose.
+  // The inverse of a rotation is its transpose.
   Vector Back(const Vector& p) const {
     const double d[3] = {p.x - map.m[3], p.y - map.m[7], p.z - map.m[11]};
     double q[3];
@@ -45,13 +45,14 @@ struct Placement {
     }
     return {q[0], q[1], q[2]};
   }
-  // Of a voxel's centre.
+  // Maps a voxel's centre back.
   Vector Back(int32_t x, int32_t y, int32_t z) const {
     return Back(Vector{x + 0.5, y + 0.5, z + 0.5});
   }
 };
 
-// Turned by `angle` about (1, 2, 3), and on so that the origin comes to (middle, middle, middle), plus `off` and more.
+// Returns a rotation by `angle` about (1, 2, 3), followed by others, that maps the origin to
+// (middle, middle, middle), plus `off` and more.
 inline Placement Placed(double angle, double scale, double middle, double off) {
   const double length = std::sqrt(14.0), axis[3] = {1 / length, 2 / length, 3 / length};
   const double c = std::cos(angle), s = std::sin(angle);
@@ -87,7 +88,8 @@ ModelGeometry FieldGeometry(const Shape& shape, const GeometryRecord& look = {})
   return FieldGeometry(graph, made, look);
 }
 
-// Numbers of `size`³ samples; of a level, or with a table of grey levels from low to high.
+// Returns a geometry of `size`³ samples; with a level, or with a table of grey levels from low to
+// high.
 inline ModelGeometry GridGeometry(uint32_t size, SampleFilter filter,
                                   const std::function<double(double, double, double)>& number,
                                   bool by_level, double level, const GeometryRecord& look = {}) {
@@ -120,7 +122,7 @@ inline ModelGeometry GridGeometry(uint32_t size, SampleFilter filter,
   return g;
 }
 
-// Voxels of a cube.
+// The voxels of a cube.
 struct Drawn {
   int32_t size = 0;
   std::vector<uint32_t> rgb;
@@ -136,7 +138,7 @@ struct Drawn {
   uint32_t At(int32_t x, int32_t y, int32_t z) const { return rgb[Index(x, y, z)]; }
   bool Lit(int32_t x, int32_t y, int32_t z) const { return At(x, y, z) != 0; }
 
-  // each(x, y, z) of those at least `rim` voxels inside.
+  // Calls each(x, y, z) for those at least `rim` voxels inside.
   template <typename Each>
   void ForEach(Each&& each, int32_t rim = 0) const {
     for (int32_t z = rim; z < size - rim; ++z) {
@@ -145,7 +147,7 @@ struct Drawn {
       }
     }
   }
-  // each(x, y, z) of neighbours in the cube: those that share a face, or all.
+  // Calls each(x, y, z) for the neighbours in the cube: those that share a face, or all.
   template <typename Each>
   void ForEachNeighbour(int32_t x, int32_t y, int32_t z, bool any, Each&& each) const {
     for (int n = 0; n < 27; ++n) {
@@ -155,7 +157,8 @@ struct Drawn {
       if (Holds(x + d[0], y + d[1], z + d[2])) each(x + d[0], y + d[1], z + d[2]);
     }
   }
-  // What steps among lit, or among dark, voxels reach from one of them.
+  // Returns the voxels that can be reached from one of them by steps among lit, or among dark,
+  // voxels.
   std::vector<uint8_t> Reached(std::array<int32_t, 3> from, bool lit, bool any) const {
     std::vector<uint8_t> reached(rgb.size());
     std::vector<std::array<int32_t, 3>> open = {from};

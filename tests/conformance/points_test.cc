@@ -1,5 +1,5 @@
-// Points without thickness, however they lie: many in one place, in order, nowhere; in several
-// layers; coming and leaving.
+// Tests points without thickness in many arrangements: many in one place, in order, none; in
+// several layers; inserted and removed.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,7 +17,7 @@ using Corner = std::array<float, 3>;
 
 class PointClouds : public EngineConformance {
  protected:
-  // `count` points between two corners, each of a colour of its own.
+  // Inserts `count` points between two corners, each with a colour of its own.
   ModelGeometry& Put(uint64_t id, uint64_t layer, uint32_t count, Corner lo, Corner hi) {
     std::mt19937_64 random(id);
     scene_.layers[layer].id = layer;
@@ -39,7 +39,7 @@ class PointClouds : public EngineConformance {
   }
   void ExpectDrawn() { DrawnLikeOracle(scene_, target_); }
 
-  const Target target_ = CubeTarget(70);  // no multiple of a region's sides
+  const Target target_ = CubeTarget(70);  // not a multiple of a region's sides
   SceneModel scene_;
 };
 
@@ -61,7 +61,7 @@ TEST_P(PointClouds, InOneRegionOrOneVoxel) {
   ExpectDrawn();
 }
 
-// So that what comes together lies together, in numbers of all sizes.
+// Neighbouring points are consecutive, in groups of all sizes.
 TEST_P(PointClouds, InOrder) {
   ModelGeometry& g = Put(1, 1, 20'000, kBelow, kAbove);
   std::vector<uint32_t> order;
@@ -128,7 +128,7 @@ TEST_P(PointClouds, InLayersWithPrioritiesAndErasing) {
   scene_.layers[4].plane_count = 1;
   scene_.layers[4].planes[0] = {1, 1, 0, -70};
   ExpectDrawn();
-  // With others, and as a mask.
+  // Together with other shapes, and as a mask.
   scene_.geometries[7] = SolidBox(7, {30, 30, 30}, {30, 20, 10}, 0x3040FF);
   scene_.drawables[7] = {.id = 7, .geometry = 7, .layer = 2, .priority = 1};
   scene_.layers[2].has_mask = 1;
@@ -142,7 +142,7 @@ TEST_P(PointClouds, OfMoreLayersThanHaveListsOfTheirOwn) {
   ExpectDrawn();
 }
 
-// The same scene again and again, a part of it changed: drawn as it would be anew.
+// The same scene again and again with a part of it changed: drawn as if it were new.
 TEST_P(PointClouds, ComeAndLeave) {
   EngineDriver engine = Make();
   ASSERT_TRUE(engine.SetTarget(target_).ok());
@@ -150,7 +150,7 @@ TEST_P(PointClouds, ComeAndLeave) {
   for (uint64_t id = 1; id <= 20; ++id) {
     Put(id, 1 + id % 2, 100 + 150 * static_cast<uint32_t>(id % 7), kBelow, kAbove);
   }
-  // Two of the same points, and two of the same voxels.
+  // Two with the same points, and two with the same voxels.
   scene_.geometries[2].positions = scene_.geometries[1].positions;
   scene_.geometries[2].colors = scene_.geometries[1].colors;
   scene_.geometries[2].record.vertex_count = scene_.geometries[1].record.vertex_count;

@@ -1,5 +1,5 @@
-// Each primitive's scalar definition against the oracle's, item by item and box by box, where it is
-// hard: far away, on faces and centres, along axes, with ties, in both directions.
+// Compares each primitive's scalar definition with the oracle's, item by item and box by box, in
+// hard cases: far away, on faces and centres, along axes, with ties, in both directions.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -25,7 +25,8 @@ DenseVolume Grid() {
   return grid;
 }
 
-// Collects from an engine's primitive, in boxes of `step` voxels that make up the grid.
+// Collects voxels from an engine's primitive, in boxes of `step` voxels that together make up the
+// grid.
 template <class Draw>
 Voxels InBoxes(int32_t step, const Draw& draw) {
   Voxels voxels;
@@ -52,8 +53,8 @@ Voxels FromOracle(const PlotAll& plot_all) {
   return voxels;
 }
 
-// Coordinates that find mistakes: on and just beside faces and centres,
-// inside, around and far away.
+// Coordinates that reveal errors: on and just beside faces and centres, inside, around and far
+// away.
 class HardCoordinates {
  public:
   explicit HardCoordinates(SceneGenerator& generator) : generator_(generator) {}
@@ -87,7 +88,7 @@ class HardCoordinates {
           c = generator_.Int(-3 * 256, (kSize + 3) * 256);
       }
     }
-    // Differences in proportion give ties at edges and corners.
+    // Proportional differences give ties at edges and corners.
     if (used_ && generator_.Chance(0.15)) {
       const int64_t d = generator_.Int(-kSize, kSize) * 256;
       for (int a = 0; a < 3; ++a) u.v[a] = last_.v[a] + d * generator_.Int(-1, 1);
@@ -222,7 +223,7 @@ TEST(Primitives, ThickTrianglesEqualTheOracleInEveryBox) {
   EXPECT_GT(hits, 20000u);
 }
 
-// 64 and 128 bits must agree where both are allowed.
+// The 64-bit and 128-bit versions must agree where both are allowed.
 TEST(Primitives, NarrowTrianglesEqualWideOnes) {
   SceneGenerator generator(SeedOr(40));
   const Box3 box{{0, 0, 0}, {kSize, kSize, kSize}};

@@ -17,7 +17,7 @@ class ProgramGenerator {
 
   Graph& graph() { return graph_; }
 
-  // A shape that is likely to have a surface here, or anything at all.
+  // Returns a shape that is likely to have a surface here, or any shape at all.
   Node Shape(int depth) {
     switch (random_.Int(0, depth > 0 ? 7 : 3)) {
       case 0:  // a ball, or an ellipsoid

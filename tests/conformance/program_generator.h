@@ -5,7 +5,7 @@
 
 namespace voxeld::gpu::conformance {
 
-// Fills in program and rings of a shape of about `size`.
+// Fills in the program and the rings of a shape of about `size`.
 void AddProgram(SceneGenerator& random, int size, ModelGeometry& g);
 
 }  // namespace voxeld::gpu::conformance

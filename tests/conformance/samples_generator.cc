@@ -27,7 +27,7 @@ void AddSamples(SceneGenerator& random, ModelGeometry& g) {
                                                           : 250;
   head.low = static_cast<float>(random.Real(0, most / 2));
   head.scale = static_cast<float>(random.Real(20, 400) / most);
-  // Now and then a sample's own number, or where many of them are alike.
+  // Now and then the value of a sample, or one that many samples share.
   head.level = static_cast<float>(random.Chance(0.3)   ? std::floor(most / 2)
                                   : random.Chance(0.3) ? most
                                                        : random.Real(0, most));
@@ -41,7 +41,7 @@ void AddSamples(SceneGenerator& random, ModelGeometry& g) {
   }
   auto* const bytes = reinterpret_cast<unsigned char*>(
       &g.indices[kSampleHeadWords + SampleHead::kTableEntries + head.bricks]);
-  // A few soft lumps, so that much of it is alike, and some noise.
+  // A few soft lumps, so that much of it is uniform, and some noise.
   double centre[3], period = random.Real(2, 15);
   for (double& c : centre) c = random.Real(-5, 25);
   const bool noise = random.Chance(0.3), gaps = random.Chance(0.3);

@@ -1,4 +1,4 @@
-// Random grids of samples: of any format, with what is nothing, as volumes and at levels.
+// Random grids of samples: of any format, with NaNs and infinities, as volumes and at levels.
 #pragma once
 
 #include "tests/conformance/scene_generator.h"
@@ -6,7 +6,7 @@
 
 namespace voxeld::gpu::conformance {
 
-// Fills the indices of a kSamples; the rest of the record is set.
+// Fills the indices of a kSamples; the rest of the record is already set.
 void AddSamples(SceneGenerator& random, ModelGeometry& g);
 
 }  // namespace voxeld::gpu::conformance

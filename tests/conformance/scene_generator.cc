@@ -72,7 +72,7 @@ Target SceneGenerator::RandomTarget() {
   target.tone.dither = static_cast<display::Dither>(Int(0, 2));
   if (Chance(0.3)) target.tone.density = display::Density::kEven;
   target.tone.sampling = static_cast<display::Sampling>(Int(0, 1));
-  const bool alike = Chance(0.5);  // of all channels
+  const bool alike = Chance(0.5);  // whether all channels are alike
   display::Tone::Curve curve{};
   for (size_t c = 0; c < 3; ++c) {
     const double gamma = Real(0.5, 3), white = alike ? 1 : Real(0.2, 1);
@@ -108,7 +108,7 @@ double SceneGenerator::RandomCoordinate(int size) {
 
 void SceneGenerator::AddVertices(ModelGeometry& g, uint32_t count, int size) {
   const bool far = Chance(0.08);
-  const double spread = Chance(0.4) ? Real(0.1, 6) : 0;  // small things near one place
+  const double spread = Chance(0.4) ? Real(0.1, 6) : 0;  // small items near one place
   double place[3];
   for (double& p : place) p = RandomCoordinate(size);
   for (uint32_t i = 0; i < count; ++i) {
@@ -128,7 +128,7 @@ void SceneGenerator::AddControlPoints(ModelGeometry& g, int size) {
   r.topology = static_cast<Topology>(Int(0, 1));
   const bool strip = r.topology == Topology::kStrip;
   if (r.kind == PrimitiveKind::kPatches) {
-    // Near one another: far ones make more triangles than the plain reference has time for.
+    // Near one another: distant ones make more triangles than the plain reference has time for.
     const double reach = Real(1, size);
     for (uint32_t i = 0; i < std::min(count, 2u) * 16 * 3; ++i) {
       g.positions.push_back(static_cast<float>(size / 2.0 + Real(-reach, reach)));
@@ -142,7 +142,7 @@ void SceneGenerator::AddControlPoints(ModelGeometry& g, int size) {
   for (uint32_t i = 0; i < r.vertex_count; ++i) g.colors.push_back(RandomColor());
 }
 
-// Closed, and now and then one in the other.
+// Closed, and now and then one inside the other.
 void SceneGenerator::AddTetrahedra(ModelGeometry& g, int size) {
   constexpr uint32_t kFaces[] = {0, 1, 2, 0, 3, 1, 1, 3, 2, 2, 3, 0};
   const uint32_t count = static_cast<uint32_t>(Int(1, 3));
@@ -212,7 +212,8 @@ ModelGeometry SceneGenerator::RandomGeometry(uint64_t id, int size) {
   return g;
 }
 
-// Any picture, of any levels, at places that may be none.
+// Adds any picture with any number of levels, at texture coordinates that are now and then any
+// bits.
 void SceneGenerator::AddTexture(ModelGeometry& g) {
   const int64_t most = Chance(0.2) ? 100 : 9;
   g.record.texture_width = static_cast<uint16_t>(Int(1, most));
@@ -232,12 +233,12 @@ Affine SceneGenerator::RandomTransform(int size) {
   switch (Int(0, 4)) {
     case 0:
       return t;
-    case 1:  // a shift, whole or not
+    case 1:  // a shift, by integers or not
       for (int row = 0; row < 3; ++row) {
         t.m[row * 4 + 3] = Chance(0.5) ? static_cast<double>(Int(-5, 5)) : Real(-5, 5);
       }
       return t;
-    case 2: {  // a turn about the middle, with a stretch
+    case 2: {  // a rotation about the middle, with a stretch
       const double angle = Real(0, 7), scale = Real(0.3, 2), middle = size / 2.0;
       const double c = std::cos(angle) * scale, s = std::sin(angle) * scale;
       t.m[0] = c, t.m[1] = -s, t.m[4] = s, t.m[5] = c, t.m[10] = Real(0.3, 2);
@@ -254,7 +255,7 @@ Affine SceneGenerator::RandomTransform(int size) {
   }
 }
 
-// Through some place of interest, in any direction and of any length.
+// Returns a plane through some place of interest, in any direction and with a normal of any length.
 ClipPlane SceneGenerator::RandomPlane(int size) {
   double n[3], at[3];
   for (double& p : at) p = RandomCoordinate(size);
@@ -270,7 +271,7 @@ ClipPlane SceneGenerator::RandomPlane(int size) {
   return {n[0], n[1], n[2], d};
 }
 
-// Along any axis, round or not.
+// Returns a cylinder along any axis, circular or not.
 ClipCylinder SceneGenerator::RandomCylinder(int size) {
   ClipCylinder cylinder;
   double* const m = cylinder.unit.m;
@@ -316,7 +317,7 @@ LayerRecord SceneGenerator::RandomLayer(uint64_t id) {
   return l;
 }
 
-// By another of the scene, or itself, or one that is not there.
+// Masks a layer by another of the scene, by itself, or by one that does not exist.
 void SceneGenerator::RandomMask(LayerRecord& layer, const SceneModel& scene) {
   if (!Chance(0.25)) return;
   layer.has_mask = 1;
@@ -359,7 +360,7 @@ void SceneGenerator::Change(SceneModel& scene, int size, DeltaBuffer& delta) {
     delta.Put(scene.drawables[id]);
   };
   switch (Int(0, 6)) {
-    case 0: {  // a new geometry, for a new drawable or one that is there
+    case 0: {  // a new geometry, for a new drawable or an existing one
       const uint64_t id = next_id_++;
       scene.geometries[id] = RandomGeometry(id, size);
       delta.Put(scene.geometries[id]);
@@ -382,7 +383,7 @@ void SceneGenerator::Change(SceneModel& scene, int size, DeltaBuffer& delta) {
     }
     case 4: {
       const uint64_t id = Chance(0.2) ? next_id_++ : RandomId(scene.layers);
-      if (scene.layers.contains(id) && Chance(0.4)) {  // where it is drawn, alone
+      if (scene.layers.contains(id) && Chance(0.4)) {  // where it is drawn alone
         scene.layers[id].plane_count = scene.layers[id].has_region = 0;
         scene.layers[id].cylinder_count = scene.layers[id].has_mask = 0;
         RandomClip(scene.layers[id], 20);
@@ -393,7 +394,7 @@ void SceneGenerator::Change(SceneModel& scene, int size, DeltaBuffer& delta) {
       delta.Put(scene.layers[id]);
       break;
     }
-    case 5: {  // drop what is not used
+    case 5: {  // drops an unused geometry
       const uint64_t id = RandomId(scene.geometries);
       const bool used = std::any_of(scene.drawables.begin(), scene.drawables.end(),
                                     [&](const auto& d) { return d.second.geometry == id; });
@@ -402,7 +403,7 @@ void SceneGenerator::Change(SceneModel& scene, int size, DeltaBuffer& delta) {
       delta.Drop(Op::kDropGeometry, id);
       break;
     }
-    case 6: {  // drop a layer with everything in it
+    case 6: {  // drops a layer with everything in it
       if (scene.layers.size() < 3) return;
       const uint64_t id = RandomId(scene.layers);
       scene.layers.erase(id);

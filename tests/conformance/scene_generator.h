@@ -1,4 +1,4 @@
-// Random scenes, targets and changes, from a seed.
+// Random scenes, targets and changes, derived from a seed.
 #pragma once
 
 #include <cstdint>
@@ -9,25 +9,26 @@
 
 namespace voxeld::gpu::conformance {
 
-// VOXELD_SEED, or `fallback`. Every test that draws on chance prints what it used.
+// Returns VOXELD_SEED, or `fallback`. Every random test prints the seed that it used.
 uint64_t SeedOr(uint64_t fallback);
 
-// VOXELD_DELTAS, or 1000: how many frames are drawn after changes. For tools that slow a GPU down a
-// hundredfold.
+// Returns VOXELD_DELTAS, or 1000: how many frames are drawn after changes. For tools that slow a
+// GPU down a hundredfold.
 int DeltasWanted();
 
 class SceneGenerator {
  public:
   explicit SceneGenerator(uint64_t seed) : engine_(seed) {}
 
-  // A small display of every kind, any format, sampling, dither, number of sub-frames; any view.
+  // Returns a small display of any kind, with any format, sampling, dither and number of
+  // sub-frames, and any view.
   Target RandomTarget();
 
-  // Layers, geometries (some shared) and drawables of every kind,
-  // for a grid of about `size` voxels.
+  // Returns layers, geometries (some shared) and drawables of every kind, for a grid of about
+  // `size` voxels.
   SceneModel RandomScene(int size);
 
-  // One change to `scene`, written to `delta` as well.
+  // Makes one change to `scene`, and writes it to `delta` as well.
   void Change(SceneModel& scene, int size, DeltaBuffer& delta);
 
   int64_t Int(int64_t low, int64_t high);

@@ -1,4 +1,4 @@
-// What displays random scenes are drawn for.
+// The displays for which random scenes are drawn.
 #include <algorithm>
 #include <cstddef>
 #include <optional>
@@ -83,7 +83,7 @@ display::Correction SceneGenerator::RandomCorrection(const display::Geometry& ge
   return correction;
 }
 
-// In rows with gaps, or scattered.
+// Returns lights in rows with gaps, or scattered ones.
 display::Lattice SceneGenerator::RandomLattice() {
   display::Lattice lattice;
   lattice.width_px = static_cast<int32_t>(Int(1, 60));
@@ -107,7 +107,8 @@ display::Lattice SceneGenerator::RandomLattice() {
   return lattice;
 }
 
-// Of a lattice also a grid that is finer, coarser or beside its lights.
+// Returns the grid; for a lattice also one that is finer or coarser than its lights, or beside
+// them.
 display::VoxelGrid SceneGenerator::RandomGrid(const display::Geometry& geometry) {
   display::VoxelGrid grid = display::DefaultGrid(geometry);
   if (!std::holds_alternative<display::Lattice>(geometry.shape) || Chance(0.5)) return grid;

@@ -11,14 +11,14 @@ namespace voxeld::gpu::conformance {
 
 namespace {
 
-// Segments so small that they come and go while the tests run.
+// Returns a pool whose segments are so small that they are created and removed while the tests run.
 BulkPool& Bulk() {
   static const std::shared_ptr<BulkPool> pool =
       BulkPool::Create({.segment_bytes = 4096, .keep_bytes = 0});
   return *pool;
 }
 
-// By chance, but the same for the same geometry.
+// Chosen at random, but always alike for the same geometry.
 bool InBulk(const ModelGeometry& g) {
   return !g.positions.empty() &&
          std::hash<uint64_t>()(g.record.id * 0x9E3779B97F4A7C15u >> 17) % 2 == 0;

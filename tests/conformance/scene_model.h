@@ -1,4 +1,4 @@
-// A scene as plain data: what the oracle draws and what deltas are written from.
+// A scene as plain data: the oracle draws it, and deltas are written from it.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ struct SceneModel {
   std::map<uint64_t, LayerRecord> layers;
 };
 
-// One delta, growing.
+// One delta, to which operations are appended.
 class DeltaBuffer {
  public:
   void Put(const ModelGeometry& g);
@@ -31,11 +31,12 @@ class DeltaBuffer {
   void Put(const LayerRecord& l);
   void Drop(Op op, uint64_t id);
   void Reset();
-  // Forgets everything and puts `scene`.
+  // Forgets everything and inserts `scene`.
   void PutWhole(const SceneModel& scene);
 
   const std::vector<std::byte>& bytes() const { return bytes_; }
-  // What it refers to: of some geometries, by chance, the arrays lie in bulk memory.
+  // Returns the bulk memory that it refers to: the arrays of some geometries, chosen at random, are
+  // there.
   const std::vector<BulkBlock>& referred() const { return referred_; }
 
  private:

@@ -1,6 +1,7 @@
-// Shapes by their measures against their distances in double precision, voxel by voxel, on every engine:
-// what a solid holds; how near a shell must come and how far it may go; that nothing gets through a
-// surface; that a shift by whole voxels shifts the result. Their volumes: volumes_test.cc.
+// Compares shapes given by their measures with their distances in double precision, voxel by voxel,
+// on every engine: the contents of a solid; how near a shell must come and how far it may extend;
+// that no path leads through a surface; that a shift by whole voxels shifts the result. Their
+// volumes: volumes_test.cc.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -35,16 +36,17 @@ constexpr double kMargin = 6e-3;  // voxels: origins are snapped to 2⁻⁸ voxe
 struct Case {
   std::string name;
   std::function<FieldShape(Graph&)> make;
-  // The signed distance of a point, in the shape's units; with `edge` where the nearest place is an edge,
-  // along which shells are mitred. Of a surface without an inside the distance alone.
+  // The signed distance of a point, in the shape's units; sets `edge` where the nearest place is an
+  // edge, along which shells are mitred. For a surface without an inside, the distance without a
+  // sign.
   std::function<double(const Vector& p, bool& edge)> distance;
-  bool solid = true;  // it has an inside
-  bool exact = true;  // the distance is, not only its sign
+  bool solid = true;  // whether it has an inside
+  bool exact = true;  // whether the distance is exact, not only its sign
 };
 
 double Norm(const Vector& v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
 
-// Of spheres along a line: the greatest depth in any of them, by a fine search.
+// For spheres along a line: the greatest depth in any of them, found by a fine search.
 double CapsuleDistance(const Vector& p, const Vector& a, const Vector& b, double ra, double rb) {
   const auto at = [&](double t) { return Norm(p - (a + t * (b - a))) - (ra + t * (rb - ra)); };
   int best = 0;
@@ -61,7 +63,8 @@ double CapsuleDistance(const Vector& p, const Vector& a, const Vector& b, double
   return at((lo + hi) / 2);
 }
 
-// Of a convex polygon in the plane, counter-clockwise; the first edge is the axis, which is none.
+// For a convex polygon in the plane, counter-clockwise; its first edge is the axis, which does not
+// count as an edge.
 double SectionDistance(double across, double along,
                        const std::vector<std::array<double, 2>>& points, bool& edge) {
   double nearest = std::numeric_limits<double>::infinity();
@@ -122,7 +125,8 @@ std::vector<Case> Cases() {
   const Parallelepiped box{{0, 0.5, -0.5}, {{16, 2, 0}, {-3, 14, 4}, {2, -3, 18}}};
   cases.push_back({"parallelepiped", [=](Graph& g) { return box.Make(g); },
                    [=](const Vector& p, bool& edge) {
-                     // By faces; beyond one of them past another it is an edge.
+                     // The distance from the faces; a place that is beyond one face and past
+                     // another is nearest to an edge.
                      double most = -std::numeric_limits<double>::infinity();
                      int beyond = 0;
                      for (int a = 0; a < 3; ++a) {
@@ -195,7 +199,7 @@ class MeasuredShapes : public EngineConformance {
     EXPECT_EQ(engine_.Frame().status(), absl::OkStatus());
     return engine_.Voxels();
   }
-  // A turn about an axis, a uniform scale, the origin in the middle.
+  // Returns a rotation about an axis, a uniform scale, and the origin in the middle.
   static Affine Placed(SceneGenerator& random, double scale) {
     Vector axis{random.Real(-1, 1), random.Real(-1, 1), random.Real(0.1, 1)};
     axis = 1 / Norm(axis) * axis;
@@ -214,7 +218,7 @@ class MeasuredShapes : public EngineConformance {
     }
     return map;
   }
-  // Back from a voxel's centre: the map is a turn and a scale.
+  // Maps a voxel's centre back: the map is a rotation and a scale.
   static Vector Back(const Affine& map, int32_t x, int32_t y, int32_t z, double scale) {
     const double d[3] = {x + 0.5 - map.m[3], y + 0.5 - map.m[7], z + 0.5 - map.m[11]};
     double q[3];
@@ -231,7 +235,8 @@ size_t At(int32_t x, int32_t y, int32_t z) {
   return (static_cast<size_t>(z) * kSize + static_cast<size_t>(y)) * kSize + static_cast<size_t>(x);
 }
 
-// Dark voxels that steps from the grid's corner reach: across faces, or any.
+// Returns the dark voxels that steps from the grid's corner reach: across faces, or in any
+// direction.
 std::vector<uint8_t> Flood(const std::vector<uint32_t>& voxels, bool any) {
   std::vector<uint8_t> reached(voxels.size());
   std::vector<std::array<int32_t, 3>> open = {{0, 0, 0}};
@@ -351,7 +356,7 @@ TEST_P(MeasuredShapes, NothingGetsIntoAnArrow) {
           const double along = Along(p, arrow.start, unit);
           const double across = Norm(p - (arrow.start + along * unit));
           const bool shaft = along > 2 && along < length - 12 && across < 2;
-          const double left = length - along;  // to the tip
+          const double left = length - along;  // distance to the tip
           const bool head = left > 2 && left < 10 && across < left * 0.75 - 2.5;
           if (!shaft && !head) continue;
           ++inside;
@@ -391,7 +396,7 @@ TEST_P(MeasuredShapes, AShiftByWholeVoxelsShiftsThem) {
   }
 }
 
-// Smaller than a voxel: still there, and not much larger than one.
+// Shapes smaller than a voxel are still drawn, and not much larger than one voxel.
 TEST_P(MeasuredShapes, TinyOnesAreNotLost) {
   const Cone needle{{-8, -8, -8}, {8, 7, 6}, 0.01, 0.01, true};
   const Torus wire{{0, 0, 0}, 10, 0.01};
@@ -414,7 +419,7 @@ TEST_P(MeasuredShapes, TinyOnesAreNotLost) {
   }
 }
 
-// Whatever is past the edge of a flat cone or of a disc is dark, at every height.
+// Every voxel beyond the edge of a flat cone or of a disc is dark, at every height.
 TEST_P(MeasuredShapes, FlatOnesEndAtTheirRadii) {
   struct Flat {
     std::function<FieldShape(Graph&)> make;

@@ -1,4 +1,4 @@
-// A shift by whole voxels shifts the result, whatever is drawn; on every engine.
+// A shift by whole voxels shifts the result, for every shape; on every engine.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -37,7 +37,7 @@ void AddPoints(ModelGeometry& g, const std::vector<Vector>& points, bool colors 
   if (colors) g.record.color_mode = ColorMode::kPerVertex;
 }
 
-// Within 9 of the origin, up and down.
+// Returns places within 9 of the origin along each axis.
 std::vector<Vector> Places(size_t count) {
   std::vector<Vector> points;
   for (size_t i = 0; i < count; ++i) {
@@ -125,7 +125,7 @@ void AddSurfaces(std::vector<Named>& all) {
     AddPoints(patches, Places(16));
     mesh.record.kind = PrimitiveKind::kTriangles;
     AddPoints(mesh, Places(12));
-    // As a height map is: a grid of samples, two triangles to a square.
+    // Arranged like a height map: a grid of samples, with two triangles for each square.
     map.record.kind = PrimitiveKind::kTriangles;
     std::vector<Vector> samples;
     for (int i = 0; i < 25; ++i)
@@ -139,7 +139,7 @@ void AddSurfaces(std::vector<Named>& all) {
     AddPoints(filled, Places(4), false);
     filled.indices = {0, 1, 2, 0, 3, 1, 1, 3, 2, 2, 3, 0};
     filled.record.index_count = 12;
-    // A picture of 4 × 4 on a triangle mesh in one colour.
+    // A picture of 4 × 4 texels on a triangle mesh of one colour.
     ModelGeometry textured;
     textured.record.kind = PrimitiveKind::kTriangles;
     AddPoints(textured, Places(9), false);
@@ -169,7 +169,7 @@ void AddGrids(std::vector<Named>& all) {
   for (const SampleFilter filter : {SampleFilter::kLinear, SampleFilter::kNearest}) {
     all.emplace_back("volume", GridGeometry(11, filter, waves, false, 0));
     all.emplace_back("isosurface", GridGeometry(11, filter, waves, true, 140, {.thickness = 1.5F}));
-    // By the place along a direction.
+    // Coloured by the place along a direction.
     ModelGeometry colored = GridGeometry(11, filter, waves, true, 140);
     colored.indices[offsetof(SampleHead, by_level) / sizeof(uint32_t)] = 2;
     const float by_place[] = {11.5F, -7.25F, 9, 100};
@@ -197,7 +197,8 @@ TEST_P(Shifts, ByWholeVoxelsShiftEverything) {
   AddGrids(all);
   for (const auto& [name, geometry] : all) {
     SCOPED_TRACE(name + ", kind " + std::to_string(static_cast<uint32_t>(geometry.record.kind)));
-    // Its middle, of a grid that of its samples, comes to a place that is no voxel's corner or centre.
+    // Its middle (for a grid, that of its samples) is placed where there is neither a corner nor a
+    // centre of a voxel.
     Placement placed = Placed(0.9, 1.07, 0, 0);
     const double half = geometry.record.kind == PrimitiveKind::kSamples ? 5.5 : 0;
     const Vector corner = placed.Forth({-half, -half, -half});

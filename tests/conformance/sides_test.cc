@@ -1,5 +1,6 @@
-// Of any expression: wherever it has other signs at neighbouring voxels' centres, one of the two is lit, whatever the thickness;
-// so nothing gets through. Signs are worked out in double precision.
+// For any expression: wherever it has different signs at the centres of neighbouring voxels, one of
+// the two is lit, whatever the thickness, so that no path leads through the surface. Signs are
+// computed in double precision.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -25,7 +26,7 @@ struct Expression {
   std::function<double(const Point&)> value;
 };
 
-// Smooth, with edges, with jumps.
+// Returns expressions that are smooth, have edges, or have jumps.
 std::vector<Expression> Expressions() {
   return {
       {"gyroid",
@@ -69,7 +70,7 @@ std::vector<Expression> Expressions() {
   };
 }
 
-// Turned about two axes, 0.9 voxels a unit.
+// Returns a rotation about two axes, with 0.9 voxels a unit.
 Affine Turned() {
   const double c = std::cos(0.43), s = std::sin(0.43), k = std::cos(0.7), t = std::sin(0.7);
   const double turn[9] = {c, -s * k, s * t, s, c * k, -c * t, 0, t, k};
@@ -79,7 +80,7 @@ Affine Turned() {
   return map;
 }
 
-// −1 or 1; 0 where single precision may see it otherwise.
+// Returns −1 or 1; 0 where single precision may give another sign.
 int SideAt(const Expression& expression, const Affine& map, const Point& voxel) {
   int side = 0;
   for (int n = 0; n < 7; ++n) {

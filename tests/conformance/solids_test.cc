@@ -1,7 +1,8 @@
-// Solids against their shapes in closed form. The definition says in which order single-precision
-// operations are made; here it is judged whether they mean the shape: centre and half axes are
-// mapped in extended precision, and a voxel's centre is placed by volumes of parallelepipeds, with
-// no inverse map. Centres within kMargin of the surface are left to the definition, and counted.
+// Compares solids with their shapes in closed form. The definition states the order of the
+// single-precision operations; this test judges whether they describe the shape: centre and half
+// axes are mapped in extended precision, and a voxel's centre is located by volumes of
+// parallelepipeds, without an inverse map. Centres within kMargin of the surface are left to the
+// definition, and counted.
 #include <array>
 #include <cmath>
 #include <optional>
@@ -13,11 +14,11 @@ namespace solids_test {
 
 constexpr int32_t kSize = 32;
 constexpr double kPi = 3.14159265358979323846;
-constexpr long double kMargin = 2e-5L;  // of the shape's own half axes
+constexpr long double kMargin = 2e-5L;  // relative to the shape's own half axes
 
 using Vec = std::array<long double, 3>;
 
-// Of the parallelepiped with these edges, signed.
+// Returns the signed volume of the parallelepiped with these edges.
 long double Volume(const Vec& a, const Vec& b, const Vec& c) {
   return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
          a[2] * (b[0] * c[1] - b[1] * c[0]);
@@ -48,8 +49,8 @@ class ClosedForm {
     volume_ = Volume(axes_[0], axes_[1], axes_[2]);
   }
 
-  // False if the centre is too near to half-way between two units to be sure of its own, or the
-  // shape so thin somewhere that it is drawn thicker.
+  // Returns false if the centre is too near to half-way between two units to be sure of its own
+  // unit, or if the shape is so thin somewhere that it is drawn thicker.
   bool plain() const {
     if (!exact_ || std::abs(volume_) < 0.05L) return false;
     for (int axis = 0; axis < 3; ++axis) {
@@ -84,14 +85,14 @@ class ClosedForm {
     return reach < 1 ? Side::kInside : Side::kOutside;
   }
 
-  // Is (x, y, z) the voxel of the centre?
+  // Returns whether (x, y, z) is the voxel of the centre.
   bool Centre(int32_t x, int32_t y, int32_t z) const {
     return std::floor(centre_[0]) == x && std::floor(centre_[1]) == y &&
            std::floor(centre_[2]) == z;
   }
 
  private:
-  // `d` along a half axis: the axis' end is at 1.
+  // Returns `d` along a half axis, whose end is at 1.
   long double Along(int axis, const Vec& d) const {
     std::array<Vec, 3> edges = axes_;
     edges[static_cast<size_t>(axis)] = d;
@@ -105,12 +106,12 @@ class ClosedForm {
   bool exact_ = true;
 };
 
-// Is the voxel drawn? Nothing where a centre near the surface decides.
+// Returns whether the voxel is drawn; nullopt if a centre near the surface decides.
 std::optional<bool> Drawn(const ClosedForm& shape, const GeometryRecord& g, int32_t x, int32_t y,
                           int32_t z) {
   const Side side = shape.SideOf(x, y, z);
   if (side == Side::kNearSurface) return std::nullopt;
-  // A shape that misses its own centre's voxel has it all the same.
+  // A shape that misses the voxel of its own centre covers it all the same.
   if (side == Side::kOutside && shape.Centre(x, y, z)) return true;
   if (side == Side::kOutside || g.fill == Fill::kSolid) return side == Side::kInside;
   bool near = false;
@@ -198,7 +199,7 @@ TEST_P(Solids, HaveTheVolumesOfTheirShapes) {
     g.fill = Fill::kSolid;
     const float sizes[] = {0.01F, 0.02F, -0.03F, 9, 11, 13};
     std::copy(std::begin(sizes), std::end(sizes), g.params);
-    Affine map;  // leaning, stretched, within the grid
+    Affine map;  // sheared, stretched, within the grid
     const double leaning[] = {1, 0.2, 0, 16.1, -0.2, 0.9, 0.1, 15.9, 0.05, -0.1, 1.1, 16.2};
     std::copy(std::begin(leaning), std::end(leaning), map.m);
     const double lit = static_cast<double>(CountLit(Draw(g, map)));

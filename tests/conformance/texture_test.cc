@@ -1,4 +1,4 @@
-// Pictures on triangles.
+// Tests pictures on triangles.
 #include <bit>
 #include <cstdint>
 #include <functional>
@@ -12,9 +12,10 @@ namespace voxeld::gpu::conformance {
 namespace texture_test {
 
 constexpr int32_t kSide = 40;
-constexpr float kPlane = 20.5f;  // a layer of voxels' centres
+constexpr float kPlane = 20.5f;  // a layer of voxel centres
 
-// A square of two triangles across the volume, from corner to corner of a picture and so often of it along each side.
+// Returns a square of two triangles across the volume, from corner to corner of a picture, which is
+// repeated this often along each side.
 ModelGeometry Square(uint32_t width, uint32_t height, const std::vector<uint32_t>& picture,
                      float times = 1) {
   ModelGeometry g;
@@ -41,7 +42,8 @@ class Textures : public EngineConformance {
  protected:
   using Want = std::function<uint32_t(int32_t x, int32_t y)>;
 
-  // All that is drawn is in the plane, and what each of its voxels must be; as the oracle has it.
+  // Checks that everything drawn is in the plane, that each of its voxels is as wanted, and that
+  // the oracle agrees.
   void ExpectPlane(const ModelGeometry& g, const Want& want, uint32_t tint = 0xFFFFFF) {
     SceneModel scene = SceneOf(g);
     scene.drawables[1].tint = tint;
@@ -95,7 +97,8 @@ TEST_P(Textures, ColoursAndTintAreMultiplied) {
   ExpectPlane(g, [](int32_t, int32_t) { return 0x800000; });
 }
 
-// Four texels in each direction to a voxel: the level of one a voxel, so means of them.
+// Four texels to a voxel in each direction: the level with one texel to a voxel is used, so they
+// are averaged.
 TEST_P(Textures, FineTexelsAreMeans) {
   std::vector<uint32_t> picture;
   for (uint32_t i = 0; i < 160 * 160; ++i) {
@@ -104,7 +107,7 @@ TEST_P(Textures, FineTexelsAreMeans) {
   ExpectPlane(Square(160, 160, picture), [](int32_t, int32_t) { return 0x808000; });
 }
 
-// Three columns of texels to two of voxels, which is not fine enough for means.
+// Three columns of texels to two of voxels, which is not fine enough for averaging.
 TEST_P(Textures, TexelsHalfAsLargeAsVoxelsAreDrawnAsTheyAre) {
   std::vector<uint32_t> picture;
   for (uint32_t i = 0; i < 60 * 40; ++i) picture.push_back(1 + i % 60 * 4);

@@ -1,5 +1,5 @@
-// Thick triangles by their distances, of meshes, height maps and Bézier patches; their order, what
-// is left of those without area, their colours and pictures; on every engine.
+// Compares thick triangles with their distances, in meshes, height maps and Bézier patches; tests
+// their order, triangles without area, and colours and pictures; on every engine.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -21,7 +21,7 @@ using implicit::Dot;
 using implicit::Length;
 
 constexpr int32_t kSize = 44;
-// Vertices are snapped to 2⁻⁸ voxel: each is half of that off, along each axis, at most.
+// Vertices are snapped to 2⁻⁸ voxel: each is off by at most half of that along each axis.
 constexpr double kMargin = 4e-3;
 
 struct Mesh {
@@ -30,7 +30,7 @@ struct Mesh {
   std::vector<std::array<uint32_t, 3>> triangles;
 };
 
-// Within 12 of the origin.
+// Returns meshes within 12 of the origin.
 std::vector<Mesh> Meshes() {
   Mesh single{"one triangle", {{-11, -7, -3}, {10, -4, 5}, {1, 11, -2}}, {{0, 1, 2}}};
   Mesh needle{"a needle", {{-11, -7, -9}, {10, 8, 9}, {10.02, 8.05, 8.9}}, {{2, 0, 1}}};
@@ -69,8 +69,8 @@ double SegmentDistance(const Vector& p, const Vector& a, const Vector& b) {
   return Length(p - (a + t * (b - a)));
 }
 
-// The place over a triangle has coordinates in it, by the normal equations; where one is negative
-// an edge is nearest.
+// The place over a triangle has coordinates in it, by the normal equations; where one of them is
+// negative, an edge is nearest.
 double TriangleDistance(const Vector& p, const Vector& a, const Vector& b, const Vector& c) {
   const Vector u = b - a, v = c - a, w = p - a;
   const double uu = Dot(u, u), uv = Dot(u, v), vv = Dot(v, v), wu = Dot(w, u), wv = Dot(w, v);
@@ -86,8 +86,8 @@ class ThickTriangles : public PlacedShapes {
  protected:
   ThickTriangles() : PlacedShapes(kSize) {}
 
-  // Voxels that are within `radius` by `distance` or belong to the thin surface, and no others;
-  // what is as near as makes no difference may be either.
+  // Checks that the voxels are those within `radius` by `distance`, and those of the thin surface,
+  // and no others; those that are at `radius` within the margin may be lit or not.
   void ExpectWithin(const Drawn& thick, const Drawn& thin, double radius, double margin,
                     const std::function<double(int32_t, int32_t, int32_t)>& distance) {
     uint64_t missing = 0, far = 0, within = 0, without_thin = 0;
@@ -141,14 +141,13 @@ TEST_P(ThickTriangles, AreWhatLiesWithinHalfTheirThickness) {
   }
 }
 
-// Of a patch whose points lie so that it is a part of a plane or of a parabolic cylinder, z =
-// x²/20.
+// A patch whose control points make it a part of a plane or of a parabolic cylinder, z = x²/20.
 TEST_P(ThickTriangles, OfPatchesAreAboutWhatLiesWithinHalfTheirThickness) {
   const Placement placed = Placed(0.4, 1, kSize / 2.0, 0.2);
   for (const double bend : {0.0, 1.0 / 20}) {
     ModelGeometry g;
     g.record.kind = PrimitiveKind::kPatches;
-    // Of x from −12 to 12, whose control points are evenly apart; those of x² are as of its polar
+    // For x from −12 to 12, with evenly spaced control points; those of x² come from its polar
     // form.
     for (int v = 0; v < 4; ++v) {
       for (int u = 0; u < 4; ++u) {
@@ -161,7 +160,7 @@ TEST_P(ThickTriangles, OfPatchesAreAboutWhatLiesWithinHalfTheirThickness) {
     g.record.vertex_count = 16;
     const Drawn thin = Draw(g, placed.map);
     g.record.thickness = 6;
-    // Its triangles are a quarter of a voxel from it at most.
+    // Its triangles are at most a quarter of a voxel away from it.
     ExpectWithin(Draw(g, placed.map), thin, 3, bend > 0 ? 0.25 + kMargin : kMargin,
                  [&](int32_t x, int32_t y, int32_t z) {
                    const Vector p = placed.Back(x, y, z);
@@ -192,7 +191,7 @@ TEST_P(ThickTriangles, HaveTheSameVoxelsFromEachOrderOfTheirCorners) {
   }
 }
 
-// Corners in a row are the thick segment between the outer ones, corners in one place a thick
+// Collinear corners give the thick segment between the outer ones, coincident corners a thick
 // point.
 TEST_P(ThickTriangles, WithoutAreaAreSegmentsAndPoints) {
   const Affine map = Placed(0, 1, kSize / 2.0, 0.25).map;
@@ -217,8 +216,8 @@ TEST_P(ThickTriangles, WithoutAreaAreSegmentsAndPoints) {
   }
 }
 
-// Over the middle of an edge half of either end's, whatever the height; beyond a corner the
-// corner's.
+// Over the middle of an edge, half of each end's colour, whatever the height; beyond a corner, the
+// corner's colour.
 TEST_P(ThickTriangles, HaveTheColoursOfTheNearestPlace) {
   ModelGeometry g =
       GeometryOf({"", {{8, 8, 20.5}, {32, 8, 20.5}, {8, 32, 20.5}}, {{0, 1, 2}}}, {.thickness = 9});
@@ -231,7 +230,7 @@ TEST_P(ThickTriangles, HaveTheColoursOfTheNearestPlace) {
     EXPECT_EQ(drawn.At(7, 33, z), 0x0000FFu) << z;
     // 11.5 of 24 from the first to the second, and 0.5 of 24 to the third.
     EXPECT_EQ(drawn.At(19, 8, z), 0x807A05u) << z;
-    // Beyond the edge between these two: as at (19.5, 8).
+    // Beyond the edge between these two: the colour is that at (19.5, 8).
     EXPECT_EQ(drawn.At(19, 6, z), 0x857A00u) << z;
     // A third of each is at (16, 16): here 8.5 of 24 from either.
     EXPECT_EQ(drawn.At(16, 16, z), 0x4A5A5Au) << z;
@@ -272,13 +271,13 @@ TEST_P(ThickTriangles, TakePicturesThroughAllTheirThickness) {
     }
   }
   EXPECT_EQ(wrong, 0u);
-  // Beyond a side the texels along it go on.
+  // Beyond a side, the texels along it continue.
   EXPECT_EQ(drawn.At(0, 20, 20), color(0, 2));
   EXPECT_EQ(drawn.At(20, 1, 21), color(3, 0));
   EXPECT_EQ(drawn.At(20, 20, 16), 0u);
 }
 
-// Thick and thin ones at once, many of either, as the oracle has them; then the thick ones thinner.
+// Many thick and many thin ones at once equal the oracle's; then the thick ones become thinner.
 TEST_P(ThickTriangles, AmongThinOnesEqualTheOracle) {
   SceneGenerator random(SeedOr(31));
   Target target = CubeTarget(40);
@@ -312,7 +311,7 @@ TEST_P(ThickTriangles, AmongThinOnesEqualTheOracle) {
   for (uint64_t id = 1; id <= 2; ++id) {
     ModelGeometry& g = scene.geometries[id + 4] = scene.geometries[id];
     g.record.id = id + 4;
-    g.record.thickness = id == 1 ? 1.1F : 0.001F;  // the second: no unit is left of it
+    g.record.thickness = id == 1 ? 1.1F : 0.001F;  // the second one rounds to zero units
     thinner.Put(g);
     scene.drawables[id].geometry = id + 4;
     thinner.Put(scene.drawables[id]);

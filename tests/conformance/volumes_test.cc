@@ -1,5 +1,6 @@
-// Of every solid about 20 voxels in radius: it has its volume within 1 %, wherever it is and however turned; on every engine.
-// Of isosurfaces also that they are where the numbers have the level, and that nothing gets through.
+// Every solid of about 20 voxels in radius has its volume within 1 %, at any place and in any
+// orientation; on every engine. Isosurfaces are also where the samples have the level, and no path
+// leads through them.
 #include <cmath>
 #include <numbers>
 #include <string>
@@ -27,8 +28,8 @@ struct Solid {
   double volume;
 };
 
-// What two spheres have between them, one not within the other: a cone's frustum from circle to circle where the mantle touches
-// them, and of each sphere the cap beyond its circle.
+// The volume of two spheres, neither within the other, and the space between them: a cone's frustum
+// from circle to circle, where the cone touches them, and the cap of each sphere beyond its circle.
 double CapsuleVolume(double ra, double rb, double length) {
   const double sine = (ra - rb) / length, square = 1 - sine * sine;
   const auto cap = [](double r, double height) {
@@ -103,7 +104,7 @@ std::vector<Solid> AllSolids() {
   }
   const Parallelepiped leaning{{}, {{36, 4, 0}, {-8, 34, 6}, {4, -6, 38}}};
   all.push_back({"parallelepiped", FieldGeometry(leaning, solid), 49'120});
-  // The shaft goes into the head, which is wider there.
+  // The shaft reaches into the head, which is wider there.
   all.push_back({"arrow", FieldGeometry(Arrow{{0, 0, -27}, {0, 0, 27}, 9, 24, 20}, solid),
                  kPi * 81 * 30 + kPi * 400 * 24 / 3});
   // A square with a hole: 40² − 16².
@@ -111,7 +112,7 @@ std::vector<Solid> AllSolids() {
                                        {-8, -8, 0},   {8, -8, 0},   {8, 8, 0},   {-8, 8, 0}};
   const std::vector<uint32_t> ends = {4, 8};
   all.push_back({"prism", FieldGeometry(Prism{corners, ends, 20}, solid), (1600 - 256) * 20});
-  // What a drill of radius 10 leaves of a ball.
+  // The rest of a ball with a hole of radius 10 drilled through it.
   all.push_back({"expression", Text("x^2+y^2+z^2 <= 400 and x^2+y^2 >= 100"),
                  4 * kPi / 3 * std::pow(300, 1.5)});
   all.push_back({"filled mesh", MeshRing(22, 10, 11), kPi * (22 * 22 - 100) * 22});
@@ -138,7 +139,7 @@ TEST_P(Volumes, AreThoseOfTheShapes) {
   }
 }
 
-// Samples a voxel apart of a ball's depth.
+// Returns samples, a voxel apart, of the depth in a ball.
 ModelGeometry BallBySamples(SampleFilter filter, const GeometryRecord& look) {
   constexpr uint32_t kSamples = 48;
   return GridGeometry(
@@ -148,7 +149,7 @@ ModelGeometry BallBySamples(SampleFilter filter, const GeometryRecord& look) {
       },
       true, 0, look);
 }
-// The middle of the samples is at that of the volume, or `off` of it.
+// The middle of the samples is at that of the volume, or `off` away from it.
 Placement BallPlaced(double off) {
   Placement placed = Placed(0.4 + 3 * off, 1, kSize / 2, off);
   const Vector corner = placed.Forth({-24, -24, -24});
@@ -164,8 +165,9 @@ TEST_P(Volumes, OfIsosurfacesToo) {
 
 TEST_P(Volumes, IsosurfacesAreWhereTheLevelIsAndNothingGetsThrough) {
   const Placement placed = BallPlaced(0.41);
-  // Numbers between samples of a distance are wrong by an eighth of its second derivatives, two of 1 / 20, at most, and so is
-  // their slope by a half of them; numbers of NEAREST by half a sample's diagonal.
+  // Values interpolated between samples of a distance are off by at most an eighth of its second
+  // derivatives, two of 1 / 20, and their slope by half of them; values of NEAREST are off by half
+  // a sample's diagonal.
   for (const auto& [filter, error] :
        {std::pair(SampleFilter::kLinear, 0.0125), {SampleFilter::kNearest, kHalfDiagonal}}) {
     for (const SurfaceRule rule : {SurfaceRule::kThin, SurfaceRule::kCover}) {
@@ -177,7 +179,7 @@ TEST_P(Volumes, IsosurfacesAreWhereTheLevelIsAndNothingGetsThrough) {
             Draw(BallBySamples(filter, {.rule = rule, .thickness = thickness}), placed.map);
         const std::vector<uint8_t> outside =
             drawn.Reached({0, 0, 0}, false, rule == SurfaceRule::kCover);
-        // Of two neighbours on either side the one that is nearer to it is lit.
+        // The nearer one of two neighbours on either side is lit.
         const double apart = rule == SurfaceRule::kCover ? std::sqrt(3.0) : 1;
         const double most = std::max(thickness / 2.0, apart / 2) + 2 * error;
         uint64_t lit = 0, inside = 0;
