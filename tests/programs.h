@@ -1,4 +1,4 @@
-// Where tests find the programs that they start.
+// Paths of the programs that tests start.
 #pragma once
 
 #include "tools/child/programs.h"

@@ -23,7 +23,7 @@ RefusedCalls::RefusedCalls(SystemCall call, int error, int times)
 RefusedCalls::~RefusedCalls() { refused_calls[static_cast<size_t>(call_)] = nullptr; }
 
 struct RefusedPlan {
-  // What this call fails with; 0: it is passed on.
+  // Returns the error with which this call fails; 0: it is passed on.
   static int Error(SystemCall call) {
     RefusedCalls* const plan = refused_calls[static_cast<size_t>(call)];
     if (plan == nullptr) return 0;
@@ -33,7 +33,7 @@ struct RefusedPlan {
     return plan->error_;
   }
 
-  // For those that tell by errno.
+  // For calls that report errors by errno.
   static bool Refuses(SystemCall call) {
     const int error = Error(call);
     if (error != 0) errno = error;

@@ -1,5 +1,5 @@
-// Calls that the system refuses when a test says so: in a library of its own, which is found before the C library's and passes on what
-// is not refused.
+// System calls that fail when a test says so: in a library of its own, which is found before the C
+// library's and passes on all other calls.
 #pragma once
 
 namespace voxeld {
@@ -15,7 +15,7 @@ enum class SystemCall {
   kSocketpair,
 };
 
-// ThreadSanitizer's own pthread_create finds the C library's past this one.
+// ThreadSanitizer's own pthread_create finds the C library's, bypassing this one.
 #if defined(__SANITIZE_THREAD__)
 inline constexpr bool kRefusesThreads = false;
 #elif defined(__has_feature)
@@ -28,16 +28,17 @@ inline constexpr bool kRefusesThreads = true;
 inline constexpr bool kRefusesThreads = true;
 #endif
 
-// As long as it lives: of the thread that made it, and of each call one at a time.
+// Refuses calls as long as it lives: those of the thread that made it, with one object at a time
+// for each call.
 class RefusedCalls {
  public:
-  // The next `times` fail with `error`; those that come after them, and all others, do not.
+  // The next `times` calls fail with `error`; later ones, and all others, do not.
   RefusedCalls(SystemCall call, int error, int times = 1);
   ~RefusedCalls();
   RefusedCalls(const RefusedCalls&) = delete;
   RefusedCalls& operator=(const RefusedCalls&) = delete;
 
-  int made() const { return made_; }  // since, whatever came of them
+  int made() const { return made_; }  // calls since then, failed or not
 
  private:
   friend struct RefusedPlan;

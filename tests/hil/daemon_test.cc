@@ -1,9 +1,11 @@
-// The unmodified voxeld on this system's USB: its display "usb" is the device that an emulator plays,
-// its display "other" is simulated and of the same geometry, so that both must show the same light.
+// The unmodified voxeld on this system's USB: its display "usb" is the device that an emulator
+// provides,
+// its display "other" is simulated and has the same geometry, so that both must show the same
+// light.
 //
-//   VOXELD_EMULATOR_CONTROL  the control socket of the emulator that plays
-//                            "voxlink,size=32x32x16,rate=60,serial=hil"
-//   VOXELD_HIL_UNPLUGS       how often the cable is pulled under load; default 5
+// VOXELD_EMULATOR_CONTROL  the control socket of the emulator that provides
+//                          "voxlink,size=32x32x16,rate=60,serial=hil"
+// VOXELD_HIL_UNPLUGS       how often the cable is pulled under load; default 5
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 #include <poll.h>
@@ -111,7 +113,7 @@ class OnUsb : public ::testing::Test {
         .has_value();
   }
 
-  // Sends one more scene, and waits for what became of it on both displays.
+  // Sends another scene, and waits for its outcomes on both displays.
   void Commit() {
     ++commits_;
     v1::StreamRequest request = SphereIn("a", "ball", 0.4 + 0.3 * std::sin(commits_));
@@ -121,7 +123,7 @@ class OnUsb : public ::testing::Test {
     ASSERT_TRUE(client_->Commit(commits_));
     client_->ReadOutcomes(client_->outcomes.size() + 2);
   }
-  // Until both displays have shown what was sent last.
+  // Commits until both displays have shown the scene that was sent last.
   bool CommitUntilShown() {
     for (int tries = 0; tries < 200; ++tries) {
       Commit();
@@ -149,7 +151,7 @@ class OnUsb : public ::testing::Test {
     EXPECT_TRUE(call->Finish().ok());
     return absl::StrFormat("%08x", display::Crc32c(std::as_bytes(std::span(rgb))));
   }
-  // The device shows what the other display shows, and nothing that it received was wrong.
+  // Checks that the device shows what the other display shows, and that it received nothing wrong.
   void ExpectSameLight() {
     const nlohmann::json device = Device();
     EXPECT_EQ(device.value("light_crc32c", ""), LightOfOther()) << device.dump();
@@ -206,7 +208,7 @@ TEST_F(OnUsb, StreamsAndEveryByteIsRight) {
   EXPECT_EQ(Device()["errors"], 0);
 }
 
-// Commits one after the other, in a thread of its own, until it is told to end.
+// Commits one scene after the other, in a thread of its own, until it is stopped.
 class OnUsb::Load {
  public:
   explicit Load(OnUsb& test)
@@ -231,8 +233,8 @@ class OnUsb::Load {
 
 class EachFault : public OnUsb, public ::testing::WithParamInterface<const char*> {};
 
-// Nobody loses a stream, every commit has its outcomes, the other display misses nothing, and the
-// device ends up with what was sent last.
+// No client loses its stream, every commit has its outcomes, the other display misses nothing, and
+// in the end the device shows the scene that was sent last.
 TEST_P(EachFault, IsOvercome) {
   Plug();
   StartDaemon();
@@ -255,8 +257,8 @@ INSTANTIATE_TEST_SUITE_P(OfThePlan, EachFault,
                                            "error:3@t9/in", "error:40@t9/in", "babble:1@t9/in",
                                            "nak:1000@t9/in", "corrupt:3@t9/in", "drop:4@t9/in"));
 
-// A device that lies about itself and in its reports, each time otherwise, while the other display's
-// client streams.
+// A device whose descriptors and reports are false, each time in another way, while the other
+// display's client streams.
 TEST_F(OnUsb, LiesHurtNobody) {
   Plug();
   StartDaemon();
@@ -277,7 +279,8 @@ TEST_F(OnUsb, LiesHurtNobody) {
   ExpectOtherMissedNothing();
 }
 
-// Light that moves is safe, and light that stands still may not be: a host that does nothing any more leaves nothing lit.
+// Moving light is safe, and light that stands still may not be: when the host stops, nothing must
+// stay lit.
 TEST_F(OnUsb, AStoppedHostsDisplayIsDarkUntilItGoesOn) {
   Plug();
   StartDaemon();
@@ -299,7 +302,7 @@ TEST_F(OnUsb, AStoppedHostsDisplayIsDarkUntilItGoesOn) {
     ExpectSameLight();
   }
   EXPECT_GE(*std::min_element(silence_ms.begin(), silence_ms.end()), 250);  // not before
-  // The best of ten: others may be late where the machine is.
+  // The best of ten: the others may be late because of the machine.
   EXPECT_LT(*std::min_element(seen_ms.begin(), seen_ms.end()), 250);
   PrintTimes("silence when it became dark", silence_ms);
   PrintTimes("stopped to dark", seen_ms);
@@ -317,13 +320,13 @@ TEST_F(OnUsb, PulledAndPluggedInUnderLoad) {
   std::vector<double> lost_ms, right_ms;
   for (int i = 0; i < unplugs && !HasFailure(); ++i) {
     Load load(*this);
-    // At a place in the stream that differs each time.
+    // At a different place in the stream each time.
     while (load.commits() < static_cast<uint64_t>(1 + i % 7)) std::this_thread::yield();
     const auto pulled = steady_clock::now();
     control_.Ask("unplug");
     EXPECT_TRUE(AwaitState(v1::DISPLAY_STATE_LOST));
     lost_ms.push_back(Milliseconds(steady_clock::now() - pulled));
-    // Every other time the scene stands still: then its light is the only one that may be seen.
+    // Every other time, the scene stands still: then its light is the only one that may be seen.
     const bool still = i % 2 == 0;
     if (still) load.End();
     const std::string expected = still ? LightOfOther() : "";

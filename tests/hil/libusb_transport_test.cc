@@ -1,7 +1,8 @@
-// libusb's transport on this system's USB, whatever that is: a real kernel's with an emulated device, or
-// one that is faked. VOXELD_EMULATOR_CONTROL: the control socket of the emulator that plays
-// "voxlink,size=4x4x2,rate=100,serial=hil". VOXELD_HIL_RETRIES, if it is set: the host controller tries again after
-// a protocol error, as xhci does.
+// Tests libusb's transport on this system's USB, which is either a real kernel's with an emulated
+// device, or a fake one.
+// VOXELD_EMULATOR_CONTROL: the control socket of the emulator that provides
+// "voxlink,size=4x4x2,rate=100,serial=hil".
+// VOXELD_HIL_RETRIES, if set: the host controller retries after a protocol error, as xhci does.
 
 #include <cstdlib>
 #include <memory>
@@ -39,7 +40,7 @@ class SystemCarrier final : public Carrier {
       woken_ = true;
       wake_.NotifyAll();
     });
-    // A device as new.
+    // Resets the device to its initial state.
     control_.Ask("unplug");
     control_.Ask("clear");
     Require([&] {
@@ -61,7 +62,8 @@ class SystemCarrier final : public Carrier {
     control_.Ask("fault " + emulator::ToText(fault));
   }
   void SetPlugged(bool plugged) override { control_.Ask(plugged ? "plug" : "unplug"); }
-  // Not everything wakes (a device that goes while none is open): looks again now and then.
+  // Some events do not wake it (a device that is removed while none is open), so it checks again
+  // now and then.
   bool RunUntil(const std::function<bool()>& done) override {
     const sync::TimeNs end = clock_.Now() + 20 * sync::kSecond;
     while (!done()) {

@@ -1,9 +1,10 @@
-// A faked kernel for one emulated device: runs a program that sees a USB device in /sys and /dev and
-// talks to it through usbfs, which in truth is a device model here. Run it under umockdev-wrapper.
+// A fake kernel for one emulated device: runs a program that sees a USB device in /sys and /dev and
+// talks to it through usbfs; the device is in fact a model in this process. Run it under
+// umockdev-wrapper.
 //
-//   umockdev_host DEVICE CONTROL PROGRAM [ARGUMENT…]     DEVICE as voxeld-emulator's
+//   umockdev_host DEVICE CONTROL PROGRAM [ARGUMENT…]     DEVICE as for voxeld-emulator
 //
-// Ends with the program's exit status.
+// Exits with the program's exit status.
 
 #include <linux/usbdevice_fs.h>
 #include <poll.h>
@@ -39,10 +40,10 @@ using display::emulator::ModelFacts;
 using display::emulator::ParseSetup;
 
 constexpr const char* kFolder = "/devices/pci0000:00/usb1/1-1";
-// As the kernel's usbfs_memory_mb.
+// Like the kernel's usbfs_memory_mb.
 constexpr size_t kMostInFlight = size_t{16} << 20;
-// The node is always ready to be written, so libusb asks all the time: an answer of "nothing yet" is
-// kept this long.
+// The node is always writable, so libusb polls all the time: an answer of "nothing yet" is delayed
+// by this much.
 constexpr sync::TimeNs kPark = 2 * sync::kMillisecond;
 
 int KernelStatus(TransferStatus status) {
@@ -126,7 +127,7 @@ class Host {
 
   std::string Node() const { return absl::StrFormat("bus/usb/001/%03d", number_); }
 
-  // Asks the device what it is.
+  // Reads the device's descriptors.
   void Enumerate() {
     facts_ = display::emulator::ReadFacts(*device_.model);
     for (char& c : facts_.serial) {
@@ -139,7 +140,7 @@ class Host {
   }
 
   void AddDevice() {
-    // A kernel does not take it otherwise.
+    // A kernel does not accept it otherwise.
     listed_ = facts_.device.size() >= 18 && facts_.configuration.size() >= 9;
     if (!listed_) return;
     const std::string path = "/dev/" + Node();
@@ -165,7 +166,7 @@ class Host {
     umockdev_testbed_uevent(testbed_, (std::string("/sys") + kFolder).c_str(), "add");
   }
 
-  // The node stays, and tells those who have it open that their device is gone.
+  // The node stays, and reports to those who have it open that their device is gone.
   void RemoveDevice() {
     if (!listed_) return;
     const std::string folder = std::string("/sys") + kFolder;
@@ -178,12 +179,12 @@ class Host {
     control_->Serve([this](std::string_view line) { return emulator::Control(device_, line); });
     device_.model->Tick();
     ReleaseParked();
-    // It may have been pulled and plugged in again since the last look.
+    // It may have been unplugged and plugged in again since the last check.
     const uint32_t plugs = device_.model->plugged() ? device_.model->plugs() : 0;
     const uint32_t had = std::exchange(plugs_, plugs);
     if (plugs == had) return;
     if (plugs != 0) {
-      ++number_;  // as the kernel does: an old handle does not come back to life
+      ++number_;  // as the kernel does: an old handle stays invalid
       Enumerate();
     }
     lock.unlock();
@@ -235,8 +236,9 @@ class Host {
     return TRUE;
   }
 
-  // What a request points to, read from the client's memory; that waits for the client, which may be stopped: without the lock, so that
-  // whoever asks about the device is answered. Owned by nobody, or by what is in flight.
+  // The data that a request points to, read from the client's memory. Reading waits for the client,
+  // which may be stopped, so it is done without the lock, and queries about the device are still
+  // answered. Owned by nobody, or by what is in flight.
   struct Memory {
     UMockdevIoctlData* first = nullptr;
     UMockdevIoctlData* second = nullptr;
@@ -347,7 +349,7 @@ class Host {
         }
         return Answer(client, EINVAL);
       }
-      case USBDEVFS_IOCTL:  // to detach a driver: there is none
+      case USBDEVFS_IOCTL:  // detaching a driver: the device has none
       case USBDEVFS_GETDRIVER:
         return Answer(client, ENODATA);
       default:
@@ -364,7 +366,7 @@ class Host {
   gboolean SynchronousControl(UMockdevIoctlClient* client, const Memory& memory) {
     usbdevfs_ctrltransfer control;
     std::memcpy(&control, memory.first->data, sizeof(control));
-    // The only one that libusb sends in this way: GET_CONFIGURATION.
+    // The only request that libusb sends in this way: GET_CONFIGURATION.
     if (control.bRequestType != 0x80 || control.bRequest != 8 || control.wLength < 1) {
       return Answer(client, EPIPE);
     }
@@ -415,17 +417,17 @@ class Host {
   std::mutex mutex_;  // handlers may run in umockdev's thread
   emulator::Emulated device_;
   ModelFacts facts_;
-  bool listed_ = false;  // the system has it
+  bool listed_ = false;  // the system has registered it
   sync::Clock& clock_;
   UMockdevTestbed* const testbed_;
   UMockdevIoctlBase* const handler_;
   std::unique_ptr<emulator::ControlSocket> control_;
   int number_ = 2;
-  uint32_t plugs_ = 1;  // of the device as it is in the testbed; 0: it is not there
+  uint32_t plugs_ = 1;  // of the device as it is in the testbed; 0: it is not plugged in
   uint64_t next_ = 1;
   std::map<uint64_t, InFlight> in_flight_;
   size_t bytes_in_flight_ = 0;
-  std::map<std::string, std::deque<UMockdevIoctlData*>> done_;  // by node
+  std::map<std::string, std::deque<UMockdevIoctlData*>> done_;  // answers by node
   std::list<Parked> parked_;
 };
 

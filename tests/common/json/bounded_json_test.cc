@@ -1,4 +1,5 @@
-// JSON that others wrote: no text is nested deeper than the bound by the time that it is a document.
+// Tests JSON from untrusted sources: a text that nests deeper than the bound never becomes a
+// document.
 #include "common/json/bounded_json.h"
 
 #include <gtest/gtest.h>

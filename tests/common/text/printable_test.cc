@@ -1,4 +1,4 @@
-// Text that others chose, made safe to print.
+// Tests that text from untrusted sources is made safe to print.
 #include "common/text/printable.h"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 namespace voxeld {
 namespace {
 
-// An encoder of the test's own.
+// An encoder that is independent of the tested code.
 std::string Utf8(uint32_t code) {
   std::string out;
   if (code < 0x80) {
@@ -70,7 +70,7 @@ TEST(Escape, LeavesNoHarmfulCharacterInAnyForm) {
     if (code != '\n') {
       EXPECT_EQ(EscapeLines(text).find(raw), std::string::npos) << code;
     }
-    // C0 controls never occur in JSON text but for white space between its parts.
+    // C0 controls never occur in JSON text except as white space between its parts.
     if (code >= 0x7f) {
       EXPECT_EQ(EscapeJson(text).find(raw), std::string::npos) << code;
     }

@@ -1,4 +1,5 @@
-// TOML that others wrote: what is read, and that no text makes the parser recurse without bound.
+// Tests TOML from untrusted sources: which texts are read, and that no text makes the parser
+// recurse without bound.
 #include "common/toml/parse_toml.h"
 
 #include <gmock/gmock.h>
@@ -62,7 +63,7 @@ TEST(ParseToml, RefusesATextThatIsTooLong) {
   EXPECT_TRUE(ParseToml("a=1\n", "a.toml", {.max_bytes = 4}).ok());
 }
 
-// A construct that nests, as deep as a number says, and the greatest depth that is accepted.
+// A construct that nests to a given depth, and the greatest depth that is accepted.
 struct Construct {
   const char* name;
   std::function<std::string(size_t depth)> text;
