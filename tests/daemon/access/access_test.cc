@@ -37,7 +37,8 @@ class AccessTest : public ::testing::Test {
     made->SetOnChange([this] { ++changes_; });
     return made;
   }
-  // A file of another size each time is another file, whatever the clock of the file system does.
+  // A file whose size differs each time counts as changed, whatever the clock of the file system
+  // does.
   void Put(const std::string& text) { PutFile(path_, text + std::string(++put_, '\n')); }
 
   const std::string folder_ = absl::StrCat(::testing::TempDir(), "/voxeld-access-", getpid());
@@ -74,7 +75,7 @@ TEST_F(AccessTest, EachIsKnownByWhatItShows) {
   EXPECT_EQ(access->Identify({.user = 99})->scopes.ToString(), "view");
   EXPECT_TRUE(access->Identify({})->scopes.empty());
 
-  // A wrong token is no way to be somebody else.
+  // A caller with a wrong token is not identified by other means.
   EXPECT_TRUE(absl::IsUnauthenticated(access->Identify({.token = "guess", .user = 7}).status()));
   EXPECT_TRUE(absl::IsUnauthenticated(access->Identify({.token = ""}).status()));
 }
@@ -135,7 +136,7 @@ TEST_F(AccessTest, AFileThatIsWrongLetsNobodyNewIn) {
   Put("[[token]]\nname = ");
   EXPECT_FALSE(access->Look().ok());
   EXPECT_THAT(access->trouble(), HasSubstr("grants.toml"));
-  // Calls under way go on; nobody new by a file that is not known to say so.
+  // Calls under way go on; new callers are refused if only the unreadable file could identify them.
   EXPECT_TRUE(access->Recheck(*caller).ok());
   EXPECT_TRUE(absl::IsUnavailable(access->Identify({.token = "secret"}).status()));
   EXPECT_TRUE(absl::IsUnavailable(access->Identify({.token = "guess"}).status()));
@@ -146,7 +147,7 @@ TEST_F(AccessTest, AFileThatIsWrongLetsNobodyNewIn) {
   std::filesystem::remove(path_);
   EXPECT_FALSE(access->Look().ok());
   EXPECT_TRUE(absl::IsUnavailable(access->Identify({.token = "secret"}).status()));
-  PutFile(path_, Token("left", "secret", "\"draw\""), 0666);  // anybody may have written it
+  PutFile(path_, Token("left", "secret", "\"draw\""), 0666);  // another user may have written it
   EXPECT_FALSE(access->Look().ok());
   EXPECT_TRUE(absl::IsUnavailable(access->Identify({.token = "secret"}).status()));
 
@@ -211,7 +212,7 @@ TEST_F(AccessTest, OthersOptionsAreInForceAtOnceOrNotAtAll) {
   ASSERT_TRUE(access->Look().ok());
   EXPECT_EQ(changes_, 3) << "expired since";
 
-  // No file any more: no tokens, and no trouble with one.
+  // Without a file there are neither tokens nor an error about one.
   PutFile(other, "wrong");
   ASSERT_FALSE(access->Look().ok());
   ASSERT_NE(access->trouble(), "");
@@ -245,7 +246,7 @@ TEST_F(AccessTest, TrustedAreRootAndTheDaemonsOwn) {
   EXPECT_EQ(access.Identify({.user = 0})->who, "user 0");
 }
 
-// What the log says of the file: its events, each with what is told.
+// Tests what is logged about the file: its events, with their values.
 class AccessLogTest : public AccessTest {
  protected:
   AccessLogTest()
@@ -253,7 +254,7 @@ class AccessLogTest : public AccessTest {
     EXPECT_EQ(std::fflush(file_), 0);
   }
   ~AccessLogTest() override { std::fclose(file_); }
-  // Since the last time.
+  // Returns what was logged since the last call.
   std::string Said() {
     std::string text;
     char part[4096];

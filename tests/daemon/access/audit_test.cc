@@ -46,7 +46,7 @@ class AuditTest : public ::testing::Test {
               std::make_shared<spdlog::sinks::ostream_sink_mt>(logged_, true)};
 };
 
-// While it is there, files of this process have so many bytes at the most.
+// As long as it exists, files of this process are limited to that many bytes.
 class SmallFiles {
  public:
   explicit SmallFiles(rlim_t bytes) {
@@ -179,7 +179,7 @@ TEST_F(AuditTest, ABufferThatIsFullCountsWhatItLoses) {
     EXPECT_THAT(Logged(), HasSubstr("audit entries are lost"));
     lost = stats.lost;
   }
-  // An entry that is larger than the buffer is written all the same where it can be.
+  // An entry that is larger than the buffer is written all the same if the file has room.
   (*audit)->Record("a", "", "Large", std::string(1000, 'x'), absl::OkStatus());
   const std::vector<json> lines = Lines(path_);
   ASSERT_EQ(lines.size(), 20 - lost + 1);
@@ -188,7 +188,7 @@ TEST_F(AuditTest, ABufferThatIsFullCountsWhatItLoses) {
   EXPECT_EQ(lines.back()["method"], "Large");
   EXPECT_EQ((*audit)->stats().lost, lost);
   Logged();
-  // The next failure is logged again, and counted on.
+  // The next failure is logged again, and counted in addition.
   const SmallFiles full(std::filesystem::file_size(path_));
   for (int i = 0; i < 20; ++i) (*audit)->Record("a", "", "Again", "", absl::OkStatus());
   EXPECT_THAT(Logged(), HasSubstr("audit entries are lost"));

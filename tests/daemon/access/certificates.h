@@ -1,4 +1,4 @@
-// Certificates for tests: an authority of the test's own, and what it signs.
+// Certificates for tests: an authority of the test's own, and the certificates that it signs.
 #pragma once
 
 #include <cstdint>
@@ -17,9 +17,10 @@ class TestAuthority {
   ~TestAuthority();
 
   const std::string& certificate() const { return certificate_; }  // PEM
-  // For the DNS name `name` and 127.0.0.1. Valid from and until so many seconds from now.
+  // Issues a certificate for the DNS name `name` and 127.0.0.1, valid from and until that many
+  // seconds from now.
   Issued Issue(const std::string& name, int64_t from_s = -3600, int64_t until_s = 3600);
-  // For the same, with nothing in the subject: what many authorities issue now.
+  // The same with an empty subject: many authorities issue such certificates now.
   Issued IssueWithoutSubject(const std::string& name);
 
  private:
@@ -30,7 +31,7 @@ class TestAuthority {
   std::string certificate_;
 };
 
-// Writes a file with that mode in place of what is there.
+// Replaces a file by one with this text and mode.
 void PutFile(const std::string& path, const std::string& text, unsigned mode = 0600);
 
 }  // namespace voxeld::daemon::access

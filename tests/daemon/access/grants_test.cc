@@ -20,7 +20,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-// Of "abc", by FIPS 180-2, appendix B.1.
+// The hash of "abc" according to FIPS 180-2, appendix B.1.
 constexpr char kHashOfAbc[] = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
 
 std::string Message(std::string_view text) {
@@ -254,7 +254,8 @@ TEST_F(GrantsFile, OfTheDaemonsOwnUserIsTrusted) {
 TEST_F(GrantsFile, ThatCannotBeReadIsAnError) {
   PutFile(path_, "# nothing\n", 0200);
   ASSERT_EQ(chmod(folder_.c_str(), 0755), 0);
-  // Root reads whatever there is: somebody else for a moment, for whom root's file is as good as their own.
+  // Root can read every file, so the test runs as another user for a moment, for whom root's file
+  // is as good as their own.
   const bool root = geteuid() == 0;
   if (root) {
     ASSERT_EQ(seteuid(12345), 0);
@@ -267,7 +268,7 @@ TEST_F(GrantsFile, ThatCannotBeReadIsAnError) {
   EXPECT_THAT(std::string(status.message()), HasSubstr("cannot be read"));
 }
 
-// A process' own memory is a file that can be opened, and not read where it begins.
+// A process' own memory is a file that can be opened, but not read at its beginning.
 TEST_F(GrantsFile, ThatFailsAsItIsReadIsAnError) {
   const absl::StatusOr<Grants> grants = ReadGrants("/proc/self/mem");
   EXPECT_TRUE(absl::IsUnavailable(grants.status())) << grants.status();

@@ -1,4 +1,5 @@
-// What decides who may do what, opened and looked at together: nothing begins with less than was asked for.
+// Tests access control as a whole, opened and checked together: it never starts with less than was
+// configured.
 #include "daemon/access/security.h"
 
 #include <gmock/gmock.h>
@@ -84,7 +85,7 @@ TEST_F(SecurityTest, NothingBeginsWithLessThanWasAskedFor) {
   TlsFiles files = files_;
   files.key = folder_ + "/none.pem";
   EXPECT_THAT(std::string(Open(files).status().message()), HasSubstr("none.pem"));
-  std::filesystem::create_directory(audit_);  // which is no file to write
+  std::filesystem::create_directory(audit_);  // which is not a writable file
   EXPECT_THAT(std::string(Open(files_).status().message()), HasSubstr("audit"));
 }
 

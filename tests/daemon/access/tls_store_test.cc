@@ -88,7 +88,7 @@ TEST_F(TlsStoreTest, AFileIsOneAndNotTooLarge) {
 
 TEST_F(TlsStoreTest, WhatCannotBeReadIsNotTakenForAnEmptyFile) {
   TlsFiles files = files_;
-  files.client_ca = "/proc/self/mem";  // can be opened, and not read where it begins
+  files.client_ca = "/proc/self/mem";  // can be opened, but not read at its beginning
   EXPECT_TRUE(absl::IsUnavailable(ReadTls(files, now_).status()));
   rlimit limit;
   ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &limit), 0);
@@ -107,7 +107,7 @@ TEST_F(TlsStoreTest, AKeyOfWhatAllMayDoAnythingWithIsRefused) {
     EXPECT_TRUE(absl::IsFailedPrecondition(ReadTls(files_, now_).status())) << mode;
   }
   PutFile(files_.key, issued.key, 0640);
-  // What goes to whoever asks is nobody's secret.
+  // A certificate that is sent to every client is not a secret.
   PutFile(files_.certificate, issued.certificate, 0644);
   PutFile(files_.client_ca, authority_.certificate(), 0644);
   EXPECT_TRUE(ReadTls(files_, now_).ok());
@@ -123,7 +123,7 @@ TEST_F(TlsStoreTest, IsValidFromItsFirstSecondToBeforeItsLast) {
   EXPECT_THAT(std::string(ReadTls(files_, expires).status().message()), HasSubstr("has expired"));
 }
 
-// The end of what cannot be read as a time is no end far away.
+// A certificate whose end cannot be parsed is not treated as valid for long.
 TEST_F(TlsStoreTest, OfATimeThatIsNoneHasExpired) {
   const Issued issued = authority_.Issue("display.example");
   std::string pem = issued.certificate;
@@ -152,7 +152,7 @@ TEST_F(TlsStoreTest, TheLastThatWasRightStays) {
   EXPECT_EQ((*store)->counts().taken, 1u);
   EXPECT_EQ((*store)->counts().refused, 0u);
 
-  // In the middle of an exchange: a certificate whose key has not come yet.
+  // In the middle of an exchange: a certificate whose key has not been written yet.
   const Issued next = authority_.Issue("display.example", -3600, 40 * 86400);
   PutFile(files_.certificate, next.certificate);
   EXPECT_FALSE((*store)->Look().ok());
@@ -228,7 +228,7 @@ TEST_F(TlsStoreTest, EachThingIsLoggedOnce) {
   EXPECT_EQ(count("expires soon"), 1u);
   EXPECT_EQ(count(absl::StrCat("seconds=", TlsStore::kWarnSeconds)), 1u);
   EXPECT_THAT((*store)->trouble(), HasSubstr("expires in 336 hours"));
-  // Of another one it is said anew.
+  // Another certificate is reported again.
   Put(authority_.Issue("display.example", -3600, 20 * 86400));
   EXPECT_TRUE((*store)->Look(true).ok());
   EXPECT_EQ(count("expires soon"), 2u);

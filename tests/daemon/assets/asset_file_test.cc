@@ -1,4 +1,4 @@
-// One asset's bytes, on disks that are full, that fail, and that are interrupted.
+// Tests the bytes of one asset on disks that are full, that fail, and with interruptions.
 #include "daemon/assets/asset_file.h"
 
 #include <fcntl.h>
@@ -136,7 +136,7 @@ TEST_F(AssetFileTest, ALinkIsNotFollowed) {
   EXPECT_EQ(Read(folder_ + "/elsewhere"), "hello");
 }
 
-// Three mebibytes and a half of "a": more than are hashed at once. By sha256sum.
+// 3.5 MiB of "a": more than is hashed at once. The hash is from sha256sum.
 TEST_F(AssetFileTest, WhatIsLargeIsHashedWhole) {
   constexpr uint64_t kBytes = 3'670'016;
   std::ofstream(whole_) << std::string(kBytes, 'a') << "and what comes behind";
@@ -146,7 +146,8 @@ TEST_F(AssetFileTest, WhatIsLargeIsHashedWhole) {
             "34c8bdd269f89a091cf17d5d23503940e0abf61c4b6544e42854b9af437f31bb");
 }
 
-// What cannot be kept is under the path that it had, for whoever goes on with it.
+// An asset that cannot be kept stays under its previous path, so that another upload can continue
+// it.
 class AssetFileKept : public AssetFileTest {
  protected:
   void ExpectNotKept(absl::StatusCode code, AssetFile& file) {
@@ -161,7 +162,7 @@ class AssetFileKept : public AssetFileTest {
 };
 
 TEST_F(AssetFileKept, WhereTheDiskDoesNotTakeItsBytes) {
-  ASSERT_EQ(mkfifo(part_.c_str(), 0600), 0);  // which no system brings to a disk
+  ASSERT_EQ(mkfifo(part_.c_str(), 0600), 0);  // which cannot be synced to a disk
   const Descriptor reads(open(part_.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
   ASSERT_TRUE(reads.ok());
   auto file = AssetFile::Open(part_, false);

@@ -1,4 +1,4 @@
-// A folder of assets that others have been at, and a disk that fails.
+// Tests a folder of assets that other programs have changed, and a disk that fails.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <spdlog/sinks/ostream_sink.h>
@@ -68,7 +68,8 @@ class AssetFolder : public ::testing::Test {
     if (absl::Status status = store_->Append(*upload, 0, bytes); !status.ok()) return status;
     return store_->Finish(*upload).status();
   }
-  // What is used least recently goes for a promise, which is not kept.
+  // The least recently used asset is removed to reserve room for an upload, which is then
+  // abandoned.
   void PushOut() {
     const auto other = store_->Begin(std::string(32, 'x'), 1, 0);
     ASSERT_TRUE(other.ok()) << other.status();
@@ -273,7 +274,7 @@ TEST_F(AssetFolder, WhatIsBroughtAnewIsNotDamagedWithWhatWas) {
   EXPECT_EQ(found->bytes, "abc");
 }
 
-// One is hashed at a time; who waits for that finds what has become of theirs.
+// One asset is hashed at a time; a caller that waited finds out whether its own is still there.
 TEST_F(AssetFolder, MayBePushedOutWhileAnotherIsHashed) {
   Put(kAbcName, "abc");
   Put(kHelloName, "hello");

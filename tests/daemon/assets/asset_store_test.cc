@@ -1,5 +1,5 @@
-// What is kept by its hash: uploads that break off, what goes when room is needed, and what a folder
-// has that is not as it was.
+// Tests assets stored by their hash: interrupted uploads, eviction when room is needed, and a
+// folder whose files have changed.
 #include "daemon/assets/asset_store.h"
 
 #include <gmock/gmock.h>
@@ -24,7 +24,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// By sha256sum, not by the code under test.
+// The hashes are from sha256sum, not from the code under test.
 struct Content {
   const char* bytes;
   const char* sha256;
@@ -45,14 +45,14 @@ class AssetStoreTest : public ::testing::TestWithParam<bool> {
   }
   ~AssetStoreTest() override { std::filesystem::remove_all(folder_); }
 
-  // Again, as after an end.
+  // Opens it again, as after a restart.
   void Open(AssetLimits limits = {
                 .max_asset_bytes = 10, .max_bytes = 4 * kSmall, .max_uploads = 3}) {
     store_.reset();
     store_ = AssetStore::Open(on_disk() ? folder_ : "", limits, clock_, nullptr);
     EXPECT_EQ(store_->figures().trouble, "");
   }
-  // Of the budget, what few bytes take.
+  // The part of the budget that a small asset takes.
   static constexpr uint64_t kSmall = AssetStore::kLeastCost;
   bool on_disk() const { return GetParam(); }
 
@@ -133,7 +133,7 @@ TEST_P(AssetStoreTest, AnUploadThatHasEndedIsNone) {
   const auto second = store_->Begin(kHello.digest(), 5, 3);
   ASSERT_TRUE(second.ok());
   clock_.Advance(30 * sync::kSecond);
-  store_->Heard(*first);  // says nothing for the second
+  store_->Heard(*first);  // has no effect on the second
   store_->Abandon(*first);
   EXPECT_TRUE(absl::IsAborted(store_->Append(*first, 3, "lo")));
   EXPECT_TRUE(absl::IsAborted(store_->Finish(*first).status()));
@@ -173,7 +173,7 @@ TEST_P(AssetStoreTest, WhatWasUsedLeastRecentlyGoes) {
   EXPECT_EQ(Find(kAbc), "abc");  // so hello is the older one
   const auto kept = store_->FindAsset(kHello.digest(), 0, 5);
   Find(kAbc);
-  Upload(kWorld);  // there is room for two
+  Upload(kWorld);  // two fit
   EXPECT_THAT(Find(kHello), HasSubstr("not here"));
   EXPECT_EQ(Find(kAbc), "abc");
   EXPECT_EQ(Find(kWorld), "world");
@@ -195,10 +195,10 @@ TEST_P(AssetStoreTest, UploadsUnderWayAreNotPushedOut) {
               HasSubstr("12288 bytes more do not fit beside 8192 of 1 uploads under way"));
   EXPECT_EQ(Find(kAbc), "abc") << "what is refused takes nobody's place";
   clock_.Advance(20 * sync::kSecond);
-  store_->Heard(*slow);  // something has come, and waits
+  store_->Heard(*slow);  // bytes have arrived, and wait
   clock_.Advance(20 * sync::kSecond);
   EXPECT_FALSE(store_->Begin(kWorld.digest(), 3 * kSmall, 0).ok());
-  clock_.Advance(10 * sync::kSecond);  // and brought nothing
+  clock_.Advance(10 * sync::kSecond);  // and nothing was stored
   EXPECT_TRUE(store_->Begin(kWorld.digest(), 3 * kSmall, 0).ok());
   EXPECT_TRUE(absl::IsAborted(store_->Append(*slow, 0, "x")));
 }
@@ -240,7 +240,7 @@ TEST_P(AssetStoreTest, APartOfAnotherSizeIsBegunAnew) {
   EXPECT_EQ(Find(kHello), "hello");
 }
 
-// Named and pushed out at once, by several threads.
+// Assets are named and evicted at the same time, by several threads.
 TEST_P(AssetStoreTest, MayBeNamedWhileOthersGo) {
   Open({.max_asset_bytes = 10, .max_bytes = 2 * kSmall});
   std::atomic<bool> stop = false;
@@ -264,7 +264,7 @@ TEST_P(AssetStoreTest, MayBeNamedWhileOthersGo) {
     for (const Content& content : {kAbc, kHello, kWorld}) {
       const std::string_view bytes = content.bytes;
       const auto upload = store_->Begin(content.digest(), bytes.size(), 0);
-      if (!upload.ok()) continue;  // it is here still
+      if (!upload.ok()) continue;  // it still exists
       EXPECT_TRUE(store_->Append(*upload, 0, bytes).ok());
       EXPECT_TRUE(store_->Finish(*upload).ok());
     }
@@ -368,7 +368,7 @@ TEST_P(AssetFolderTest, WhatIsSaidToBeHereHasBeenLookedAt) {
 TEST_P(AssetFolderTest, AnUploadThatWasKilledGoesOn) {
   const auto upload = store_->Begin(kHello.digest(), 5, 0);
   ASSERT_TRUE(store_->Append(*upload, 0, "hel").ok());
-  // As SIGKILL leaves it: a part whose owner said nothing more, and one that has only just begun.
+  // As SIGKILL leaves it: a part whose owner was silent, and one that has only just begun.
   std::filesystem::copy_file(folder_ + "/" + kHello.sha256 + ".part", folder_ + "/kept");
   store_.reset();
   std::filesystem::rename(folder_ + "/kept", folder_ + "/" + kHello.sha256 + ".part");
@@ -400,7 +400,7 @@ TEST_P(AssetFolderTest, AFullDiskAtTheBeginningTakesNothing) {
   rlimit before;
   ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &before), 0);
   rlimit none = before;
-  none.rlim_cur = 0;  // no descriptor is to be had
+  none.rlim_cur = 0;  // no descriptors are available
   ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &none), 0);
   const auto begun = store_->Begin(kHello.digest(), 5, 0);
   ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &before), 0);

@@ -26,7 +26,7 @@ int Answer(DiskCall call) {
   return answer == nullptr ? 0 : (*answer)(call);
 }
 
-// With the bytes that the system is to take; nothing: it fails, and errno says why.
+// Returns how many bytes the system may transfer; nullopt: the call fails with errno set.
 std::optional<size_t> Ask(DiskCall call, size_t size) {
   const int answer = Answer(call);
   if (answer == 0) return size;
@@ -52,7 +52,7 @@ DiskCalls::~DiskCalls() {
 using voxeld::daemon::assets::Ask;
 using voxeld::daemon::assets::DiskCall;
 
-// In place of the C library's.
+// These replace the C library's functions.
 extern "C" {
 
 ssize_t pread(int file, void* bytes, size_t size, off_t offset) {

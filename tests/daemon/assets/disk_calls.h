@@ -1,4 +1,4 @@
-// A disk that fails: what this program asks the system for a file goes through here.
+// A disk that fails: the file operations of this program go through here.
 #pragma once
 
 #include <cstdint>
@@ -8,11 +8,12 @@ namespace voxeld::daemon::assets {
 
 enum class DiskCall : uint8_t { kRead, kWrite, kSync };  // pread, pwrite, fsync
 
-// While it is there, `answer` is asked before each of these calls, in the caller's thread: 0: the system carries it out, else the
-// number of the error with which it fails, or kOneByte. One at a time.
+// As long as it exists, `answer` is called before each of these calls, in the caller's thread. It
+// returns 0 to let the system carry it out, the number of the error with which it fails, or
+// kOneByte. Only one may exist at a time.
 class DiskCalls {
  public:
-  static constexpr int kOneByte = -1;  // it reads or writes no more
+  static constexpr int kOneByte = -1;  // it reads or writes only one byte
   explicit DiskCalls(std::function<int(DiskCall)> answer);
   ~DiskCalls();
   DiskCalls(const DiskCalls&) = delete;

@@ -264,7 +264,7 @@ TEST(FindConfigFile, PrefersTheUsersOwn) {
   EXPECT_EQ(FindConfigFile(both, exists), "/xdg/voxeld/voxeld.toml");
 }
 
-// A file of its own under the test's folder.
+// Each test has a file of its own in the test's folder.
 class LoadedConfig : public ::testing::Test {
  protected:
   std::string Write(const std::string& text) {
@@ -357,7 +357,7 @@ absl::StatusOr<CommandLine> Parse(std::vector<const char*> arguments) {
   return ParseCommandLine(static_cast<int>(arguments.size()), arguments.data(), "1.2.3");
 }
 
-// As a shell's <(…) names it.
+// As a shell's <(…) passes it.
 TEST(ConfigFile, MayBeAPipeWhichIsReadOnce) {
   int ends[2];
   ASSERT_EQ(pipe(ends), 0);
@@ -433,7 +433,7 @@ TEST(Suggest, WhatIsLikeAndNothingElse) {
   EXPECT_EQ(Nearest("htp", known), "http");
   EXPECT_EQ(Nearest("displays", known), "display");
   EXPECT_EQ(Nearest("zebra", known), "");
-  // Half of the letters is a guess.
+  // If only half of the letters match, no suggestion is made.
   EXPECT_EQ(Nearest("cube", {"cone", "box"}), "");
   EXPECT_EQ(Nearest("remove", {"demo", "clear"}), "");
   EXPECT_EQ(Nearest("", known), "");

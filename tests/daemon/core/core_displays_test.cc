@@ -1,4 +1,4 @@
-// Displays: settings, patterns, captures, the end.
+// Tests displays: settings, patterns, captures, removal.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -36,7 +36,7 @@ TEST(CoreDisplays, NamesAreUniqueAndDisplaysComeBeforeStart) {
                                 {}, {.view = view});
   };
   EXPECT_EQ(add("main").code(), absl::StatusCode::kAlreadyExists);
-  // A scripted display shows what it gets: it holds nothing.
+  // A scripted display cannot hold a volume: it shows what it gets.
   const absl::Status unlocked = sim.core->AddDisplay(
       std::make_unique<testing::ScriptedDisplay>(testing::SmallDisplay("locked"), sim.clock), {},
       {.genlock = "wall"});
@@ -97,10 +97,10 @@ TEST(CoreDisplays, AViewThatTheSceneDoesNotFitIsRefused) {
   EXPECT_EQ(refused.code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(refused.message(), HasSubstr("entity \"x\" of layer \"a\""));
   EXPECT_EQ(sim.engine().targets.size(), 1u);
-  // Nor does a refused view stay behind as something to fit.
+  // Nor does a refused view stay behind as something that must fit.
   sim.Send(client, 2, Put("a", "x", 2));
   EXPECT_TRUE(client.sink->issues.empty());
-  // Once taken, it is what counts.
+  // Once it is accepted, it applies.
   sim.Send(client, 3, testing::DeleteAllMine());
   ASSERT_TRUE(sim.Update(update).ok());
   sim.Send(client, 4, Put("a", "x", 1));
@@ -119,7 +119,7 @@ TEST(CoreDisplays, ACaptureWaitsForThePatternThatWasSetBeforeIt) {
   update.pattern = TestPattern::kWhite;
   ASSERT_TRUE(sim.Update(update).ok());
   const auto captured = Capture(sim, sync::kSecond, 0);
-  EXPECT_TRUE(sim.Show());  // the pattern, on its way when the capture came
+  EXPECT_TRUE(sim.Show());  // the pattern, which was on its way when the capture was requested
   EXPECT_FALSE(captured->done());
   EXPECT_TRUE(sim.Show());  // sent again, whole
   ASSERT_TRUE(captured->done());
@@ -149,7 +149,7 @@ TEST(CoreDisplays, ANewViewIsDrawnAnew) {
   ASSERT_EQ(sim.engine().targets.size(), 2u);
   EXPECT_EQ(sim.engine().targets[1].view, gpu::Affine());
   EXPECT_EQ(sim.engine().frames.size(), 2u);
-  ASSERT_TRUE(sim.Update(update).ok());  // the same again: nothing to do
+  ASSERT_TRUE(sim.Update(update).ok());  // the same again: no effect
   EXPECT_EQ(sim.engine().frames.size(), 2u);
 }
 
@@ -182,7 +182,7 @@ TEST(CoreDisplays, APatternTakesTheScenesPlaceForAWhile) {
     ASSERT_TRUE(sim.Update(update).ok());
     EXPECT_TRUE(sim.Show());
   }
-  EXPECT_EQ(sim.engine().engines, 1);  // no delta was ever refused
+  EXPECT_EQ(sim.engine().engines, 1);  // no delta was refused
   ASSERT_EQ(sim.engine().scene->geometries().size(), 1u);
   EXPECT_EQ(sim.engine().scene->geometries().begin()->second.positions[0], 4);
   EXPECT_EQ(sim.engine().targets.back().view.m[0], 4);
@@ -204,7 +204,7 @@ TEST(CoreDisplays, ACaptureWaitsForTheSnapshotThatItAsksFor) {
   ASSERT_TRUE(captured->done());
   ASSERT_TRUE(captured->result.ok()) << captured->result.status();
   EXPECT_EQ(captured->result->volume, 3u);
-  // A snapshot that looks the same is shown by the volume before.
+  // A snapshot that looks the same is shown by the previous volume.
   sim.Send(client, 3, Put("a", "x", 2));
   const auto same = Capture(sim, sync::kSecond, 4);
   EXPECT_TRUE(sim.Show());
@@ -238,7 +238,7 @@ TEST(CoreDisplays, WhatWentWrongWithADeviceIsToldAfterwardsToo) {
   EXPECT_EQ(sim.GetStats().displays[1].device_trouble, "");
   sim.display(1).FailTransfers(3);
   sim.core->Step();
-  sim.core->Step();  // what was posted
+  sim.core->Step();  // the posted work
   const std::string name = sim.GetStats().displays[1].name;
   EXPECT_THAT(sim.transfers_failed, ElementsAre(Pair(name, ElementsAre(3u))));
   EXPECT_THAT(sim.GetStats().displays[1].device_trouble, HasSubstr("transfers failed 0 s ago"));
@@ -259,7 +259,7 @@ TEST(CoreDisplays, ACancelledCaptureHoldsNothingUp) {
   Simulation sim;
   sim.Start();
   const sync::TimeNs idle = sim.core->Step();
-  // One that waits for its snapshot, and one that waits for the device.
+  // A capture that waits for its snapshot, and one that waits for the device.
   for (const uint64_t at_least : {uint64_t{9}, uint64_t{0}}) {
     absl::Status status = absl::UnknownError("no answer");
     const CaptureId id = sim.core->Capture("main", 60 * sync::kSecond, at_least,

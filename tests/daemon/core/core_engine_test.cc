@@ -1,5 +1,5 @@
-// An engine in a process of its own that is lost: the CPU draws on, the engine comes back, and what
-// makes it fault is found.
+// Tests an engine in a process of its own that is lost: the CPU takes over, the engine returns, and
+// the entity that makes it fault is found.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -51,7 +51,7 @@ class CoreEngine : public ::testing::Test {
 
   DisplayFigures Figures(size_t display = 0) { return sim_->GetStats().displays[display]; }
 
-  // Commits an entity, and lets the display show what comes of it.
+  // Commits an entity, and lets the display show the result.
   void Draw(const std::string& id, float x, uint32_t color = 0xFFFFFF) {
     sim_->Send(client_, ++frame_id_, Put("a", id, Entity1(Dots(x, color))));
     ShowAll();
@@ -60,13 +60,13 @@ class CoreEngine : public ::testing::Test {
     while (sim_->Show()) {
     }
   }
-  // What the newest commit came to.
+  // Returns the outcome of the newest commit.
   Kind Outcome() {
     const std::vector<CommitOutcome> outcomes = client_.sink->OutcomesOf(frame_id_);
     EXPECT_EQ(outcomes.size(), 1u);
     return outcomes.empty() ? Kind::kLost : outcomes[0].kind;
   }
-  // Until nothing more is due soon.
+  // Advances the time until nothing more is due soon.
   void Advance(sync::TimeNs time) {
     for (sync::TimeNs step = 0; step < time; step += sync::kSecond / 20) {
       sim_->Advance(sync::kSecond / 20);
@@ -80,7 +80,7 @@ class CoreEngine : public ::testing::Test {
   }
 
   const std::shared_ptr<GpuScript> script_ = std::make_shared<GpuScript>();
-  FaultyGpu* newest_ = nullptr;  // that was made last
+  FaultyGpu* newest_ = nullptr;  // the newest one
   std::unique_ptr<Simulation> sim_;
   Simulation::Client client_;
   uint64_t frame_id_ = 0;
@@ -108,7 +108,7 @@ TEST_F(CoreEngine, ThatIsLostCostsNoVolumeAndComesBackAfterDrawingTheSameBytes) 
   EXPECT_EQ(figures.engine_returns, 1u);
   EXPECT_GE(figures.return_last_ns, sync::kSecond / 4);
   EXPECT_EQ(figures.return_last_ns, figures.return_max_ns);
-  // First alone, then in the process that all share.
+  // First in a process of its own, then in the one that all share.
   EXPECT_THAT(script_->shared, ElementsAre(true, false, true));
   EXPECT_THAT(Events(), ElementsAre(What::kLost, What::kTookOver, What::kReturned));
   Draw("three", -0.25f);
@@ -163,7 +163,7 @@ TEST_F(CoreEngine, AnEntityThatFaultsIsFoundPinnedAndLetGoWithItsEnd) {
   EXPECT_THAT(figures.engine_degraded, HasSubstr("drawn by the CPU"));
   EXPECT_GE(figures.engine_faults, 2u);
   EXPECT_EQ(figures.engine_returns, 1u);
-  // It may change, also into what faults.
+  // It may be changed, also into one that faults.
   Draw("6", 0.3f, kBad);
   EXPECT_EQ(Figures().engine, "cuda");
   EXPECT_EQ(Outcome(), Kind::kPresented);
@@ -234,7 +234,7 @@ TEST_F(CoreEngine, ThatIsLateIsNoFaultOfTheScene) {
   EXPECT_THAT(script_->shared, ElementsAre(true, false, false, true));
 }
 
-// Of one GPU of several: nothing in the scene is to blame, and nothing is searched for.
+// For one of several GPUs: nothing in the scene is to blame, and no search is made.
 TEST_F(CoreEngine, RanksOfUnequalMemoryAreNoFaultOfTheScene) {
   Draw("one", -0.5f);
   script_->unequal = 2;
@@ -304,7 +304,7 @@ TEST_F(CoreEngine, ThatCannotBeHadIsAskedForMoreAndMoreSeldom) {
   Advance(16 * sync::kSecond);
   EXPECT_EQ(Figures().engine, "cpu");
   EXPECT_THAT(Figures().engine_degraded, HasSubstr("no CUDA device can be used"));
-  EXPECT_EQ(Figures().engine_faults, 1u);      // that it is not there is no fault of the scene
+  EXPECT_EQ(Figures().engine_faults, 1u);  // an engine that is absent is not a fault of the scene
   EXPECT_EQ(script_->shared.size(), 1u + 6u);  // 0.25, 0.75, 1.75, 3.75, 7.75, 15.75 s
   script_->absent = absl::OkStatus();
   Advance(17 * sync::kSecond);

@@ -1,4 +1,5 @@
-// Owners take turns: a large commit, many commits or many sessions of one owner do not hold up the others.
+// Owners take turns: a large commit, many commits or many sessions of one owner do not delay the
+// others.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -18,7 +19,7 @@ using testing::Simulation;
 
 constexpr int kLarge = 20'000;  // operations; many slices
 
-// Hands over a commit of so many entities without letting the core run.
+// Passes a commit of that many entities without letting the core run.
 void Hand(Simulation::Client& client, int entities, const std::string& layer = "a") {
   std::vector<Operation> all;
   for (int i = 0; i < entities; ++i) all.push_back(Put(layer, absl::StrCat(i)));
@@ -27,14 +28,14 @@ void Hand(Simulation::Client& client, int entities, const std::string& layer = "
   client.info.intake->Take({std::move(all), {}, 100});
 }
 
-// Hands over a large commit and lets the core apply its first slice.
+// Passes a large commit and lets the core apply its first slice.
 void BeginLarge(Simulation& sim, Simulation::Client& client) {
   Hand(client, kLarge);
   sim.core->Turn(0);
   sim.core->Turn(0);
 }
 
-// Another session of the client's owner.
+// Opens another session of the client's owner.
 Simulation::Client OpenAgain(Simulation& sim, const Simulation::Client& client) {
   OpenOptions same;
   same.owner_token = client.info.owner_token;
@@ -45,7 +46,8 @@ size_t CommitsAccepted(const Simulation::Client& client) {
   return client.sink->Of<Accepted>().size();
 }
 
-// Turns of the core's thread until `client` has so many commits accepted.
+// Returns the number of turns of the core's thread until that many commits of `client` are
+// accepted.
 int TurnsUntil(Simulation& sim, const Simulation::Client& client, size_t accepted) {
   int turns = 0;
   while (CommitsAccepted(client) < accepted && turns < 1000) {

@@ -1,4 +1,4 @@
-// must_show, present_at, credit and turns, with displays that do what the test says.
+// Tests must_show, present_at, credit and turns, with displays controlled by the test.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -251,7 +251,7 @@ TEST(CoreFlow, WhatEnginesHoldCountsForTheLimit) {
   EXPECT_EQ(client.sink->issues[0].reason, Reason::kQuotaExceeded);
   EXPECT_THAT(client.sink->issues[0].message, HasSubstr("max_memory_bytes"));
 
-  // There is room again once an engine holds less.
+  // There is room again once an engine uses less memory.
   sim.engine().memory_bytes = 1000;
   sim.Send(client, 41, testing::DeleteAllMine());
   while (sim.Show()) {
@@ -270,7 +270,7 @@ TEST(CoreFlow, CommitsThatRideAreLimitedAndTheRestWaits) {
   Simulation sim(limits);
   sim.Start();
   auto client = sim.Open();
-  // One in flight, one waits in the mailbox, then one rides in what comes next.
+  // One is in flight, one waits in the mailbox, and one is shown with the next volume.
   for (uint64_t i = 1; i <= 6; ++i) sim.Send(client, i, Put("a", "x", static_cast<float>(i)));
   EXPECT_EQ(AcceptedOf(client), 3u);
   for (int i = 0; i < 20 && sim.Show(); ++i) {
@@ -356,8 +356,8 @@ TEST(CoreFlow, StagesAscendAndTheClientsClockIsFound) {
   sim.clock.Advance(sync::kSecond);
   auto client = sim.Open();
   const sync::TimeNs now = sim.clock.Now();
-  // A client whose clock is an hour ahead: the first message came 3 ms after it was sent, the second 1 ms, the
-  // third 8 ms: so as far as can be known 2, 0 and 7.
+  // A client whose clock is an hour ahead: the first message arrived 3 ms after it was sent, the
+  // second 1 ms, the third 8 ms; so, as far as can be known, 2, 0 and 7.
   const int64_t ahead = 3600 * sync::kSecond;
   const auto send = [&](uint64_t frame, int64_t way_ms) {
     Operation commit = testing::EndCommit(frame);

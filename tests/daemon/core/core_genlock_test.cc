@@ -1,7 +1,8 @@
-// Displays in genlock: what their devices show, sweep by sweep, in one thread under a clock that stands still.
+// Tests displays in genlock: what their devices show, sweep by sweep, in one thread under a clock
+// that stands still.
 //
-// The oracle knows nothing of volumes and orders: the scene is a number in lit voxels, and what each device shows in
-// each of its sweeps is read from its pictures.
+// The oracle knows nothing of volumes and orders: the scene is a number in lit voxels, and the
+// number that each device shows in each of its sweeps is read from its slice images.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -35,7 +36,8 @@ constexpr int kBits = 20;  // of the number shown
 constexpr int kRate = 200;
 constexpr sync::TimeNs kPeriod = sync::kSecond / kRate;
 
-// A device, and the number that its eye sees; nothing: it is dark, or shows what was before the first number.
+// A device, and the number seen on it; nullopt: it is dark, or shows the scene from before the
+// first number.
 struct Screen {
   std::string name;
   display::simulated::Parts parts;
@@ -76,10 +78,11 @@ class Wall {
 
   sync::TimeNs now() const { return clock_.Now(); }
   Screen& screen(size_t i) { return *screens_[i]; }
-  // Times that screens have shown different numbers for longer than their sweeps lie apart.
+  // Returns how often screens have shown different numbers for longer than the time between their
+  // sweeps.
   uint64_t differences() const { return differences_; }
 
-  // Puts up the number, as dots.
+  // Inserts the number, as dots.
   void Show(uint64_t number) {
     std::vector<Operation> all;
     for (int bit = 0; bit < kBits; ++bit) {
@@ -120,7 +123,7 @@ class Wall {
     Settle();
     return status;
   }
-  // A snapshot of what one shows; what comes of it is counted.
+  // Captures what a screen shows; the results are counted.
   void Capture(size_t screen) {
     ++captures_;
     core_->Capture(screens_[screen]->name, 2 * sync::kSecond, 0, [this](const auto& volume) {
@@ -134,7 +137,7 @@ class Wall {
   uint64_t captures() const { return captures_; }
   uint64_t captured() const { return captured_; }
   uint64_t broken_captures() const { return broken_captures_; }
-  // Turns after which the daemon wanted another at once, of all.
+  // Returns the part of the turns after which the daemon wanted another turn at once.
   double idle_turns() const { return static_cast<double>(spins_) / static_cast<double>(turns_); }
 
   Stats GetStats() {
@@ -172,10 +175,10 @@ class Wall {
     return number;
   }
 
-  // How far sweeps that belong together lie apart: half a period from the first display's.
+  // Returns the time between sweeps that belong together: half a period from the first display's.
   sync::TimeNs apart() const { return (screens_.size() > 2 ? kPeriod : kPeriod / 2) + 10'000; }
 
-  // When one changes, others follow with their own sweeps.
+  // When one screen changes, the others follow with their own sweeps.
   void Look() {
     bool differ = false;
     std::optional<uint64_t> first;
@@ -227,7 +230,7 @@ constexpr uint64_t kSomeVolumes = 2000;
 #else
 constexpr uint64_t kSomeVolumes = 10'000;
 #endif
-// As many as the lock promises.
+// The number of volumes for which the lock holds.
 constexpr uint64_t kAllVolumes = 100'000;
 
 TEST(CoreGenlock, DisplaysShowTheSameNumberOrNone) {
@@ -246,8 +249,9 @@ TEST(CoreGenlock, DisplaysShowTheSameNumberOrNone) {
   EXPECT_EQ(stats.displays[0].genlock_slips, 0u);
 }
 
-// One has a slow link, on which transfers stall for as long as several sweeps and its answers come late by as much as the lock
-// allows for; it is also pulled and plugged in again now and then. The other is pulled once.
+// One display has a slow link, on which transfers stall for several sweeps, and whose answers are
+// as late as the lock allows; it is also unplugged and plugged in again now and then. The other is
+// unplugged once.
 void ExpectNoDifference(uint64_t wanted, uint32_t seed) {
   Wall wall({{}, {{"pacing", "200000"}}});
   std::mt19937 random(seed);
@@ -285,7 +289,7 @@ void ExpectNoDifference(uint64_t wanted, uint32_t seed) {
   EXPECT_EQ(figures.genlock_slips, 0u);
   EXPECT_GT(figures.genlock_postponed, 0u) << "nothing was delayed";
   EXPECT_GT(restarts, 0u);
-  // Both come to show the newest once the faults are over.
+  // In the end both show the newest, once the faults are over.
   wall.RunFor(sync::kSecond);
   wall.Show(++number);
   wall.RunFor(sync::kSecond);
@@ -300,8 +304,8 @@ TEST(CoreGenlock, NorDoTheyInALongShow) {
   ExpectNoDifference(wanted == nullptr ? kAllVolumes : std::strtoull(wanted, nullptr, 10), 8);
 }
 
-// Three of them, blanked and lit again, captured, their links failing with and without the device's being pulled: none differs, and in the
-// end all show the newest.
+// Three displays that are blanked and lit again, captured, and whose links fail with and without
+// the device being unplugged: none differs, and in the end all show the newest.
 TEST(CoreGenlock, WhateverIsAskedOfThemTheyGoOn) {
   using What = display::emulator::Fault::What;
   for (uint32_t seed = 1; seed <= 40; ++seed) {

@@ -1,9 +1,9 @@
-// The core against a plain sequential model: random operations of many clients, displays and
+// Tests the core against a plain sequential model: random operations of many clients, displays and
 // operators under a clock that stands still (tests/daemon/core/model).
 //
-//   VOXELD_SEEDS=100000 core_model_test     so many seeds instead of CI's
-//   VOXELD_SEED=4711 core_model_test        the first of them; alone unless VOXELD_SEEDS is given
-//   VOXELD_TRACE=1 VOXELD_SEED=4711 …       with all that happens
+//   VOXELD_SEEDS=100000 core_model_test     runs that many seeds instead of CI's
+//   VOXELD_SEED=4711 core_model_test        the first of them; the only one unless VOXELD_SEEDS is given
+//   VOXELD_TRACE=1 VOXELD_SEED=4711 …       prints every event
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -59,7 +59,7 @@ TEST(CoreModel, TheCoreDoesWhatThePlainModelDoes) {
             << " timed commits dropped, " << sum.must_show_timeouts << " must_show timeouts, "
             << sum.resumed << " sessions taken up\n";
   if (seeds < 500) return;
-  // All that the model judges has been met.
+  // Every kind that the model judges has occurred.
   for (const auto kind : {CommitOutcome::Kind::kPresented, CommitOutcome::Kind::kUnchanged,
                           CommitOutcome::Kind::kSuperseded, CommitOutcome::Kind::kLost,
                           CommitOutcome::Kind::kNotShown}) {

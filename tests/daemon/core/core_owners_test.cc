@@ -1,4 +1,4 @@
-// Owners with several sessions, and what an operator may do.
+// Tests owners with several sessions, and the actions of operators.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -50,7 +50,7 @@ TEST(CoreOwners, SessionsOfOneOwnerShareItsNamesAndItsQuota) {
   ASSERT_THAT(owners, SizeIs(1));
   EXPECT_EQ(owners[0].sessions, 2u);
   EXPECT_EQ(owners[0].entities, 3u);
-  // A layer is of the session that last wrote it.
+  // A layer belongs to the session that last wrote it.
   sim.Close(one);
   EXPECT_EQ(sim.List().total, 3u);
   sim.Close(two);

@@ -1,4 +1,4 @@
-// Questions about the scene: pages, keys, figures.
+// Tests queries on the scene: pages, keys, statistics.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -81,7 +81,7 @@ TEST(CoreQueries, PagesAreStableWhateverChangesInBetween) {
   EXPECT_EQ(page.layers.size(), 4u);
   ASSERT_FALSE(page.next_page_token.empty());
   query.page_token = page.next_page_token;
-  // What was listed goes, and something comes before: neither disturbs the rest.
+  // A listed entity is removed, and another is inserted before it: neither disturbs the rest.
   sim.Send(one, 3, testing::DeleteId("b", "p1"), Put("a", "a"));
   page = sim.List(query);
   EXPECT_THAT(Ids(page), ElementsAre("b/p2", "b/p3"));
@@ -188,7 +188,7 @@ TEST(CoreQueries, FiguresAddUp) {
   EXPECT_EQ(display.commits_unchanged, 1u);
 }
 
-// A simulation chooses who comes next: the core's thread is 0, the displays' follow.
+// A simulation chooses which thread runs next: the core's thread is 0, the displays' follow.
 TEST(CoreQueries, AQuestionGoesFromThreadToThreadInTheirTurns) {
   Simulation sim({}, 2);
   sim.Start();

@@ -1,4 +1,4 @@
-// Receipts by hand: what a client is told of each commit, rule by rule.
+// Tests receipts in single cases: the messages to a client about each commit, rule by rule.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -110,7 +110,7 @@ TEST(CoreReceipts, WhatLooksLikeAVolumeThatIsLostIsLost) {
     EXPECT_EQ(Only(*client.sink, frame).kind, Kind::kLost);
     EXPECT_EQ(Only(*client.sink, frame).reason, "three slices missing");
   }
-  // The next one goes out though it looks the same as what was lost.
+  // The next one is sent although it looks the same as the lost one.
   sim.Send(client, 3, Put("a", "x", 1));
   ASSERT_TRUE(sim.Show());
   EXPECT_EQ(Only(*client.sink, 3).kind, Kind::kPresented);
@@ -123,7 +123,7 @@ TEST(CoreReceipts, HiddenCommitsAreNotShown) {
   sim.Send(client, 1, SetLayer("h", false), Put("h", "x"));
   EXPECT_EQ(Only(*client.sink, 1).kind, Kind::kNotShown);
   EXPECT_EQ(Only(*client.sink, 1).why, NotShown::kHidden);
-  // What was put up hidden is there when the layer is shown.
+  // An entity that was inserted while its layer was hidden appears when the layer is shown.
   sim.Send(client, 2, SetLayer("h", true));
   ASSERT_TRUE(sim.Show());
   EXPECT_EQ(Only(*client.sink, 2).kind, Kind::kPresented);
@@ -160,7 +160,7 @@ TEST(CoreReceipts, ALossTakesWhatIsInFlightAndWhatWaits) {
   EXPECT_THAT(Only(*client.sink, 3).reason, HasSubstr("cable pulled"));
   sim.Send(client, 4, Put("a", "x", 4));
   EXPECT_EQ(Only(*client.sink, 4).why, NotShown::kAbsent);
-  EXPECT_TRUE(client.sink->OutcomesOf(2).empty());  // the display has it still
+  EXPECT_TRUE(client.sink->OutcomesOf(2).empty());  // the display still has it
 
   sim.display().Attach();
   sim.core->Step();
@@ -288,7 +288,7 @@ TEST(CoreReceipts, DecodingsRefusalsCountForTheCommitThatTheyComeBefore) {
   EXPECT_EQ(client.sink->Of<Accepted>()[2].second.refused_operations, 1u);
 }
 
-// -------------------------------------------------------------------------- the engine fails
+// -------------------------------------------------------------------------- engine failures
 
 TEST(CoreReceipts, ALostEngineIsReplacedAndNothingElseIsLost) {
   Simulation sim;
@@ -373,7 +373,7 @@ TEST(CoreReceipts, ASlowEngineNeverHoldsTheDisplayUp) {
   EXPECT_FALSE(sim.Show());
   EXPECT_TRUE(client.sink->Of<CommitOutcome>().empty());
   ASSERT_TRUE(sim.engine().Run());
-  sim.core->Step();  // hands the first over, begins the next with all that came
+  sim.core->Step();  // hands the first over, and starts the next with everything that has come
   EXPECT_EQ(Only(*client.sink, 2).kind, Kind::kSuperseded);
   ASSERT_TRUE(sim.Show());
   EXPECT_EQ(Only(*client.sink, 1).kind, Kind::kPresented);

@@ -1,4 +1,4 @@
-// Sessions taken up again.
+// Tests resumed sessions.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -80,7 +80,7 @@ TEST(CoreResume, EndsTheOldStreamAndAppliesWhatItHadSent) {
   ASSERT_TRUE(client.sink->ended.has_value());
   EXPECT_EQ(client.sink->ended->code(), absl::StatusCode::kAborted);
   EXPECT_EQ(again.info.last_frame_id, 3u);
-  // The old stream's own end comes later and does nothing.
+  // The end of the old stream is reported later and has no effect.
   sim.Close(client);
   EXPECT_EQ(sim.GetStats().sessions, 1u);
   EXPECT_EQ(sim.List().total, 1u);
@@ -107,7 +107,7 @@ TEST(CoreResume, OutcomesOwedComeToTheNewStream) {
   sim.Send(client, 1, Put("a", "x", 1));
   sim.Send(client, 2, Put("a", "x", 2));
   sim.Close(client);
-  sim.Show();  // of frame 1, while nobody is there
+  sim.Show();  // of frame 1, while no client is connected
   auto again = sim.Open(Resuming(client));
   ASSERT_THAT(again.sink->OutcomesOf(1), SizeIs(1));
   EXPECT_THAT(again.sink->OutcomesOf(2), SizeIs(0));

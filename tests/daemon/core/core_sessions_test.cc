@@ -1,4 +1,4 @@
-// Sessions, what they leave behind, and limits.
+// Tests sessions, what they leave behind, and limits.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -35,7 +35,7 @@ TEST(CoreSessions, OneVanishesAndTheOthersLayerIsUntouched) {
   EXPECT_NE(one.info.owner, other.info.owner);
   sim.Send(one, 1, Put("a", "x"));
   sim.Send(other, 2, Put("a", "x"), Put("b", "y"));
-  // In the middle of a frame, without a commit.
+  // In the middle of a draw batch, without a commit.
   sim.Send(one, 0, testing::Begin("a"), Put("a", "half"));
   sim.Close(one);
   const EntityPage page = sim.List();
@@ -225,7 +225,7 @@ TEST(CoreSessions, WhatWaitsForACommitIsLimitedOverAllSessions) {
   sim.Send(one, 1);  // makes room,
   sim.Send(other, 0, put());
   EXPECT_EQ(other.sink->issues.size(), 1u);
-  sim.Close(other);  // and so does one who goes
+  sim.Close(other);  // and so does a client that leaves
   sim.Send(third, 2, put());
   EXPECT_TRUE(third.sink->issues.empty());
 }
@@ -250,7 +250,7 @@ TEST(CoreSessions, OfManyRefusalsTheFirstAreToldAndTheOthersCounted) {
   EXPECT_EQ(client.sink->Of<Accepted>()[0].second.refused_operations, 5u);
   EXPECT_EQ(sim.List().total, 1u);
 
-  // Each commit begins anew; what decoding left out is counted too.
+  // Each commit counts from zero; operations that decoding left out are counted too.
   Refusals refused;
   for (int i = 0; i < 5; ++i)
     refused.Add({8, "a", "y", "upsert", Reason::kInvalidValue, "wrong"}, 2);

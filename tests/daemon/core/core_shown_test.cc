@@ -1,4 +1,4 @@
-// What a display shows, with the scene that it was drawn from.
+// Tests what a display shows, together with the scene from which it was drawn.
 #include <gtest/gtest.h>
 
 #include "daemon/pipeline/frame_pipeline.h"
@@ -36,7 +36,7 @@ struct Watched : Simulation {
     return shown;
   }
 
-  // The entities of layer a that the volume shown was drawn from.
+  // Returns the entities of layer a from which the shown volume was drawn.
   std::string Names() {
     const absl::StatusOr<ShownScene> shown = Shown();
     if (!shown.ok()) return std::string(shown.status().message());
@@ -61,7 +61,7 @@ TEST(CoreShown, TheSceneThatTheVolumeWasDrawnFrom) {
   Watched sim;
   sim.Watch();
   EXPECT_EQ(sim.Names(), "first ");
-  // Drawn, and on its way, but what is shown is still the one before.
+  // The next volume is drawn and on its way, but the previous one is still shown.
   sim.Send(sim.client, 2, Put("a", "second", 2));
   EXPECT_EQ(sim.Names(), "first ");
   sim.Send(sim.client, 3, DeleteId("a", "first"));
@@ -90,7 +90,8 @@ TEST(CoreShown, APictureThatStaysWasDrawnFromTheNewestSceneThatLooksSo) {
   sim.Watch();
   const uint64_t volume = sim.told;
   EXPECT_EQ(sim.Names(), "first ");
-  // What is drawn anew with other entities and the same look: the same dot by two names, then by one.
+  // The scene is drawn again with other entities that look the same: the same dot under two names,
+  // then under one.
   sim.Send(sim.client, 2, Put("a", "again", 1));
   while (sim.Show()) {
   }

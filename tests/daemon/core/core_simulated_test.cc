@@ -1,6 +1,6 @@
-// A whole daemon in one thread under a clock that stands still: the CPU engine,
-// the voxlink driver, the device model at the other end of its wire. The same run twice
-// gives the same receipts, to the nanosecond.
+// Tests a whole daemon in one thread under a clock that stands still: the CPU engine, the voxlink
+// driver, and the device model at the other end of its wire. The same run twice gives the same
+// receipts, to the nanosecond.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -52,7 +52,7 @@ class SimulatedDaemon {
     RunFor(0);
   }
 
-  // Everything that happens until then, in order of time.
+  // Runs everything that happens in that time, in order.
   void RunFor(sync::TimeNs span) {
     const sync::TimeNs end = clock.Now() + span;
     while (clock.Now() < end) {

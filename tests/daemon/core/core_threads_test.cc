@@ -1,5 +1,5 @@
-// The core with its threads, the CPU engine and the simulated display: everything as it runs, for
-// the sanitizers and for the light that comes out at the end.
+// Tests the core with its threads, the CPU engine and the simulated display: everything as in
+// production, for the sanitizers and for the light that comes out at the end.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -33,7 +33,7 @@ sync::SystemClock& TheClock() {
   return clock;
 }
 
-// Collects from the core's thread; waits from the test's.
+// Collects in the core's thread; waits in the test's.
 class WaitingSink final : public SessionSink {
  public:
   void OnIssue(const Issue& issue) override {
@@ -45,11 +45,11 @@ class WaitingSink final : public SessionSink {
     receipts_.push_back(receipt);
     changed_.NotifyAll();
   }
-  // Until there are so many receipts. False if that takes too long.
+  // Waits for that many receipts. Returns false if that takes too long.
   bool Await(size_t count) {
     return AwaitThat([count](const std::vector<Receipt>& all) { return all.size() >= count; });
   }
-  // Until so many commits were accepted.
+  // Waits until that many commits were accepted.
   bool AwaitAccepted(int64_t count) {
     return AwaitThat([count](const std::vector<Receipt>& all) {
       return std::count_if(all.begin(), all.end(), [](const Receipt& receipt) {
@@ -82,7 +82,7 @@ class WaitingSink final : public SessionSink {
   std::vector<Issue> issues_ VOXELD_GUARDED_BY(mutex_);
 };
 
-// The answer to a question, waited for.
+// Waits for the answer to a query.
 template <typename T>
 class Answer {
  public:
@@ -132,7 +132,7 @@ class RunningCore {
     }
     const absl::Status started = core->Start();
     EXPECT_TRUE(started.ok()) << started;
-    // Commits before the displays are there would be NOT_SHOWN(absent).
+    // Commits before the displays are attached would be NOT_SHOWN(absent).
     for (const std::string& name : displays) {
       const sync::TimeNs deadline = TheClock().Now() + kGenerous;
       while (Describe(name).state != display::DisplayState::kShowing &&
@@ -208,7 +208,7 @@ TEST(CoreThreads, WhatACommitPutsUpComesOutOfTheDisplay) {
   EXPECT_GT(stats.displays[0].bytes_out, 0u);
   EXPECT_EQ(stats.displays[0].commits_presented, 1u);
 
-  // Gone with its session.
+  // Removed with its session.
   Answer<bool> closed;
   running.core->CloseSession(session.session, session.incarnation, true,
                              [reply = closed.reply()] { reply(true); });
@@ -219,7 +219,7 @@ TEST(CoreThreads, WhatACommitPutsUpComesOutOfTheDisplay) {
   EXPECT_TRUE(running.core->Stop(kGenerous).ok());
 }
 
-// Whoever frees a geometry waits until the gate is open.
+// A thread that frees a guarded geometry waits until the gate is open.
 class Gate {
  public:
   GeometryPtr Guard(const GeometryPtr& geometry) {
@@ -311,7 +311,7 @@ TEST(CoreThreads, ManyClientsAtOnceAndEverySumIsExact) {
           EXPECT_TRUE(updated.Await().ok());
         }
       }
-      // Every other one vanishes while it is still owed.
+      // Every other client leaves while outcomes are outstanding.
       if (c % 2 == 0) {
         EXPECT_TRUE(sink->Await(kCommits * 3));
       }
@@ -331,7 +331,7 @@ TEST(CoreThreads, ManyClientsAtOnceAndEverySumIsExact) {
     EXPECT_EQ(told["one"].size(), size_t{kCommits});
     EXPECT_EQ(told["two"].size(), size_t{kCommits});
   }
-  // Until all is told, also what nobody hears any more.
+  // Waits until all outcomes are reported, also those that no client receives any longer.
   const sync::TimeNs deadline = TheClock().Now() + kGenerous;
   Stats stats = running.GetStats();
   while ((stats.sessions > 0 ||
@@ -373,7 +373,7 @@ TEST(CoreThreads, StopWithWorkOnItsWayEndsInTime) {
   }
 }
 
-// A display that does not come to an end by itself.
+// A display that does not stop by itself.
 class StuckDisplay final : public display::Display {
  public:
   struct Gate {
@@ -381,7 +381,7 @@ class StuckDisplay final : public display::Display {
     sync::CondVar changed;
     bool open VOXELD_GUARDED_BY(mutex) = false;
     bool ended VOXELD_GUARDED_BY(mutex) = false;
-    // Ticks wait for the gate too, the first of them in here.
+    // Ticks also wait for the gate; `in_tick` is set in the first of them.
     bool stops_ticks VOXELD_GUARDED_BY(mutex) = false;
     bool in_tick VOXELD_GUARDED_BY(mutex) = false;
   };
@@ -430,7 +430,7 @@ TEST(CoreThreads, StopNamesWhatHadNotEndedAndLeavesItAlone) {
     EXPECT_THAT(status.message(), HasSubstr("display \"stuck\""));
     EXPECT_THAT(status.message(), ::testing::Not(HasSubstr("core")));
   }
-  // Its thread goes on, and cleans up, when it can; the core is gone by then.
+  // Its thread continues, and cleans up, when it can; by then the core no longer exists.
   sync::MutexLock lock(gate->mutex);
   gate->open = true;
   gate->changed.NotifyAll();

@@ -1,4 +1,4 @@
-// Word of newer snapshots: by itself, and from a core.
+// Tests notifications of newer snapshots: SceneWatch alone, and from a core.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +23,7 @@ TEST(SceneWatch, CallsOnceWhenThereIsMore) {
   SceneWatch watch(Numbered(1));
   int calls = 0;
   watch.Await(0, [&] { ++calls; });
-  EXPECT_EQ(calls, 1);  // there was already
+  EXPECT_EQ(calls, 1);  // existed already
   watch.Await(1, [&] { ++calls; });
   watch.Await(1, [&] { ++calls; });
   EXPECT_EQ(calls, 1);
@@ -68,7 +68,7 @@ TEST(SceneWatch, KeepsTheNewestOnly) {
   EXPECT_TRUE(first.expired());
 }
 
-// Whoever asks from wherever it is misses no end: the last number is seen by all.
+// A waiter does not miss the end, whichever thread it asks from: every one sees the last number.
 TEST(SceneWatch, ServesManyThreads) {
   constexpr uint64_t kLast = 2000;
   SceneWatch watch(Numbered(1));
@@ -99,7 +99,7 @@ TEST(SceneWatch, ServesManyThreads) {
   for (std::thread& thread : threads) thread.join();
 }
 
-// Whatever changes the scene, watchers hear of it.
+// Watchers are notified of every change of the scene.
 TEST(CoreWatch, EveryNewSnapshotIsTold) {
   Simulation sim;
   sim.Start();
@@ -120,11 +120,11 @@ TEST(CoreWatch, EveryNewSnapshotIsTold) {
   std::get<Upsert>(put.op).entity.lifetime_ns = 5;
   sim.Send(client, 1, put, Put("b", "y"));
   EXPECT_EQ(told.size(), 1u);
-  sim.Advance(5);  // x goes
+  sim.Advance(5);  // x is removed
   EXPECT_EQ(told.size(), 2u);
   sim.Send(other, 1, Put("c", "z"));
   EXPECT_EQ(told.size(), 3u);
-  sim.Close(other);  // c goes
+  sim.Close(other);  // c is removed
   EXPECT_EQ(told.size(), 4u);
   EXPECT_FALSE(watch.newest()->FindLayer({client.info.owner, "b"})->writer->ended);
   sim.Close(client);  // its layers are orphaned

@@ -1,4 +1,4 @@
-// Credit, memory and frames given up, apart from the core.
+// Tests credit, memory and dropped frames, apart from the core.
 #include "daemon/core/intake.h"
 
 #include <gmock/gmock.h>
@@ -36,7 +36,7 @@ class IntakeTest : public ::testing::Test {
     return intake->Take({std::move(all), {}, bytes, 1, 2, named_bytes});
   }
 
-  // The layers and ids of what a commit would put.
+  // Returns the layers and ids of the entities that a commit would insert.
   static std::vector<std::string> Puts(const WaitingCommit& commit) {
     std::vector<std::string> puts;
     for (const Operation& operation : commit.operations) {
@@ -60,7 +60,7 @@ class IntakeTest : public ::testing::Test {
   std::shared_ptr<testing::RecordingSink> sink = std::make_shared<testing::RecordingSink>();
   std::optional<Intake> intake;
   uint64_t sequence = 0;
-  uint64_t named_bytes = 0;  // that Take's messages name
+  uint64_t named_bytes = 0;  // named by the messages for Take
   int scheduled = 0;
 };
 
@@ -125,7 +125,7 @@ TEST_F(IntakeTest, WhatWaitsForItsTurnHoldsItsCredit) {
   WaitingCommit commit = Pop();
   EXPECT_EQ(sink->rooms, 0);
   intake->Done(std::move(commit));
-  // Nothing waits any more, so what is staged holds none either.
+  // Nothing waits any longer, so staged operations hold no credit either.
   EXPECT_EQ(sink->rooms, 1);
   EXPECT_EQ(sink->credits.back(), 10 + 1201 + kWindow);
   EXPECT_TRUE(intake->HasRoom());
@@ -310,7 +310,7 @@ TEST_F(IntakeTest, LocalMemoryOfWhatWaitsHoldsReadingBack) {
   WaitingCommit two = Pop(), three = Pop();
   intake->Done(std::move(two));
   EXPECT_FALSE(intake->HasRoom());
-  // One that waits elsewhere for its time gives it back at once, and not a second time.
+  // A commit that waits elsewhere for its time gives its credit back at once, and only once.
   intake->Detach(three);
   EXPECT_EQ(sink->rooms, 2);
   intake->Done(std::move(three));

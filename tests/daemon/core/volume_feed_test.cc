@@ -1,4 +1,4 @@
-// What a viewer gets of a display's volumes: the newest, and what of it differs.
+// Tests what a viewer gets of a display's volumes: the newest, and the parts of it that differ.
 #include "daemon/core/volume_feed.h"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@ namespace {
 using testing::Put;
 using testing::Simulation;
 
-// With something in the scene.
+// A simulation with something in the scene.
 struct Lit : Simulation {
   Lit() {
     Start();
@@ -27,7 +27,7 @@ struct Viewer {
       : sim(sim), feed(VolumeFeed::Open(*sim.core, sim.clock, display, [this] { ++readies; })) {
     sim.core->Step();
   }
-  // All that the display has to show is shown.
+  // Shows everything that the display has to show.
   void Show() {
     sim.core->Step();
     while (sim.Show()) {

@@ -1,5 +1,6 @@
-// Curves of every kind against places close together on them, worked out in double precision from what their messages say: a thick
-// one is all that is within its radius, at its joints as elsewhere; one that is a voxel wide goes along it without a gap.
+// Compares curves of every kind with closely spaced places on them, computed in double precision
+// from their messages: a thick curve consists of everything within its radius, at its joints as
+// elsewhere; a curve one voxel wide has no gaps.
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -25,7 +26,8 @@ struct Case {
   double error = gpu::kCurveError;
 };
 
-// Of uniform knots 0, 1, 2, …: the cubic basis spline over [k, k + 4], by Cox and de Boor's recursion.
+// For uniform knots 0, 1, 2, …: the cubic basis spline over [k, k + 4], by Cox and de Boor's
+// recursion.
 double Basis(int k, int degree, double t) {
   if (degree == 0) return t >= k && t < k + 1 ? 1 : 0;
   return (t - k) / degree * Basis(k, degree - 1, t) +
@@ -34,7 +36,7 @@ double Basis(int k, int degree, double t) {
 
 double Choose(int n, int i) { return i == 0 ? 1 : Choose(n, i - 1) * (n - i + 1) / i; }
 
-// By Bernstein's polynomials.
+// Evaluated with Bernstein polynomials.
 Vector BezierAt(const std::vector<Vector>& points, int degree, double t) {
   const size_t spans = points.size() / static_cast<size_t>(degree);
   const double along = t * static_cast<double>(spans);
@@ -50,7 +52,8 @@ Vector BezierAt(const std::vector<Vector>& points, int degree, double t) {
   return sum;
 }
 
-// The point before the first and that behind the last of an open curve go on straight.
+// The point before the first and the one after the last of an open curve continue in a straight
+// line.
 Vector PointAt(const std::vector<Vector>& points, bool closed, int i) {
   const int n = static_cast<int>(points.size());
   const auto at = [&](int k) { return points[static_cast<size_t>(k)]; };
@@ -101,7 +104,8 @@ Case Polyline(const std::vector<Vector>& points, bool loop) {
   return c;
 }
 
-// What lies across `axis`: towards `toward`, and a quarter turn on, seen from where the axis points to.
+// Returns the two directions across `axis`: the one towards `toward`, and the one a quarter turn
+// further, as seen from where the axis points to.
 std::array<Vector, 2> Frame(const Vector& axis, const Vector& toward) {
   const Vector w = Unit(axis);
   const Vector u = Unit(toward - gpu::implicit::Dot(toward, w) * w);
@@ -127,7 +131,7 @@ Case Arc(std::string name, const Vector& normal, const Vector& toward, double st
 }
 
 Case Ellipse(std::string name, double start, double sweep) {
-  const Vector a = {4.6, 0.5, 1}, b = {-0.4, 1.5, 0.6};  // not at right angles
+  const Vector a = {4.6, 0.5, 1}, b = {-0.4, 1.5, 0.6};  // not orthogonal
   const double all = sweep == 0 ? kTurn : sweep;
   Case c{std::move(name), {}, [=](double t) {
            return std::cos(start + t * all) * a + std::sin(start + t * all) * b;
@@ -221,7 +225,7 @@ TEST_F(DrawnCurves, ThickOnesAreWhatIsWithinTheirRadius) {
     SCOPED_TRACE(c.name);
     const std::vector<Vector> places = Places(c);
     for (const double radius : {0.4, 1.65, 3.2}) {
-      // Their lines' own voxels are lit as well.
+      // The voxels of their lines are lit as well.
       const double most = std::max(radius, kHalfDiagonal) + c.error + kSnapped;
       Distances distances(kSize, most + 0.1);
       for (const Vector& place : places) distances.Add(place);
@@ -254,7 +258,7 @@ TEST_F(DrawnCurves, OfOneVoxelsWidthHaveNoGaps) {
       std::array<int32_t, 3> first = {};
       for (const Vector& place : places) {
         distances.Add(place);
-        // The cells of a cover touch it but for the error; others are a step aside at most.
+        // The cells of a cover touch it up to the error; others are at most a step aside.
         const bool cover = sampling == v1::LINE_SAMPLING_COVER;
         const int32_t v[3] = {static_cast<int32_t>(std::floor(place.x)),
                               static_cast<int32_t>(std::floor(place.y)),
@@ -271,7 +275,7 @@ TEST_F(DrawnCurves, OfOneVoxelsWidthHaveNoGaps) {
       }
       const std::vector<uint8_t> reached =
           drawn.Reached(first, true, sampling != v1::LINE_SAMPLING_COVER);
-      // EUCLIDEAN steps may pass over a corner: nothing is promised of those.
+      // EUCLIDEAN steps may pass over a corner: for those nothing is guaranteed.
       uint64_t far = 0, apart = 0;
       drawn.ForEach([&](int32_t x, int32_t y, int32_t z) {
         if (!drawn.Lit(x, y, z)) return;

@@ -1,4 +1,5 @@
-// Primitives as they are sent, drawn alone by the CPU's engine; others draw the same voxels (tests/conformance).
+// Primitives as they are sent, drawn alone by the CPU's engine; other engines draw the same voxels
+// (tests/conformance).
 #pragma once
 
 #include <gtest/gtest.h>
@@ -23,7 +24,7 @@ using gpu::conformance::Placement;
 using gpu::implicit::Vector;
 using P = v1::Primitive;
 
-// Vertices are snapped to 2⁻⁸ voxel along each axis; on the way there singles are rounded.
+// Vertices are snapped to 2⁻⁸ voxel along each axis, after rounding to single precision.
 inline constexpr double kSnapped = 0.0034 + 1e-4;
 
 inline void Set(v1::Vec3* out, const Vector& v) {
@@ -95,7 +96,8 @@ class DrawnPrimitives : public ::testing::Test {
   gpu::conformance::EngineDriver engine_;
 };
 
-// How far voxels' centres are from places that lie close together on a curve or a surface; no farther than `reach`.
+// Measures how far the centres of voxels are from closely spaced places on a curve or a surface, up
+// to `reach`.
 class Distances {
  public:
   Distances(int32_t size, double reach)

@@ -1,4 +1,5 @@
-// Volumes and isosurfaces, skewed and turned, against what their samples say at every voxel's centre in double precision.
+// Compares volumes and isosurfaces, skewed and turned, with the values of their samples at every
+// voxel's centre in double precision.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,7 +20,7 @@ using Color = std::array<double, 3>;
 constexpr int32_t kSize = 48;
 constexpr int kSamples[3] = {9, 8, 7};
 constexpr double kDoubt =
-    1e-4;  // of what singles make of a coordinate, samples; and of a number of about 1
+    1e-4;  // the error of single precision in a coordinate, in samples; and in a number of about 1
 
 // A grid, and the channels of its samples.
 struct Reference {
@@ -28,7 +29,7 @@ struct Reference {
   int channels = 1;
   std::vector<double> samples;
 
-  // A voxel's centre in samples.
+  // Maps a voxel's centre to sample coordinates.
   Vector Place(const Vector& p) const {
     const Vector d = p - corner;
     const double volume = Dot(edges[0], Cross(edges[1], edges[2]));
@@ -42,7 +43,8 @@ struct Reference {
     }
     return true;
   }
-  // So near to a face of the grid, or of a sample's cell, that singles may see it on the other side.
+  // Returns whether a place is so near to a face of the grid, or of a sample's cell, that single
+  // precision may put it on the other side.
   bool IsDoubtful(const Vector& q) const {
     for (int a = 0; a < 3; ++a) {
       const double face = std::round(q[a]);
@@ -115,7 +117,7 @@ Color Channels(uint32_t rgb) {
           static_cast<double>(rgb & 255)};
 }
 
-// Straight from one of the values to the next.
+// Interpolated linearly between the values.
 Color Transferred(double value) {
   const double v = std::clamp(value, kValues[0], kValues[3]);
   size_t i = 0;
@@ -128,7 +130,7 @@ Color Transferred(double value) {
   return color;
 }
 
-// With the grid's corner at a multiple of 2⁻⁸ voxel, to which origins are snapped.
+// The grid's corner is at a multiple of 2⁻⁸ voxel, to which origins are snapped.
 Placement PlacedGrid() {
   Placement placed = Placed(0.8, 4.5, kSize / 2, 0.2);
   const Vector corner = placed.Forth(Reference().corner);
@@ -237,7 +239,8 @@ TEST_F(DrawnGrids, IsosurfacesHoldWhatIsNoLessThanTheirLevel) {
   }
 }
 
-// What the rule says of a voxel: lit or not; nothing where singles may see it otherwise.
+// Decides whether a voxel is lit according to the rule; nullopt where single precision may decide
+// otherwise.
 class Shell {
  public:
   Shell(const Reference& grid, const Placement& placed, double level, double half)
@@ -269,7 +272,7 @@ class Shell {
   }
 
  private:
-  // Level less number: what is beyond the grid is infinitely far outside.
+  // Returns the level minus the value: beyond the grid, everything is infinitely far outside.
   double DepthAt(const Vector& voxel) const {
     const Vector q = grid_.Place(placed_.Back(voxel));
     return Reference::Holds(q) ? level_ - grid_.At(q) : std::numeric_limits<double>::infinity();
@@ -277,7 +280,7 @@ class Shell {
   bool IsDoubtfulAt(int32_t x, int32_t y, int32_t z, double depth) const {
     return grid_.IsDoubtful(grid_.Place(placed_.Back(x, y, z))) || std::fabs(depth) < kDoubt;
   }
-  // Where other samples begin to count, and the slope jumps.
+  // Returns whether other samples begin to count here, so that the slope jumps.
   bool IsAtAKink(int32_t x, int32_t y, int32_t z) const {
     const Vector q = grid_.Place(placed_.Back(x, y, z));
     for (int a = 0; a < 3; ++a) {
@@ -285,7 +288,7 @@ class Shell {
     }
     return false;
   }
-  // Of the numbers across a voxel, by central differences.
+  // Returns the slope of the values across a voxel, by central differences.
   double SlopeAt(int32_t x, int32_t y, int32_t z) const {
     constexpr double kAside = 1e-6;
     double square = 0;
@@ -334,7 +337,7 @@ TEST_F(DrawnGrids, IsosurfacesAreAsThickAsTheirShells) {
   }
 }
 
-// From the first of two colours to the second, along a direction that is none of the grid's.
+// From the first of two colours to the second, along a direction that is not an axis of the grid.
 TEST_F(DrawnGrids, IsosurfacesHaveTheColoursOfTheirPlaces) {
   const Reference grid = Waves(false);
   const Vector along{0.5, -1.5, 1};

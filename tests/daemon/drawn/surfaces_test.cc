@@ -1,5 +1,6 @@
-// Height maps and Bézier surfaces against the same in double precision: distances from triangles by brute force, from patches by
-// places close together on them; nothing gets through.
+// Compares height maps and Bézier surfaces with a computation in double precision: distances from
+// triangles by brute force, from patches by closely spaced places on them; no path leads through a
+// surface.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -25,7 +26,7 @@ double SegmentDistance(const Vector& p, const Vector& a, const Vector& b) {
   return Length(p - (a + t * (b - a)));
 }
 
-// How far inside of its edges a point of a triangle's plane is; negative outside.
+// Returns how far inside its edges a point of a triangle's plane is; negative outside.
 double Depth(const Vector& p, const Corners& t) {
   const Vector normal = Unit(Cross(t[1] - t[0], t[2] - t[0]));
   double depth = 1e9;
@@ -45,7 +46,8 @@ double TriangleDistance(const Vector& p, const Corners& t) {
                    SegmentDistance(p, t[2], t[0])});
 }
 
-// Whether one of the three lines from face to face through the middle of a voxel goes through a triangle, beyond doubt.
+// Returns whether one of the three lines from face to face through the middle of a voxel certainly
+// crosses a triangle.
 bool IsCrossed(const Vector& middle, const Corners& t) {
   constexpr double kSure = 0.02;
   const Vector normal = Unit(Cross(t[1] - t[0], t[2] - t[0]));
@@ -103,7 +105,7 @@ struct HeightMap {
   }
 };
 
-// Of 0 to 1.
+// Heights from 0 to 1.
 HeightMap Hills() {
   HeightMap map;
   for (uint32_t i = 0; i < map.columns * map.rows; ++i)
@@ -115,7 +117,8 @@ class DrawnSurfaces : public DrawnPrimitives {
  protected:
   DrawnSurfaces() : DrawnPrimitives(kSize) {}
 
-  // A surface z = f(x, y) across the whole cube: what is clearly above it cannot be reached from below.
+  // For a surface z = f(x, y) across the whole cube: a place that is clearly above it cannot be
+  // reached from below.
   void ExpectNothingGetsThrough(const P& primitive, bool cover, double doubt,
                                 const std::function<double(double, double)>& f) {
     const Drawn drawn = Draw(primitive, gpu::Affine());
@@ -221,7 +224,7 @@ TEST_F(DrawnSurfaces, BezierSurfacesAreWithinTheirErrorOfTheirPatches) {
                       (i / 4 - 1.5) * 2 + 0.5 * std::cos(i * 3.1), 3 * std::sin(i * i * 1.3)});
   }
   const Placement placed = Placed(0.8, 5, kSize / 2, 0.2);
-  constexpr double kApart = 0.25;  // voxels, of places' neighbours
+  constexpr double kApart = 0.25;  // in voxels, between neighbouring places
   Distances distances(kSize, 1.5);
   constexpr int kPlaces = 400;
   double apart = 0;
@@ -241,10 +244,10 @@ TEST_F(DrawnSurfaces, BezierSurfacesAreWithinTheirErrorOfTheirPatches) {
     drawn.ForEach([&](int32_t x, int32_t y, int32_t z) {
       const double d = distances.At(x, y, z);
       lit += drawn.Lit(x, y, z);
-      // Of places on a grid one is no farther than half of its squares' diagonal.
+      // One of the places on a grid is at most half the diagonal of its squares away.
       far += drawn.Lit(x, y, z) &&
              d > kHalfDiagonal + gpu::kPatchError + kSnapped + kApart * kApart / 4;
-      // The cube around a middle that is nearer to the triangles than half a voxel meets them.
+      // A cube whose middle is nearer to the triangles than half a voxel meets them.
       near += rule == v1::SURFACE_RULE_COVER && d < 0.5 - gpu::kPatchError - kSnapped;
       missing += rule == v1::SURFACE_RULE_COVER && d < 0.5 - gpu::kPatchError - kSnapped &&
                  !drawn.Lit(x, y, z);
@@ -257,12 +260,12 @@ TEST_F(DrawnSurfaces, BezierSurfacesAreWithinTheirErrorOfTheirPatches) {
 }
 
 TEST_F(DrawnSurfaces, NothingGetsThroughBezierSurfaces) {
-  // Even along x and y: z is a function of them.
+  // Evenly spaced along x and y: z is a function of them.
   std::vector<Vector> points;
   for (int i = 0; i < 16; ++i)
     points.push_back({-6 + 20.0 * (i % 4), -6 + 20.0 * (i / 4), 24 + 26 * std::sin(i * i * 1.9)});
   const auto f = [&](double x, double y) { return PatchAt(points, (x + 6) / 60, (y + 6) / 60).z; };
-  // Triangles are a quarter of a voxel away at most, across; and these slope by up to 2.
+  // Triangles are at most a quarter of a voxel away, measured across; and these slope by up to 2.
   ExpectNothingGetsThrough(BezierSurface(points, v1::SURFACE_RULE_THIN), false, 2, f);
   ExpectNothingGetsThrough(BezierSurface(points, v1::SURFACE_RULE_COVER), true, 5, f);
 }

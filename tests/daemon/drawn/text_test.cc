@@ -1,5 +1,6 @@
-// Letters against their outlines, as the fonts have them, in double precision: what these hold by the even-odd rule, from the front
-// to the back; flat; and as lines. From the fonts that the tests' machines have (fonts-dejavu-core).
+// Compares letters with the outlines in their fonts, in double precision: as solids, which contain
+// what the outlines contain by the even-odd rule, from the front to the back; flat; and as lines.
+// The fonts are those of the tests' machines (fonts-dejavu-core).
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -14,9 +15,10 @@ namespace text_test {
 
 constexpr int32_t kSize = 64;
 constexpr double kScale = 4;
-constexpr double kHeight = 7.5;  // of capital letters, units
+constexpr double kHeight = 7.5;  // of capital letters, in units
 constexpr const char* kText = "g8\xC3\x85";
-// Letters' curves are cut into pieces no farther from them than this, capital heights.
+// The curves of letters are cut into pieces that are at most this far from them, in capital
+// heights.
 constexpr double kFlatness = 1.0 / 1500;
 
 struct Point {
@@ -31,11 +33,11 @@ Point BezierAt(const text::OutlinePoint* p, double t) {
   return at;
 }
 
-// In capital heights, where the text stands.
+// A letter, in capital heights, at its place in the text.
 struct Letter {
   std::vector<Ring> rings;
 
-  // How far from the outline, and whether within.
+  // Returns the distance from the outline, and sets whether the point is within it.
   double Distance(const Point& p, bool* inside) const {
     double square = 1e9;
     *inside = false;
@@ -48,7 +50,7 @@ struct Letter {
         const double t = std::clamp(((p.x - a.x) * dx + (p.y - a.y) * dy) / length2, 0.0, 1.0);
         const double u = p.x - a.x - t * dx, v = p.y - a.y - t * dy;
         square = std::min(square, u * u + v * v);
-        // Edges that a ray upwards meets.
+        // Counts the edges that a ray upwards meets.
         if ((a.x > p.x) != (b.x > p.x) && a.y + (p.x - a.x) / dx * dy > p.y) *inside = !*inside;
       }
     }
@@ -86,7 +88,7 @@ class DrawnText : public DrawnPrimitives {
     Set(text->mutable_up(), kUp);
     return p;
   }
-  // Of a place in units: x along the line, y up, z to the reader, in capital heights.
+  // Maps a place in units to capital heights: x along the line, y up, z to the reader.
   static Vector InText(const Vector& p) {
     const Vector z = Unit(kFacing);
     const Vector y = Unit(kUp - gpu::implicit::Dot(kUp, z) * z), x = gpu::implicit::Cross(y, z);
@@ -98,9 +100,9 @@ class DrawnText : public DrawnPrimitives {
     const Vector y = Unit(kUp - gpu::implicit::Dot(kUp, z) * z), x = gpu::implicit::Cross(y, z);
     return kPosition + kHeight * (p.x * x + p.y * y);
   }
-  // Letters between two depths, towards the reader, voxels.
+  // Checks that the letters lie between two depths, towards the reader, in voxels.
   void ExpectBetween(const Drawn& drawn, double back, double front) const {
-    constexpr double kVoxel = 1 / (kHeight * kScale);  // capital heights
+    constexpr double kVoxel = 1 / (kHeight * kScale);  // in capital heights
     constexpr double kDoubt = kFlatness + kSnapped * kVoxel;
     uint64_t lit = 0, judged = 0, wrong = 0;
     drawn.ForEach([&](int32_t x, int32_t y, int32_t z) {
@@ -212,7 +214,8 @@ TEST_F(DrawnText, StrokesAreWithinTheirRadius) {
   EXPECT_EQ(missing, 0u);
 }
 
-// From green to red along a direction that is none of the text's; of letters each by its own place.
+// From green to red along a direction that is not an axis of the text; each letter is coloured by
+// its own place.
 TEST_F(DrawnText, ColouredLettersHaveTheColoursOfTheirPlaces) {
   const Vector along{1, 0.5, -0.25};
   for (const double depth : {0.0, 1.3}) {

@@ -1,4 +1,4 @@
-// What is said of entities whose voxels were counted by hand.
+// Tests explanations of entities whose voxels were counted by hand.
 #include "daemon/explain/explain.h"
 
 #include <gmock/gmock.h>
@@ -47,7 +47,7 @@ EntityData WithPriority(EntityData data, uint32_t priority) {
   return data;
 }
 
-// 16 voxels a side, each a pixel; a scene's unit is a voxel.
+// 16 voxels a side, each a pixel; the scene's unit is a voxel.
 gpu::Target Cube() {
   gpu::Target target;
   target.geometry.grid = {kSide, kSide, kSide, {1, 1, 1}, {-8, -8, -0.5}};
@@ -158,7 +158,7 @@ TEST_F(ExplainTest, WhatIsMasked) {
   EXPECT_EQ(Ask("x").visibility, Visibility::kMasked);
   Commit(SetMask("a", "none there"));
   EXPECT_EQ(Ask("x").visibility, Visibility::kMasked);
-  // Of the mask itself: its layer is not shown.
+  // For the mask itself: its layer is not shown.
   EXPECT_EQ(Ask("hole", "m").visibility, Visibility::kLayerHidden);
 }
 
@@ -244,7 +244,7 @@ TEST_F(ExplainTest, InstancesAndObjects) {
 }
 
 TEST_F(ExplainTest, WhereTheDisplayHasNoLight) {
-  // A colour that one bit a channel does not show.
+  // A colour that one bit per channel does not show.
   target_.layout.format = display::PixelFormat::kBitPlanes;
   Commit(Put("a", "x", Box({0, 0, 0}, {4, 4, 4}, 0x010101)),
          Put("a", "bright", Box({8, 8, 8}, {12, 12, 12})));
@@ -255,7 +255,7 @@ TEST_F(ExplainTest, WhereTheDisplayHasNoLight) {
 }
 
 TEST_F(ExplainTest, WhereNoPixelLooks) {
-  // Slices of the lower half alone.
+  // Slices of only the lower half.
   auto& stack = std::get<display::PlanarStack>(target_.geometry.shape);
   stack.positions_mm.resize(kSide / 2);
   target_.layout.slices = kSide / 2;

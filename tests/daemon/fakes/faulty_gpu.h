@@ -1,4 +1,4 @@
-// Engines "of a GPU" that fault when a test says so: the CPU's, in the caller's thread, under
+// "GPU" engines that fault when a test says so: the CPU's engine, in the caller's thread, under
 // another name.
 #pragma once
 
@@ -18,19 +18,19 @@
 
 namespace voxeld::daemon::testing {
 
-// What a test steers and sees of the GPU and of its engines; survives them.
+// The state of the GPU and of its engines that a test sets and reads; outlives them.
 struct GpuScript {
-  std::set<uint32_t> bad_colors;  // whose geometries fault, unless the CPU draws them
+  std::set<uint32_t> bad_colors;  // colours of geometries that fault, unless the CPU draws them
   int faults = 0;                 // the next frames fault, whatever they draw
   bool broken = false;            // every frame faults
-  int late = 0;                   // the next frames' answers do not come in time
-  int unequal = 0;           // frames for which one of several GPUs has no memory: all are lost
-  bool full = false;         // frames are refused for want of memory
-  absl::Status absent;       // not OK: engines come, and then cannot be had
-  bool wrong = false;        // frames have other bytes than they should
+  int late = 0;                   // the answers to the next frames are late
+  int unequal = 0;  // number of frames for which one of several GPUs is out of memory: all are lost
+  bool full = false;         // frames are refused as out of memory
+  absl::Status absent;       // if not OK: engines are created, and are then unavailable
+  bool wrong = false;        // frames have wrong bytes
   bool slow_cpu = false;     // the CPU's frames wait for RunCpu
-  std::vector<bool> shared;  // of each GPU engine made: in the process that all share
-  int cpu_engines = 0;       // made
+  std::vector<bool> shared;  // whether each GPU engine is in the shared process
+  int cpu_engines = 0;       // number made
   std::vector<std::function<void()>> cpu_frames;
 
   void RunCpu() {
@@ -110,7 +110,7 @@ class FaultyGpu final : public gpu::Engine {
     engine_->ReadVoxels(box, out, std::move(done));
   }
 
-  // The process ends between calls.
+  // The process exits between calls.
   void Die() {
     gone_ = true;
     lost_(absl::DataLossError("the worker was lost"));

@@ -1,4 +1,4 @@
-// Short ways to write operations in tests.
+// Helpers for writing operations in tests.
 #pragma once
 
 #include <algorithm>
@@ -118,7 +118,7 @@ inline Operation EndCommit(uint64_t frame_id = 0) {
   return {0, commit};
 }
 
-// Numbers them as a stream does: 1, 2, 3, … after `last`.
+// Numbers the operations as a stream does: 1, 2, 3, … after `last`.
 template <typename... Ops>
 std::vector<Operation> Sequence(uint64_t last, Ops... ops) {
   std::vector<Operation> all;

@@ -1,6 +1,6 @@
-// An engine that keeps what deltas tell it, checks every rule of gpu/delta.h,
-// and "draws" by hashing the scene it holds: equal scenes give equal pictures.
-// Calls end when Run is called, or at once.
+// An engine that records the contents of its deltas, checks every rule of gpu/delta.h, and "draws"
+// by hashing the scene that it holds: equal scenes give equal pictures. Calls end when Run is
+// called, or at once.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,7 @@
 
 namespace voxeld::daemon::testing {
 
-// What an engine holds. Checks ids, references and order as an engine would.
+// The scene that an engine holds. Checks ids, references and order as an engine would.
 class SceneModel : public gpu::DeltaVisitor {
  public:
   struct Geometry {
@@ -82,8 +82,8 @@ class SceneModel : public gpu::DeltaVisitor {
     return absl::OkStatus();
   }
 
-  // What is drawn, ids left out: each drawable with its geometry's content and its layer, in a
-  // canonical order. With `visible_only`, what hidden layers hold is left out.
+  // Returns what is drawn, without ids: each drawable with its geometry's content and its layer, in
+  // a canonical order. With `visible_only`, the contents of hidden layers are left out.
   std::vector<std::string> Canonical(bool visible_only = false) const {
     std::vector<std::string> all;
     const auto bytes = [](const auto& values) {
@@ -122,21 +122,22 @@ class SceneModel : public gpu::DeltaVisitor {
   int puts_ = 0, drops_ = 0;
 };
 
-// What a test steers and sees of its engines; survives them.
+// The state of its engines that a test sets and reads; outlives them.
 struct EngineScript {
-  uint64_t memory_bytes = 0;         // what frames say that the engine holds
+  uint64_t memory_bytes = 0;         // the memory that frames report as used by the engine
   bool inline_calls = true;          // false: calls wait for Run
-  std::optional<absl::Status> fail;  // the next frame ends in this, once
-  bool fail_staging = false;         // AcquireStaging is refused, once
-  int engines = 0;                   // made so far
-  std::vector<gpu::Target> targets;  // set so far
-  std::vector<uint64_t> frames;      // drawn so far
+  std::optional<absl::Status> fail;  // the next frame ends with this error, once
+  bool fail_staging = false;         // the next AcquireStaging is refused, once
+  int engines = 0;                   // number made so far
+  std::vector<gpu::Target> targets;  // the targets set so far
+  std::vector<uint64_t> frames;      // the frames drawn so far
   std::deque<std::function<void()>> calls;
-  SceneModel* scene = nullptr;                    // of the newest engine; null when there is none
-  std::function<void(uint64_t frame)> on_submit;  // as it is asked for
-  std::function<void(uint64_t frame, const SceneModel& scene)> on_frame;  // as it is drawn
+  SceneModel* scene = nullptr;                    // of the newest engine; null without engines
+  std::function<void(uint64_t frame)> on_submit;  // called when a frame is requested
+  // called when a frame is drawn
+  std::function<void(uint64_t frame, const SceneModel& scene)> on_frame;
 
-  // Carries out what waits. False if nothing did.
+  // Carries out waiting calls. Returns false if there were none.
   bool Run() {
     if (calls.empty()) return false;
     while (!calls.empty()) {

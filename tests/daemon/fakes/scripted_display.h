@@ -1,4 +1,4 @@
-// A display whose device does what a test says. Time passes only when the test moves it.
+// A display whose device is controlled by the test. Time advances only when the test advances it.
 #pragma once
 
 #include <functional>
@@ -34,15 +34,15 @@ class ScriptedDisplay final : public display::Display {
   ScriptedDisplay(display::DisplayInfo info, sync::Clock& clock)
       : Display(std::move(info), clock), now_(clock) {}
 
-  // ---- what the device does
+  // ---- the device's behaviour
   bool attach_at_once = true;
-  sync::TimeNs show_after_ns = -1;  // ≥ 0: each volume is shown that long after it was sent
+  sync::TimeNs show_after_ns = -1;  // if ≥ 0, each volume is shown that long after it was sent
   absl::Status refuse_brightness, refuse_blank;
 
   void Attach() { Attached(); }
   void Lose(const std::string& reason) { DeviceLost(reason); }
   void FailTransfers(uint64_t count) { mutable_stats().transfers_failed += count; }
-  // The volume in flight ends. False if none is.
+  // Shows the volume in flight. Returns false if no volume is in flight.
   bool Show() {
     if (in_flight() == nullptr) return false;
     FrameDone(now_.Now(), display::Evidence::kDevice, now_.Now() - sync::kMillisecond, 100);
@@ -66,7 +66,7 @@ class ScriptedDisplay final : public display::Display {
     return coming;
   }
 
-  int sent = 0;  // volumes begun, of any cause
+  int sent = 0;  // volumes sent, for any reason
   std::function<void(uint64_t volume)> on_send;
 
  protected:

@@ -1,5 +1,5 @@
-// A whole core in one thread, under a clock that stands still,
-// with scripted displays and recording engines.
+// A whole core in one thread, under a clock that stands still, with scripted displays and recording
+// engines.
 #pragma once
 
 #include <map>
@@ -42,7 +42,7 @@ struct RecordingSink final : SessionSink {
     }
     return found;
   }
-  // Of one commit, in the order of arrival.
+  // Returns the outcomes of one commit, in the order of arrival.
   std::vector<CommitOutcome> OutcomesOf(uint64_t frame_id) const {
     std::vector<CommitOutcome> found;
     for (const auto& [receipt, outcome] : Of<CommitOutcome>()) {
@@ -60,7 +60,7 @@ class Simulation {
     uint64_t last_sequence = 0;
   };
 
-  // `make_engine` empty: recording engines, each with its script.
+  // If `make_engine` is empty, recording engines are used, each with its script.
   using MakeEngine =
       std::function<absl::StatusOr<std::unique_ptr<gpu::Engine>>(const gpu::EngineOptions&)>;
 
@@ -92,7 +92,7 @@ class Simulation {
     displays_ = displays;
   }
 
-  // Starts, and shows the first (dark) volume unless a display does not attach.
+  // Starts the core, and shows the first (dark) volume unless a display does not attach.
   void Start() {
     if (!core->Start().ok()) std::abort();
     core->Step();
@@ -108,7 +108,8 @@ class Simulation {
     return client;
   }
 
-  // Numbers the operations and hands them over, with a commit at the end if `frame_id` is not 0.
+  // Numbers the operations and passes them to the core, with a commit at the end if `frame_id` is
+  // not 0.
   template <typename... Ops>
   void Send(Client& client, uint64_t frame_id, Ops... ops) {
     std::vector<Operation> all = Sequence(client.last_sequence, std::move(ops)...);
@@ -131,7 +132,7 @@ class Simulation {
     core->Step();
   }
 
-  // Lets the device show what is in flight.
+  // Lets the device show the volume in flight.
   bool Show(int display = 0) {
     const bool shown = display_[display]->Show();
     core->Step();
@@ -165,7 +166,7 @@ class Simulation {
   sync::FakeClock clock;
   absl::Status make_engine_fails;
   std::vector<EngineEvent> engine_events;
-  std::map<std::string, std::vector<uint64_t>> transfers_failed;  // as it was told, by display
+  std::map<std::string, std::vector<uint64_t>> transfers_failed;  // as reported, by display
   std::optional<Core> core;
 
  private:

@@ -1,4 +1,4 @@
-// A connection spoken to in bytes.
+// A connection on which tests send and receive bytes.
 #pragma once
 
 #include <arpa/inet.h>
@@ -16,12 +16,12 @@
 
 namespace voxeld::daemon::http {
 
-// A blocking connection; every read has a deadline of its own.
+// A blocking connection; every read has its own deadline.
 class Connection {
  public:
   explicit Connection(const Address& address) : fd_(Made(address.unix_socket)) { Connect(address); }
   Connection() : fd_(Made(false)) {}  // not connected yet
-  // From the local address `from`, for example "127.0.0.2".
+  // Connects from the local address `from`, for example "127.0.0.2".
   Connection(const Address& address, const char* from) : fd_(Made(false)) {
     sockaddr_in name = {};
     name.sin_family = AF_INET;
@@ -51,21 +51,21 @@ class Connection {
   void Send(const std::string& text) {
     EXPECT_EQ(send(fd_, text.data(), text.size(), MSG_NOSIGNAL), static_cast<ssize_t>(text.size()));
   }
-  // Nothing more comes from here.
+  // Shuts down the sending side.
   void FinishSending() { EXPECT_EQ(shutdown(fd_, SHUT_WR), 0); }
-  // Up to and with `end`, or to the end of the connection.
+  // Reads up to and including `end`, or to the end of the connection.
   std::string ReadTo(const std::string& end) {
     std::string text;
     char c = 0;
     while (!text.ends_with(end) && recv(fd_, &c, 1, 0) == 1) text += c;
     return text;
   }
-  // Whether something has come, or the end, that is not read yet.
+  // Returns whether unread bytes, or the end of the connection, have arrived.
   bool Readable() const {
     pollfd socket = {.fd = fd_, .events = POLLIN, .revents = 0};
     return poll(&socket, 1, 0) != 0;
   }
-  // As much as is taken before the other end closes.
+  // Returns how much is accepted before the peer closes.
   size_t SendUntilClosed(const std::string& text) {
     size_t sent = 0;
     for (;;) {

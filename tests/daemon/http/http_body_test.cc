@@ -1,4 +1,4 @@
-// Bodies that somebody takes, spoken to in bytes.
+// Tests request bodies that are passed to a receiver, at the level of bytes.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -17,15 +17,15 @@ using ::testing::StartsWith;
 
 using Then = std::function<void(std::optional<Response>)>;
 
-// What a receiver was given, seen from the test's thread.
+// Records what a receiver was given, for the test's thread.
 struct Taken {
   sync::Mutex mutex;
   sync::CondVar changed;
   std::string bytes VOXELD_GUARDED_BY(mutex);
   size_t pieces VOXELD_GUARDED_BY(mutex) = 0, longest VOXELD_GUARDED_BY(mutex) = 0;
   bool whole VOXELD_GUARDED_BY(mutex) = false;
-  int gone VOXELD_GUARDED_BY(mutex) = 0;              // receivers
-  std::optional<Then> held VOXELD_GUARDED_BY(mutex);  // of the last piece, where the test answers
+  int gone VOXELD_GUARDED_BY(mutex) = 0;              // receivers that were destroyed
+  std::optional<Then> held VOXELD_GUARDED_BY(mutex);  // for the last piece, if the test answers
 };
 
 class Receiver final : public BodyReceiver {
@@ -151,7 +151,7 @@ TEST_F(HttpBody, IsSentWhenItIsWanted) {
   EXPECT_THAT(connection.ReadAll(), StartsWith("HTTP/1.1 202 "));
 }
 
-// Nothing more than a piece is held here while whoever takes it is busy.
+// The server holds at most one piece while the receiver is busy.
 TEST_F(HttpBody, WaitsForWhoeverTakesIt) {
   hold_ = true;
   Start({.answer_limit_ns = 60 * sync::kSecond});
@@ -188,7 +188,7 @@ TEST_F(HttpBody, TooMuchIsRefused) {
   AwaitGone();
 }
 
-// Who still sends hears the answer all the same.
+// A client that is still sending gets the answer all the same.
 TEST_F(HttpBody, MayBeRefusedAtOnceAndHalfWay) {
   room_ = 100'000;
   Start();
@@ -226,7 +226,7 @@ TEST_F(HttpBody, EndsWithTheServer) {
   }
   server_.reset();
   AwaitGone();
-  then(std::nullopt);  // falls on the floor
+  then(std::nullopt);  // is dropped
 }
 
 TEST_F(HttpBody, EndsWhereNothingComes) {
@@ -237,7 +237,7 @@ TEST_F(HttpBody, EndsWhereNothingComes) {
   AwaitGone();
 }
 
-// On a disk that hangs, say. What the receiver says later is not heard.
+// When the receiver does not answer, for example because a disk hangs. Its later answer is ignored.
 TEST_F(HttpBody, EndsWhereItIsNotTaken) {
   hold_ = true;
   Start({.answer_limit_ns = 20 * sync::kMillisecond});
@@ -261,7 +261,7 @@ TEST_F(HttpBody, EndsWhereItIsNotTaken) {
   EXPECT_EQ(taken_.bytes, "half");
 }
 
-// Something always comes, but not enough.
+// Bytes keep arriving, but too few.
 TEST_F(HttpBody, EndsWhereTooLittleComes) {
   max_bytes_ = uint64_t{1} << 50;
   Start({.idle_limit_ns = 20 * sync::kMillisecond, .body_bytes_per_s = uint64_t{1} << 40});

@@ -1,4 +1,4 @@
-// The server, spoken to in bytes.
+// Tests the server at the level of bytes.
 #include "daemon/http/http_server.h"
 
 #include <fcntl.h>
@@ -164,7 +164,7 @@ TEST_F(HttpServer, WhereThereAreNoWebSocketsThatIsARequestLikeOthers) {
   EXPECT_THAT(Ask(AskForAWebSocket("/hello")), EndsWith("hello\n"));
 }
 
-// The process gets so many more descriptors, about, while this lives.
+// While this lives, the process can open only about that many more descriptors.
 class FewDescriptors {
  public:
   explicit FewDescriptors(rlim_t more) {
@@ -188,7 +188,7 @@ TEST_F(HttpServer, WithoutDescriptorsItsStartIsAnError) {
         .status();
   };
   ASSERT_TRUE(start().ok()) << "and all that is made once is there";
-  bool waits = true, listens = true;  // that there was one for these in each try
+  bool waits = true, listens = true;  // in every try, each of these got a descriptor
   absl::Status status;
   for (rlim_t more = 0; more < 10; ++more) {
     {
@@ -217,7 +217,7 @@ TEST_F(HttpServer, WhoCannotBeAcceptedIsToldAndAcceptedLater) {
     return told.size();
   };
   for (size_t i = 1; i <= 2; ++i) {
-    Connection connection;  // of which the socket is there before
+    Connection connection;  // whose socket already exists
     {
       const FewDescriptors none(0);
       connection.Connect(server_->address());
@@ -227,7 +227,8 @@ TEST_F(HttpServer, WhoCannotBeAcceptedIsToldAndAcceptedLater) {
     EXPECT_THAT(connection.ReadTo("\r\n\r\n"), StartsWith("HTTP/1.1 200 "));
   }
   sync::MutexLock lock(mutex);
-  // Once until one has been accepted; the server may have looked for the next before the first was answered.
+  // Once until one has been accepted; the server may have tried to accept the next before the first
+  // was answered.
   EXPECT_LE(told.size(), 3u);
   for (const std::string& why : told) EXPECT_EQ(why, "Too many open files");
 }
@@ -252,7 +253,7 @@ TEST_F(HttpServer, ABodyThatIsThrownAwayHasALimit) {
   EXPECT_THAT(post(4096), StartsWith("HTTP/1.1 405 "));
   EXPECT_THAT(Ask("POST /hello HTTP/1.1\r\nHost: x\r\nContent-Length: 4097\r\n\r\n"),
               StartsWith("HTTP/1.1 413 "));
-  // Of a length that nobody has said.
+  // The length of the body is not specified.
   Connection chunks(server_->address());
   chunks.Send("POST /hello HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\n2000\r\n");
   EXPECT_THAT(chunks.ReadTo("\r\n\r\n"), StartsWith("HTTP/1.1 413 "));
@@ -309,7 +310,7 @@ TEST_F(HttpServer, DoesNotWaitForAnAnswerForEver) {
   Connection connection(server_->address());
   connection.Send(Get("/later"));
   EXPECT_THAT(connection.ReadTo("in time\n"), StartsWith("HTTP/1.1 503 "));
-  TakeWaiting()({.body = "too late\n"});  // falls on the floor
+  TakeWaiting()({.body = "too late\n"});  // is dropped
   connection.Send(Get("/hello"));
   EXPECT_THAT(connection.ReadTo("hello\n"), StartsWith("HTTP/1.1 200 "));
 }
@@ -324,7 +325,7 @@ TEST_F(HttpServer, WhoWaitsForAnAnswerIsNotIdle) {
 bool StartsWithOk(const std::string& answer) { return absl::StartsWith(answer, "HTTP/1.1 200 "); }
 
 TEST_F(HttpServer, WhoDoesNotReadAnAnswerMakesRoomForOthers) {
-  const std::string body(64 << 20, 'b');  // more than lies in sockets' buffers
+  const std::string body(64 << 20, 'b');  // more than fits into the buffers of sockets
   const auto server = Server::Start({.listen = *ParseAddress("127.0.0.1:0"),
                                      .max_connections = 1,
                                      .idle_limit_ns = 20 * sync::kMillisecond},
@@ -356,7 +357,7 @@ TEST_F(HttpServer, ConnectionsThatSayNothingKeepNobodyAway) {
   std::vector<std::unique_ptr<Connection>> silent;
   for (int i = 0; i < 40; ++i) {
     silent.push_back(std::make_unique<Connection>(server_->address()));
-    if (i % 2 == 0) silent.back()->Send("GET /hel");  // nor do those that never finish
+    if (i % 2 == 0) silent.back()->Send("GET /hel");  // nor do those that never finish a request
   }
   EXPECT_THAT(Ask(Get("/hello")), StartsWith("HTTP/1.1 200 "));
 }
@@ -398,7 +399,8 @@ TEST_F(HttpServer, WhereAllAreAtWorkARequestIsRefusedButForReservedPaths) {
   for (int i = 0; i < 20; ++i) {
     EXPECT_THAT(Ask(Get("/hello")), StartsWith("HTTP/1.1 200 ")) << i;
   }
-  // One that is kept open after such a request leaves its place to no other, and may not ask for anything else itself.
+  // A connection that is kept open after such a request yields its place to no other, and may not
+  // send another request itself.
   Connection kept(server_->address());
   kept.Send(Get("/hello"));
   EXPECT_THAT(kept.ReadTo("hello\n"), StartsWith("HTTP/1.1 200 "));
@@ -428,7 +430,7 @@ TEST_F(HttpServer, OneAddressDoesNotGetAllPlaces) {
   const std::string refused = absl::StrCat(eighth.ReadTo("\r\n\r\n"), eighth.ReadTo("\n"));
   EXPECT_THAT(refused, StartsWith("HTTP/1.1 503 "));
   EXPECT_THAT(refused, HasSubstr("7 requests and WebSockets from 127.0.0.2 are being served"));
-  // Its health is still told, and others are served.
+  // Health is still answered, and other clients are served.
   Connection health(server_->address(), "127.0.0.2");
   health.Send(Get("/hello"));
   EXPECT_THAT(health.ReadTo("hello\n"), StartsWith("HTTP/1.1 200 "));
@@ -437,7 +439,7 @@ TEST_F(HttpServer, OneAddressDoesNotGetAllPlaces) {
   work.push_back(TakeWaiting());
   for (Done& done : work) done({.body = "done\n"});
   EXPECT_THAT(other.ReadTo("done\n"), StartsWith("HTTP/1.1 200 "));
-  // An idle connection of the same address gives up its place.
+  // An idle connection from the same address yields its place.
   EXPECT_THAT(greedy[0]->ReadTo("done\n"), StartsWith("HTTP/1.1 200 "));
   Connection next(server_->address(), "127.0.0.2");
   next.Send(Get("/later"));
@@ -466,7 +468,7 @@ TEST_F(HttpServer, TheAddressWithMostIdleConnectionsGivesUpAPlace) {
 TEST_F(HttpServer, ThePortIsThereForTheNextAtOnce) {
   Start();
   Connection open(
-      server_->address());  // which the server ends, and its system remembers for a minute
+      server_->address());  // which the server closes, and its system remembers for a minute
   open.Send(Get("/hello"));
   EXPECT_THAT(open.ReadTo("hello\n"), StartsWith("HTTP/1.1 200 "));
   const Address address = server_->address();
@@ -523,10 +525,10 @@ TEST_F(HttpServer, AnAddressThatCannotBeListenedOnIsNamed) {
     }
     return Server::Start(options, [](const Request&, const Done&) { return false; }).status();
   };
-  // For documentation alone (RFC 5737): of no machine.
+  // Reserved for documentation (RFC 5737): no machine has it.
   EXPECT_THAT(std::string(why("192.0.2.1").message()),
               HasSubstr("192.0.2.1:0 cannot be listened on"));
-  // A name of which a part is too long is none (RFC 1035).
+  // A name with a part that is too long is invalid (RFC 1035).
   const absl::Status unknown = why(std::string(64, 'x') + ".invalid");
   EXPECT_TRUE(absl::IsInvalidArgument(unknown)) << unknown;
   EXPECT_THAT(std::string(unknown.message()), HasSubstr("is not known"));

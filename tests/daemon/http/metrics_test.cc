@@ -60,7 +60,7 @@ TEST(Metrics, EveryFigureStandsThereOnce) {
   EXPECT_THAT(text, HasSubstr("voxeld_display_bytes_out_total{display=\"two\"} 77\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_display_commit_to_presented_seconds{display=\"one\","
                               "stat=\"p99\"} 0.25\n"));
-  // Without a value there is none.
+  // Without a value, the metric is left out.
   EXPECT_THAT(text, HasSubstr("voxeld_display_assemble_seconds{display=\"one\",stat=\"p50\"} Nan"));
   EXPECT_THAT(text, HasSubstr("voxeld_display_state{display=\"one\",state=\"lost\"} 1\n"));
   EXPECT_THAT(text, HasSubstr("voxeld_display_state{display=\"one\",state=\"showing\"} 0\n"));
@@ -163,7 +163,7 @@ TEST(Health, IsWellUnlessADisplayIsLostOrAnEngineIsGone) {
   EXPECT_EQ(HealthResponse(displays, stats, Phase::kStarting).status, 503u);
   EXPECT_THAT(HealthResponse(displays, stats, Phase::kStarting).body, HasSubstr("\"starting\""));
   EXPECT_EQ(HealthResponse(displays, stats, Phase::kEnding).status, 503u);
-  // And nothing else: that displays stop then is no trouble of theirs.
+  // And nothing else: it is not an error of displays that they stop then.
   stats.displays[0].state = display::DisplayState::kStopped;
   EXPECT_EQ(HealthResponse(displays, stats, Phase::kEnding).body,
             R"({"status":"failing","reasons":[{"what":"shutting down"}]})"

@@ -1,4 +1,4 @@
-// Which bytes are the beginning of a call. Frames are written out by hand here.
+// Tests which bytes are the beginning of a call. Frames are written out by hand here.
 #include "daemon/listen/greeting.h"
 
 #include <gmock/gmock.h>
@@ -37,11 +37,11 @@ const std::string kBegin = kPreface + kSettings;
 
 struct Read {
   Verdict verdict = Verdict::kMore;
-  size_t decided_at = 0;  // bytes that were there
+  size_t decided_at = 0;  // the number of bytes at the decision
   std::string why;
 };
 
-// As it comes `step` bytes at a time, asked only when it says that it wants to be.
+// Passes the bytes `step` at a time, and asks only when it says that it wants to be asked.
 Read Drip(const std::string& bytes, size_t step) {
   Greeting greeting(kMostMessage);
   Read out;
@@ -152,7 +152,7 @@ TEST(Greeting, DataOfACallThatIsNoneIsWrong) {
   EXPECT_EQ(Drip(kBegin + kHeaders + Frame(0, 8, 1, "\x05x"), 1).verdict, Verdict::kWrong);
 }
 
-// Bytes of any kind: it says something of them within its limit, and asks for more than it has.
+// For random bytes: it decides within its limit, and asks for more than it has.
 TEST(Greeting, OfGarbageComesToAnEnd) {
   std::mt19937 random(7);
   for (int round = 0; round < 2'000; ++round) {
@@ -176,7 +176,8 @@ TEST(Greeting, OfGarbageComesToAnEnd) {
   }
 }
 
-// A ClientHello of `size` bytes in one record (RFC 8446, 4.1.2 and 5.1), whatever is in it.
+// Returns a ClientHello of `size` bytes in one record (RFC 8446, 4.1.2 and 5.1), with arbitrary
+// content.
 std::string Hello(size_t size) {
   const auto byte = [](size_t value) { return static_cast<char>(value & 0xff); };
   return std::string("\x16\x03\x01") + byte((size + 4) >> 8) + byte(size + 4) + "\x01" +
@@ -217,7 +218,7 @@ TEST(TlsGreeting, AnythingElseIsWrongAsSoonAsItIs) {
   server[5] = 2;
   EXPECT_EQ(DripTls(server, 1).verdict, Verdict::kWrong);
   std::string cut = Hello(100);
-  cut[8] = 101;  // it goes on in another record
+  cut[8] = 101;  // it continues in another record
   EXPECT_EQ(DripTls(cut, 1).verdict, Verdict::kWrong);
   EXPECT_THAT(Drip(Hello(100), 1).why, HasSubstr("without TLS"));
 }

@@ -1,4 +1,4 @@
-// The guard's rules, under a clock that is moved by hand and sockets that are numbers.
+// Tests the guard's rules, under a clock that is moved by hand and with numbers as sockets.
 #include "daemon/listen/guard.h"
 
 #include <gmock/gmock.h>
@@ -54,7 +54,7 @@ class GuardTest : public ::testing::Test {
                                             .lookahead_bytes = 500,
                                             .cut_penalty_ns = sync::kSecond,
                                             .max_cancelled_calls_per_second = 10};
-  // What is left alone: thirteen sixteenths of the bytes, fifteen of the time.
+  // The amounts that are not limited: thirteen sixteenths of the bytes, fifteen of the time.
   static constexpr uint64_t kFreeBytes = 1300;
   static constexpr sync::TimeNs kFreeTime = 7'500 * sync::kMillisecond;
 
@@ -62,7 +62,7 @@ class GuardTest : public ::testing::Test {
     return guard_.Enter(peer, own, std::make_unique<FakeWire>(line));
   }
 
-  // Looks as often as the guard asks for it.
+  // Calls Look as often as the guard asks for it.
   void Pass(sync::TimeNs time) {
     const sync::TimeNs end = clock_.Now() + time;
     while (clock_.Now() < end) {
@@ -119,7 +119,7 @@ TEST_F(GuardTest, BytesThatNobodyToldOfAreSeenByTheNextLook) {
 
 TEST_F(GuardTest, WhoEndsItFirstIsCountedAndPunishedTheSame) {
   const ConnectionId id = Enter(Tcp(1), line_);
-  line_.bytes = 1601;  // and reset, before anybody looked
+  line_.bytes = 1601;  // and reset, before Look was called
   guard_.Leave(id);
   EXPECT_EQ(line_.cuts, 1) << "what gRPC has not read is thrown away";
   EXPECT_TRUE(line_.gone);
@@ -178,7 +178,7 @@ TEST_F(GuardTest, AnAnswerThatAnybodyGetsBeginsBytesAndTimeAnewAndAuthorisesNobo
 
 TEST_F(GuardTest, AnAnswerBeyondTheLimitAuthorisesNobodyHoweverFastItWas) {
   Enter(Tcp(1), line_);
-  line_.bytes = 1601;  // in no time: neither OnBytes nor Look had a chance
+  line_.bytes = 1601;  // in no time: neither OnBytes nor Look was called in between
   guard_.OnAnswer(Tcp(1).name, true);
   EXPECT_EQ(line_.cuts, 1);
   EXPECT_FALSE(line_.trusted);
@@ -190,7 +190,7 @@ TEST_F(GuardTest, TimeStandsStillWhileTheDaemonOwesAnAnswerBytesDoNot) {
   guard_.OnMessage(Tcp(1).name);
   Pass(60 * sync::kSecond);
   EXPECT_EQ(line_.cuts, 0);
-  guard_.OnCallEnd(Tcp(1).name);  // refused: it begins anew
+  guard_.OnCallEnd(Tcp(1).name);  // refused: its time starts again
   Pass(kFreeTime - 1);
   EXPECT_EQ(line_.cuts, 0);
   Pass(1);
@@ -230,7 +230,7 @@ TEST_F(GuardTest, TheAddressOfWhatWasCutIsRefusedTwiceAsLongEachTime) {
     length = std::min(2 * length, Guard::kLongestPenalty * kLimits.cut_penalty_ns);
   }
   EXPECT_EQ(counters_.Read().refused_after_cut, 18u);
-  clock_.Advance(length);  // as long as it was refused last
+  clock_.Advance(length);  // as long as it was last refused
   guard_.OnWrongGreeting(Enter(Tcp(1), line_), "");
   clock_.Advance(kLimits.cut_penalty_ns);
   EXPECT_TRUE(guard_.MayEnter(Tcp(8)).ok()) << "it begins anew";
@@ -292,7 +292,7 @@ TEST_F(GuardTest, BytesOfWhichNothingComesAreCutThoughTheConnectionIsAuthorised)
   Enter(Tcp(1), line_);
   guard_.OnAnswer(Tcp(1).name, true);
   uint64_t progress = 1;
-  for (int i = 0; i < 10; ++i) {  // messages as great as may be
+  for (int i = 0; i < 10; ++i) {  // messages of the greatest size
     line_.bytes += kLimits.max_message_bytes + kLimits.lookahead_bytes;
     guard_.OnFigures(Of(line_), {.progress = progress, .open = 1});
     guard_.OnFigures(Of(line_), {.progress = ++progress, .open = 1});
@@ -382,7 +382,7 @@ TEST_F(GuardTest, TheStrangerThatIsIdleLongestMakesRoom) {
     Enter(Tcp(i), lines_[i]);
     Pass(100 * sync::kMillisecond);
   }
-  guard_.OnMessage(Tcp(0).name);  // at work, so not idle
+  guard_.OnMessage(Tcp(0).name);  // busy, so not idle
   EXPECT_TRUE(guard_.MayEnter(Tcp(9)).ok());
   EXPECT_EQ(lines_[0].cuts, 0);
   EXPECT_EQ(lines_[1].cuts, 1);
@@ -430,7 +430,7 @@ TEST_F(GuardTest, ACallThatGoesOnAfterItsAnswerKeepsNobodyAway) {
   for (int i = 0; i < 3; ++i) {
     Enter(Tcp(i), lines_[i]);
     guard_.OnMessage(Tcp(i).name);
-    guard_.OnAnswer(Tcp(i).name, false);  // of health, which goes on
+    guard_.OnAnswer(Tcp(i).name, false);  // a health call, which continues
   }
   Pass(Guard::kFirstCall);
   EXPECT_TRUE(guard_.MayEnter(Tcp(9)).ok());

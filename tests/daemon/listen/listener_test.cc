@@ -1,4 +1,5 @@
-// The listener on the system's sockets: what is accepted, refused, cut, and when descriptors run out.
+// Tests the listener on the system's sockets: which connections are accepted, refused and closed,
+// and running out of descriptors.
 #include "daemon/listen/listener.h"
 
 #include <arpa/inet.h>
@@ -29,7 +30,7 @@ namespace listener_test {
 using std::chrono::steady_clock;
 using ::testing::HasSubstr;
 
-// Until it holds; false after a generous time.
+// Waits until it holds; returns false after a generous time.
 bool Await(const std::function<bool()>& holds) {
   const auto end = steady_clock::now() + std::chrono::seconds(30);
   while (!holds()) {
@@ -46,7 +47,8 @@ Descriptor Connect(const SocketName& name) {
   return client;
 }
 
-// Whether the other end closed, or cut, the connection in a generous time; what comes is thrown away.
+// Returns whether the peer closed or reset the connection within a generous time; discards received
+// bytes.
 bool Ends(int client) {
   for (;;) {
     pollfd poll_fd = {client, POLLIN, 0};
@@ -56,7 +58,7 @@ bool Ends(int client) {
   }
 }
 
-// The beginning of a call: headers that say nothing, and a message of three bytes.
+// The beginning of a call: empty headers, and a message of three bytes.
 constexpr std::string_view kPreface = "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 constexpr std::string_view kSettings{"\0\0\0\4\0\0\0\0\0", 9};
 constexpr std::string_view kCall{
@@ -102,7 +104,7 @@ class ListenerTest : public ::testing::Test {
     std::filesystem::remove_all(folder_, ignored);
   }
 
-  // Names of what listens.
+  // Returns the names of the sockets that listen.
   std::vector<SocketName> Start(const std::string& text, const ConnectionLimits& limits = {}) {
     auto sockets = ListeningSocket::Listen(*ParseAddress(text));
     EXPECT_TRUE(sockets.ok()) << sockets.status();
@@ -168,7 +170,7 @@ TEST_F(ListenerTest, AHostWithSeveralNumbersHasOnePort) {
   ASSERT_FALSE(names.empty());
   const in_port_t port = reinterpret_cast<const sockaddr_in*>(&names[0].address)->sin_port;
   EXPECT_NE(port, 0);
-  for (const SocketName& name : names) {  // the port lies at the same place in both families
+  for (const SocketName& name : names) {  // the port is at the same place in both families
     EXPECT_EQ(reinterpret_cast<const sockaddr_in*>(&name.address)->sin_port, port);
     EXPECT_TRUE(Connect(name).ok());
   }
@@ -330,7 +332,7 @@ TEST_F(ListenerTest, BytesBeyondTheLimitAreCutThoughNobodyReadsThem) {
   EXPECT_TRUE(Await([&] { return counters_.Read().open == 0; }));
 }
 
-// As gRPC does: all that there is, at once.
+// As gRPC does: reads everything that has arrived, at once.
 TEST_F(ListenerTest, WhoReadsAllThatComesGetsNoMoreThanTheLimitBeforeTheCut) {
   const std::vector<SocketName> names = Start("127.0.0.1:0");
   const Descriptor client = Connect(names[0]);
@@ -352,7 +354,7 @@ TEST_F(ListenerTest, WhoReadsAllThatComesGetsNoMoreThanTheLimitBeforeTheCut) {
   while (send(client.get(), some.data(), some.size(), MSG_NOSIGNAL) > 0) {
   }
   reader.join();
-  // And what came before the listener had the connection.
+  // Including what had arrived before the listener had the connection.
   EXPECT_LE(got, 65u << 10);
   EXPECT_EQ(counters_.Read().cut_for_bytes, 1u);
 }
@@ -388,7 +390,7 @@ TEST_F(ListenerTest, SilenceIsCutInTime) {
   EXPECT_EQ(counters_.Read().cut_for_time, 1u);
 }
 
-// Lowers the process' limit to what is open and a few more, until it goes.
+// Lowers the process' limit to the open descriptors and a few more, until it is destroyed.
 class FewDescriptors {
  public:
   explicit FewDescriptors(rlim_t more) {
@@ -417,7 +419,7 @@ TEST_F(ListenerTest, AcceptsAgainWhenDescriptorsComeBack) {
       const uint64_t failures = counters_.Read().accept_failures;
       for (Descriptor& client : clients) {
         (void)connect(client.get(), names[0].get(), names[0].length);
-        Speak(client.get());  // in the system's queue it has been connected with
+        Speak(client.get());  // the system's queue has connected it
       }
       ASSERT_TRUE(Await([&] { return counters_.Read().accept_failures > failures; }));
       EXPECT_LT(served(), kClients);

@@ -1,4 +1,4 @@
-// Names of peers: as gRPC has them, and whom they are counted with.
+// Tests names of peers: gRPC's form, and the group with which a peer is counted.
 #include "daemon/listen/peer.h"
 
 #include <arpa/inet.h>

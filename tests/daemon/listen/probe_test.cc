@@ -1,4 +1,4 @@
-// When the probe says that nobody can connect: under a clock that is moved by hand.
+// Tests when the probe reports that clients cannot connect, under a clock that is moved by hand.
 #include "daemon/listen/probe.h"
 
 #include <gmock/gmock.h>
@@ -31,7 +31,7 @@ class ProbeTest : public ::testing::Test {
     AwaitIdle(0);
   }
 
-  // The probe's thread has made so many attempts, and waits for the time to come.
+  // Waits until the probe's thread has made that many attempts, and waits for the time to come.
   void AwaitIdle(int attempts) {
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     for (;;) {

@@ -1,4 +1,5 @@
-// What the probe's attempt says of the other end: one that does not accept, refuses, goes, or answers.
+// Tests what the probe's attempt reports about a peer that does not accept, refuses, closes, or
+// answers.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
@@ -24,7 +25,7 @@ constexpr std::string_view kGoAway{"\0\0\x8\7\0\0\0\0\0\0\0\0\0\0\0\0\0", 17};
 class ReachTest : public ::testing::Test {
  protected:
   ReachTest() {
-    sockaddr_in any = {};  // every address, as a daemon may listen on
+    sockaddr_in any = {};  // the wildcard address, on which a daemon may listen
     any.sin_family = AF_INET;
     listening_.Reset(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
     EXPECT_EQ(bind(listening_.get(), reinterpret_cast<sockaddr*>(&any), sizeof(any)), 0);
@@ -33,7 +34,7 @@ class ReachTest : public ::testing::Test {
     EXPECT_EQ(getsockname(listening_.get(), target_.name.get(), &target_.name.length), 0);
   }
 
-  // What Reach says while the other end accepts once, hears the request and sends `answer`.
+  // Returns the result of Reach while the peer accepts once, reads the request and sends `answer`.
   absl::Status With(std::string_view answer, sync::TimeNs limit) {
     std::thread other([&] {
       SocketName name;
@@ -43,7 +44,7 @@ class ReachTest : public ::testing::Test {
       EXPECT_GT(recv(got.get(), buffer, sizeof(buffer), 0), 0);
       EXPECT_EQ(send(got.get(), answer.data(), answer.size(), MSG_NOSIGNAL),
                 static_cast<ssize_t>(answer.size()));
-      if (hold_) recv(got.get(), buffer, sizeof(buffer), 0);  // until it goes
+      if (hold_) recv(got.get(), buffer, sizeof(buffer), 0);  // until it closes
     });
     const absl::Status status = Reach(target_, own_, limit);
     other.join();

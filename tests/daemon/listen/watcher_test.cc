@@ -1,4 +1,4 @@
-// What epoll refuses, and what becomes of the connection.
+// Tests what happens to a connection when epoll refuses it.
 #include "daemon/listen/watcher.h"
 
 #include <gmock/gmock.h>
@@ -17,7 +17,7 @@
 namespace voxeld::daemon::listen {
 namespace watcher_test {
 
-// Until it holds; false after a generous time.
+// Waits until it holds; returns false after a generous time.
 bool Await(const std::function<bool()>& holds) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
   while (!holds()) {
@@ -36,7 +36,7 @@ bool Ends(int client) {
 class WatcherTest : public ::testing::Test {
  protected:
   WatcherTest() {
-    guard_.SetOnBusy([] {});  // somebody looks at the calls of those that are authorised
+    guard_.SetOnBusy([] {});  // the calls of authorised connections are watched
     SocketName any;
     auto* const name = reinterpret_cast<sockaddr_in*>(any.get());
     name->sin_family = AF_INET;
@@ -62,7 +62,7 @@ class WatcherTest : public ::testing::Test {
     return watcher_->Add(peer_, false, Descriptor(dup(served_.get()))).status();
   }
   void Authorise() { guard_.OnAnswer(peer_.name, true); }
-  // Whoever has bytes is armed again, as somebody looks at its calls.
+  // A connection with bytes is armed again, as its calls are watched.
   bool AllHaveLeft() {
     return Await([this] {
       guard_.TakeBusy();

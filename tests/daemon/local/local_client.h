@@ -1,4 +1,4 @@
-// The other end of the local socket, as a producer would have it.
+// A client of the local socket, as a producer would have it.
 #pragma once
 
 #include <fcntl.h>
@@ -23,7 +23,7 @@ namespace voxeld::daemon::local {
 
 inline constexpr int kAllSeals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE;
 
-// A memfd that holds `bytes`, with these seals.
+// Returns a memfd that holds `bytes`, with these seals.
 inline Descriptor MakeMemfd(std::string_view bytes, int seals = kAllSeals) {
   Descriptor fd(memfd_create("voxeld-test", MFD_CLOEXEC | MFD_ALLOW_SEALING));
   EXPECT_GE(fd.get(), 0) << std::strerror(errno);
@@ -63,7 +63,7 @@ class LocalClient {
         << std::strerror(errno);
   }
 
-  // False: it would have had to wait, or the server has gone.
+  // Returns false if it would have had to wait, or if the server has closed the connection.
   bool SendBytes(std::string_view bytes, const std::vector<int>& fds = {}) {
     iovec part = {const_cast<char*>(bytes.data()), bytes.size()};
     msghdr header = {};
@@ -86,7 +86,8 @@ class LocalClient {
     return SendBytes(message.SerializeAsString(), fds);
   }
 
-  // The next answer; nothing once the server has closed, or after a generous time (a failure).
+  // Returns the next answer; nullopt once the server has closed, or after a generous time (a
+  // failure).
   std::optional<v1::LocalAnswer> Read() {
     pollfd ready = {socket_.get(), POLLIN, 0};
     if (poll(&ready, 1, 30'000) != 1) {
@@ -101,7 +102,7 @@ class LocalClient {
     return answer;
   }
 
-  // An answer is there already.
+  // Returns whether an answer has arrived.
   bool CanRead() const {
     pollfd ready = {socket_.get(), POLLIN, 0};
     return poll(&ready, 1, 0) == 1;
@@ -116,7 +117,7 @@ class LocalClient {
 
   v1::LocalAnswer Hello(const std::string& token) { return Call(HelloMessage(token)); }
 
-  // Whatever the server has seen before, it has dealt with when this returns.
+  // When this returns, the server has handled everything that it had received before.
   void RoundTrips() {
     for (int i = 0; i < 6; ++i) EXPECT_TRUE(Call(ReleaseMessage(~uint64_t{0})).has_refused());
   }

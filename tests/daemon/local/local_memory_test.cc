@@ -1,4 +1,4 @@
-// A session's memories: what is taken, what is found, what it counts for.
+// Tests a session's memories: which are accepted, which are found, and how much they count.
 #include "daemon/local/local_memory.h"
 
 #include <gmock/gmock.h>
@@ -78,7 +78,7 @@ TEST(LocalMemory, EveryMissingSealIsNamed) {
     EXPECT_EQ(held.memory.memories(), 0u);
     EXPECT_EQ(*held.mapped, 0u);
   }
-  // Against later writes alone: what is mapped for writing already still writes.
+  // Sealed only against later writes: an existing writable mapping can still write.
   HeldMemory held;
   const int future = F_SEAL_SHRINK | F_SEAL_GROW | 0x10;  // F_SEAL_FUTURE_WRITE
   const absl::Status status = held.memory.Hold(1, 4, MakeMemfd("four", future).get());
@@ -98,7 +98,7 @@ TEST(LocalMemory, IsMemoryAndNothingElse) {
     EXPECT_TRUE(absl::IsInvalidArgument(status)) << fd << status;
     EXPECT_THAT(std::string(status.message()), HasSubstr("is no memfd"));
   }
-  // One that cannot be sealed says so by lacking all seals.
+  // Memory that cannot be sealed is recognised by the lack of all seals.
   EXPECT_THAT(std::string(held.memory.Hold(1, 4, plain.get()).message()),
               HasSubstr("not sealed with F_SEAL_SHRINK, F_SEAL_GROW, F_SEAL_WRITE;"));
 }
@@ -154,7 +154,7 @@ TEST(LocalMemory, StaysWhileItIsInUse) {
   EXPECT_TRUE(absl::IsNotFound(held.memory.Release(1)));
   EXPECT_EQ(found->bytes, "first bytes of all");
   EXPECT_EQ(*held.mapped, 1u);
-  // The id is free for other memory meanwhile.
+  // The id is free for other memory in the meantime.
   ASSERT_TRUE(held.Hold(1, "second").ok());
   EXPECT_EQ(held.memory.Find(1, 0, 6)->bytes, "second");
   EXPECT_EQ(found->bytes, "first bytes of all");
@@ -253,7 +253,7 @@ TEST(LocalMemory, WhatIsReleasedIsNotMappedAnyMore) {
   EXPECT_EQ(mapped(), 0u);
 }
 
-// More than a process has addresses for: a memfd may be said to be so large without any memory.
+// More than a process has addresses for: a memfd may claim such a size without any memory.
 TEST(LocalMemory, ThatCannotBeMappedCostsNothing) {
   constexpr uint64_t kHuge = uint64_t{1} << 60;
   const Descriptor fd(memfd_create("huge", MFD_CLOEXEC | MFD_ALLOW_SEALING));

@@ -1,4 +1,4 @@
-// Thousands of packets at random, right, nearly right and wrong, with descriptors of all kinds.
+// Tests thousands of random packets, right, nearly right and wrong, with descriptors of all kinds.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -45,7 +45,7 @@ class Sender {
     return bytes;
   }
 
-  // Mostly as many as are right.
+  // Mostly the right number.
   std::vector<int> Descriptors(const std::string& bytes) {
     const bool memory = !bytes.empty() && bytes.front() == '\x12';  // the tag of field 2
     std::vector<int> fds(Below(8) == 0 ? Below(5) : memory ? 1 : 0);
@@ -79,7 +79,7 @@ TEST_F(LocalPackets, AtRandomHurtNobody) {
               ? HelloMessage(sessions[sender.Below(2)].token).SerializeAsString()
               : sender.Bytes();
       client->SendBytes(bytes, fresh ? std::vector<int>() : sender.Descriptors(bytes));
-      // One answer to each packet, or the end.
+      // One answer to each packet, or the end of the connection.
       const std::optional<v1::LocalAnswer> answer = client->Read();
       if (answer.has_value()) {
         ++answers[answer->what_case()];
@@ -93,7 +93,7 @@ TEST_F(LocalPackets, AtRandomHurtNobody) {
         for (uint64_t id = 0; id < kIds; ++id) {
           const auto found = session.memory->Find(id, 0, 64);
           if (!found.ok()) continue;
-          const char first = found->bytes.front();  // only what is sealed was taken
+          const char first = found->bytes.front();  // only sealed memory was accepted
           ASSERT_TRUE(first == 'm' || first == 'n');
         }
       }
@@ -103,7 +103,7 @@ TEST_F(LocalPackets, AtRandomHurtNobody) {
   EXPECT_EQ(OpenDescriptors(), before);
   EXPECT_EQ(sessions[0].memory->memories() + sessions[1].memory->memories(), 0u);
   EXPECT_EQ(watched.memory->Find(1, 0, 4)->bytes, "0123");
-  // All of it has been tried.
+  // Every case has occurred.
   EXPECT_GT(answers[v1::LocalAnswer::kWelcome], 100);
   EXPECT_GT(answers[v1::LocalAnswer::kHeld], 100);
   EXPECT_GT(answers[v1::LocalAnswer::kReleased], 100);

@@ -1,4 +1,4 @@
-// The local socket and its clients, with real memfds.
+// Tests the local socket and its clients, with real memfds.
 #include "daemon/local/local_socket.h"
 
 #include <gmock/gmock.h>
@@ -24,7 +24,7 @@ void ExpectRefusedAndClosed(LocalClient& client, const char* why) {
   EXPECT_FALSE(client.Read().has_value()) << why;
 }
 
-// No descriptor can be opened in this process while it lives.
+// While it lives, no descriptor can be opened in this process.
 class NoDescriptors {
  public:
   NoDescriptors() {
@@ -131,7 +131,7 @@ TEST_F(LocalSocketTest, WithoutTheRightTokenThereIsNoWayIn) {
   twice.Send(HelloMessage(session.token));
   ExpectRefusedAndClosed(twice, "a second time");
   EXPECT_EQ(session.memory->memories(), 0u);
-  // All that was sent at once after a wrong token does not hide why.
+  // Packets sent directly after a wrong token do not hide the reason.
   LocalClient eager(path());
   eager.Send(HelloMessage("wrong"));
   for (int i = 0; i < 5; ++i) eager.Send(MemoryMessage(1, 4), {fd.get()});
@@ -165,7 +165,7 @@ TEST_F(LocalSocketTest, MalformedPacketsEndTheConnection) {
       EXPECT_EQ(session.memory->memories(), 0u);
     }
   }
-  // A packet of no bytes is like the end.
+  // An empty packet counts as the end of the connection.
   LocalClient empty = Joined(session);
   EXPECT_TRUE(empty.SendBytes("", {fd.get()}));
   EXPECT_FALSE(empty.Read().has_value());
@@ -176,7 +176,7 @@ TEST_F(LocalSocketTest, HelloIsDueInTime) {
   Start({.hello_limit_ns = 2 * sync::kSecond});
   const Tokens::Registered session = Register(1), other = Register(2);
   LocalClient joined = Joined(session), late(path()), silent(path());
-  // Accepted by now: only after that does their time begin.
+  // They have been accepted by now: only then does their time begin.
   joined.RoundTrips();
   clock_.Advance(2 * sync::kSecond - 1);
   joined.RoundTrips();
@@ -223,7 +223,7 @@ TEST_F(LocalSocketTest, TheConnectionsEndLetsItsMemoryGo) {
   watcher.RoundTrips();
   EXPECT_EQ(session.memory->memories(), 0u);
   EXPECT_EQ(other.memory->memories(), 1u);
-  // The session can come again.
+  // The session can connect again.
   LocalClient again = Joined(session);
   EXPECT_TRUE(again.Call(MemoryMessage(1, 4), {fd.get()}).has_held());
 }
@@ -281,7 +281,7 @@ TEST_F(LocalSocketTest, WhoDoesNotReadHoldsUpNobodyElse) {
   const Tokens::Registered session = Register(1), other = Register(2);
   LocalClient deaf = Joined(session), bystander = Joined(other);
   uint64_t sent = 0;
-  // Until the server has stopped reading, which it has once it still has after round trips.
+  // Until the server has stopped reading, which is certain if that is still so after round trips.
   for (int full = 0; full < 3;) {
     if (deaf.Send(ReleaseMessage(sent))) {
       ++sent;
@@ -344,7 +344,7 @@ TEST_F(LocalSocketTest, IsWhereNobodyListens) {
   const Tokens::Registered session = Register(1);
   Joined(session).RoundTrips();
 
-  // What a daemon left that did not end well is taken away; what is no socket is not.
+  // The socket left by a daemon that crashed is removed; a file that is not a socket is not.
   socket_.reset();
   const Descriptor left(socket(AF_UNIX, SOCK_SEQPACKET, 0));
   sockaddr_un name = {};

@@ -1,4 +1,4 @@
-// A system that has no random bytes for a token.
+// Tests a system that has no random bytes for a token.
 #include <gmock/gmock.h>
 
 #include <cerrno>

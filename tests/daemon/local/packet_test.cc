@@ -1,4 +1,4 @@
-// One packet at a time: what is taken of it, and what is said of one that is none.
+// Tests single packets: what is read from them, and the errors for invalid ones.
 #include "daemon/local/packet.h"
 
 #include <fcntl.h>
@@ -27,7 +27,7 @@ class PacketTest : public ::testing::Test {
     close(ends_[0]);
     if (ends_[1] >= 0) close(ends_[1]);
   }
-  // With so many descriptors.
+  // Sends a packet with that many descriptors.
   void Send(const std::string& bytes, size_t descriptors = 0) {
     std::string sent = bytes;
     iovec part = {sent.data(), sent.size()};

@@ -39,7 +39,7 @@ class LocalSocketTest : public ::testing::Test {
 
   Tokens::Registered Register(SessionId session) { return *socket_->tokens()->Register(session); }
 
-  // A connection that has said Hello.
+  // Returns a connection that has sent Hello.
   LocalClient Joined(const Tokens::Registered& session) {
     LocalClient client(path());
     EXPECT_TRUE(client.Hello(session.token).has_welcome());

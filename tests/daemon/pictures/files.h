@@ -1,4 +1,4 @@
-// Pictures as files.
+// Image files for tests.
 #pragma once
 
 #include <png.h>
@@ -10,7 +10,7 @@
 
 namespace voxeld::pictures {
 
-// Of 0x00RRGGBB, or with `alpha` 0xAARRGGBB, row by row.
+// Pixels are 0x00RRGGBB, or with `alpha` 0xAARRGGBB, row by row.
 inline std::string PngOf(uint32_t width, uint32_t height, const std::vector<uint32_t>& pixels,
                          bool alpha = false) {
   std::vector<uint8_t> bytes;
@@ -32,7 +32,7 @@ inline std::string PngOf(uint32_t width, uint32_t height, const std::vector<uint
   return file;
 }
 
-// Grey, 16 bits a pixel, of a file that does not say what its values mean.
+// Grey, 16 bits a pixel; the file does not say what its values mean.
 inline std::string WideGreyPngOf(uint32_t width, uint32_t height,
                                  const std::vector<uint16_t>& grey) {
   png_image image = {};

@@ -38,7 +38,7 @@ TEST(Picture, APngIsReadAsItIs) {
   EXPECT_EQ(file->size().width, 3u);
   EXPECT_EQ(file->size().height, 2u);
   EXPECT_THAT(*file->Read(), ElementsAreArray(pixels));
-  EXPECT_THAT(*file->Read(), ElementsAreArray(pixels));  // any number of times
+  EXPECT_THAT(*file->Read(), ElementsAreArray(pixels));  // can be read any number of times
 }
 
 TEST(Picture, WhatIsNotOpaqueLiesOverBlack) {
@@ -84,7 +84,7 @@ TEST(Picture, OneRowOrColumnIsAPicture) {
   }
 }
 
-// Of what a file's head alone needed, and of what all of it did, well or not.
+// Neither for reading a file's head alone, nor for reading all of it, successfully or not.
 TEST(Picture, NothingOfALibraryIsLeft) {
   const std::vector<uint32_t> pixels(64 * 64, 0x80FF20);
   const std::string png = PngOf(64, 64, pixels), jpeg = JpegOf(64, 64, pixels);
@@ -115,7 +115,8 @@ TEST(Picture, WhatIsNoneIsRefused) {
   EXPECT_FALSE(PictureFile::Open("\xFF\xD8\xFF").ok());
 }
 
-// Wherever it ends, and whichever byte is another: an error or a picture of that size, and no more.
+// Wherever the file is truncated, and whichever byte is changed: the result is an error or a
+// picture of that size.
 TEST(Picture, BrokenFilesAreRefused) {
   std::vector<uint32_t> pixels(64);
   for (size_t i = 0; i < pixels.size(); ++i)

@@ -1,4 +1,4 @@
-// Sliding windows, the pool of buffers, and the loop.
+// Tests sliding windows, the pool of buffers, and the loop.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -24,7 +24,7 @@ SnapshotPtr SnapshotOf(uint64_t number) {
 
 class Locked : public ::testing::Test {
  protected:
-  // Members whose sweeps begin so long after the clock's whole periods.
+  // Adds members whose sweeps begin that long after the clock's whole periods.
   void Join(const std::vector<sync::TimeNs>& phases) {
     clock_.AdvanceTo(100 * kPeriod);
     for (size_t m = 0; m < phases.size(); ++m) {
@@ -34,7 +34,7 @@ class Locked : public ::testing::Test {
     }
     members_ = phases.size();
   }
-  // A round that all hold; its number.
+  // Makes all hold a round. Returns its number.
   uint64_t Hold(uint64_t snapshot) {
     genlock_.Want(0, SnapshotOf(snapshot));
     const auto round = genlock_.ToDraw(0);
@@ -76,10 +76,10 @@ TEST_F(Locked, AllAreOrderedOnceAllHold) {
   EXPECT_EQ(genlock_.NextCommand(0).what, What::kNothing) << "the other does not hold it yet";
   genlock_.Held(1, 1);
   const std::vector<Genlock::Command> orders = Orders();
-  // Each at a sweep of its own, which begins with the other's.
+  // Each order is for a sweep of its own, which begins with the other's.
   EXPECT_EQ(orders[0].at % kPeriod, 0);
   EXPECT_EQ(orders[1].at - orders[0].at, 3 * sync::kMillisecond);
-  // Two sweeps ahead, and a quarter for the order's way.
+  // Two sweeps ahead, and a quarter for the time that the order takes to arrive.
   EXPECT_EQ(orders[0].ahead, 2u);
   EXPECT_EQ(orders[0].at, 102 * kPeriod);
   for (size_t m = 0; m < 2; ++m) genlock_.Ordered(m, 1, orders[m].at, true);
@@ -101,7 +101,7 @@ TEST_F(Locked, AnOrderThatOneHasNotTakenInTimeIsPutOffForAll) {
   const std::vector<Genlock::Command> first = Orders();
   genlock_.Ordered(0, volume, first[0].at, true);
   const sync::TimeNs deadline = genlock_.Step();
-  // Between the last moment at which a device takes it and the first at which one shows it.
+  // Between the last moment at which a device accepts it and the first at which one shows it.
   EXPECT_GT(deadline, first[1].at - kPeriod);
   EXPECT_LT(deadline, first[0].at);
   clock_.AdvanceTo(deadline - 1);
@@ -114,11 +114,11 @@ TEST_F(Locked, AnOrderThatOneHasNotTakenInTimeIsPutOffForAll) {
   for (size_t m = 0; m < 2; ++m) {
     EXPECT_GE(second[m].at, first[m].at + kPeriod);
     EXPECT_EQ((second[m].at - first[m].at) % kPeriod, 0);
-    // A device that has the new order has it before the old one's sweep, and takes it.
+    // A device that has the new order gets it before the sweep of the old one, and accepts it.
     EXPECT_GT(second[m].at - static_cast<sync::TimeNs>(second[m].ahead - 1) * kPeriod,
               clock_.Now());
   }
-  // The late answer is to the first order: it counts for nothing.
+  // The late answer is to the first order: it is ignored.
   genlock_.Ordered(1, volume, first[1].at, true);
   genlock_.Ordered(0, volume, second[0].at, true);
   EXPECT_NE(genlock_.Step(), sync::kNever);
@@ -152,7 +152,7 @@ TEST_F(Locked, WhatOneCannotHaveAllDropAndDrawAgain) {
   }
   EXPECT_EQ(genlock_.figures().dropped, 1u);
   EXPECT_EQ(genlock_.figures().volumes, 0u);
-  // After a pause, though nobody has asked again.
+  // After a pause, even if no further request was made.
   EXPECT_FALSE(genlock_.ToDraw(0).has_value());
   const sync::TimeNs again = genlock_.Step();
   ASSERT_GT(again, clock_.Now());
@@ -173,7 +173,7 @@ TEST_F(Locked, WhoShowsNothingHoldsNobodyUp) {
   EXPECT_FALSE(genlock_.ToDraw(1).has_value());
   genlock_.Held(0, 1);
   EXPECT_EQ(genlock_.NextCommand(0).what, What::kShow);
-  // It comes back: with the next round, though the first is still to be shown.
+  // It returns: with the next round, even if the first has not been shown yet.
   genlock_.SetPresent(1, true);
   genlock_.SetSweeps(1, 100 * kPeriod, kPeriod);
   EXPECT_FALSE(genlock_.ToDraw(1).has_value());
@@ -181,7 +181,7 @@ TEST_F(Locked, WhoShowsNothingHoldsNobodyUp) {
   genlock_.Shown(0, 1, 103 * kPeriod);
   ASSERT_TRUE(genlock_.ToDraw(1).has_value());
   EXPECT_EQ(genlock_.ToDraw(1)->volume, 2u);
-  // It goes in the middle of a round: the other's goes on.
+  // It leaves in the middle of a round: the other's continues.
   genlock_.Held(0, 2);
   EXPECT_EQ(genlock_.NextCommand(0).what, What::kNothing);
   genlock_.SetPresent(1, false);
@@ -215,7 +215,7 @@ TEST_F(Locked, WhatIsShownApartIsCounted) {
   genlock_.Shown(1, volume, orders[1].at + kPeriod);
   EXPECT_EQ(genlock_.figures().slips, 1u);
   EXPECT_EQ(genlock_.figures().volumes, 0u);
-  // Not by one of them at all.
+  // Not accepted by one of them at all.
   volume = Hold(2);
   orders = Orders();
   for (size_t m = 0; m < 2; ++m) genlock_.Ordered(m, volume, orders[m].at, true);

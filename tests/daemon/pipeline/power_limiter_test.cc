@@ -28,7 +28,7 @@ display::SliceFrame FrameOf(const display::FrameLayout& layout) {
   return frame;
 }
 
-// Against a plain sum of all bytes.
+// Compared with a plain sum of all bytes.
 TEST(LightMeter, AddsUpWhatChanged) {
   const display::FrameLayout layout{.slices = 5, .width = 4, .height = 3, .sub_frames = 2};
   display::SliceFrame frame = FrameOf(layout);
@@ -46,7 +46,7 @@ TEST(LightMeter, AddsUpWhatChanged) {
     const double want = sum / 255 / static_cast<double>(frame.bytes.size());
     EXPECT_NEAR(meter.Measure(frame), want, 0.002);  // sub-frames are averaged in whole levels
   }
-  // What has not changed by its number is not looked at.
+  // A picture whose number has not changed is not measured again.
   const double before = meter.Measure(frame);
   frame.bytes.assign(frame.bytes.size(), std::byte{255});
   EXPECT_EQ(meter.Measure(frame), before);
@@ -62,7 +62,8 @@ TEST(PowerLimiter, WithoutALimitAllIsAdmitted) {
   EXPECT_EQ(limiter.next(), sync::kNever);
 }
 
-// Nothing above the limit is ever admitted, whatever dither makes of the steps; and it does not take long.
+// Nothing above the limit is ever admitted, whatever dither does to the steps, and the limiter does
+// not take long.
 TEST(PowerLimiter, NothingAboveTheLimitIsAdmitted) {
   std::mt19937 random(2);
   PowerLimiter limiter(100);
@@ -101,14 +102,14 @@ TEST(PowerLimiter, LightComesBackAfterASecondAndNotAtTheLimit) {
   EXPECT_TRUE(limiter.Rise(100 + sync::kSecond));
   EXPECT_EQ(limiter.steps(), 57);  // 32 · 0.9 · 50 / 25
   EXPECT_EQ(limiter.next(), sync::kNever);
-  // Brighter within the second: it does not rise.
+  // Brighter within the second: the brightness does not rise.
   EXPECT_TRUE(limiter.Admit(0.3, 0));
   EXPECT_NE(limiter.next(), sync::kNever);
   EXPECT_TRUE(limiter.Admit(0.46, 0));
   EXPECT_EQ(limiter.next(), sync::kNever);
 }
 
-// A limit below one step of the scene's light: dark, and light again when the scene allows a step.
+// A limit below one step of the scene's light: dark, and lit again when the scene allows a step.
 TEST(PowerLimiter, MayComeToNothing) {
   PowerLimiter limiter(1000);
   limiter.SetLimit(1);

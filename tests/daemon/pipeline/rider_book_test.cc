@@ -1,4 +1,4 @@
-// RiderBook against a flat list of riders that is gone through from end to end at every event.
+// Compares RiderBook with a flat list of riders that is searched from end to end at every event.
 #include "daemon/pipeline/rider_book.h"
 
 #include <gmock/gmock.h>
@@ -13,7 +13,7 @@ namespace {
 
 using Kind = CommitOutcome::Kind;
 
-// What was told: (frame id, kind, volume or superseding frame, reason).
+// A reported outcome: (frame id, kind, volume or superseding frame, reason).
 using Told = std::tuple<uint64_t, Kind, uint64_t, std::string>;
 
 Told Flatten(const Rider& rider, const CommitOutcome& outcome) {
@@ -96,7 +96,7 @@ class FlatModel {
     e.place = Place::kDone;
     told[e.rider.frame_id] = {e.rider.frame_id, kind, volume, reason};
   }
-  // Of each session in one place, all but the newest; each by the next one.
+  // Supersedes all but the newest commit of each session in one place; each by the next one.
   void Supersede(Place place, uint64_t volume) {
     for (size_t i = 0; i < all_.size(); ++i) {
       if (all_[i].place != place || all_[i].volume != volume) continue;
@@ -125,7 +125,7 @@ TEST(RiderBook, AgreesWithAFlatListOverRandomEvents) {
     });
     FlatModel model;
     uint64_t frame = 0, volume = 0, newest = 0;
-    std::vector<uint64_t> open;  // submitted, without outcome, ascending
+    std::vector<uint64_t> open;  // submitted and without an outcome, in ascending order
     bool drawing = false;
     for (int step = 0; step < 300; ++step) {
       switch (random() % 8) {
@@ -265,7 +265,7 @@ TEST(RiderBook, RidersOfAVolumeThatIsDrawnAgainRideAgainBeforeLaterOnes) {
   book.Submit(1);
   book.Board(RiderOf(1, 2, 2));
   book.Reboard(1);
-  book.Reboard(7);  // that there is not
+  book.Reboard(7);  // does not exist
   EXPECT_TRUE(told.empty());
   EXPECT_EQ(book.pending(), 2u);
   book.Draw(2);

@@ -1,4 +1,4 @@
-// Test patterns, drawn by the CPU engine and looked at voxel by voxel.
+// Tests test patterns, drawn by the CPU engine and checked voxel by voxel.
 #include "daemon/pipeline/test_pattern.h"
 
 #include <gmock/gmock.h>
@@ -74,7 +74,7 @@ class Drawn {
     return colors;
   }
 
-  // Of a lattice's lights, by pixel.
+  // Returns the light of a lattice's lights, by pixel.
   std::vector<uint32_t> Lights() const {
     std::vector<uint32_t> lights;
     for (size_t i = 0; i < pictures_.size(); i += 3) {
@@ -89,7 +89,8 @@ class Drawn {
   std::vector<std::byte> pictures_;
 };
 
-// Lights on a ring that stands in the grid, none in its middle or at its corners; two slices.
+// Lights on a ring that stands in the grid, without lights in its middle or at its corners; two
+// slices.
 display::Geometry Ring() {
   display::Lattice lattice;
   lattice.width_px = 20;
@@ -157,9 +158,10 @@ TEST(TestPattern, ALatticesCornersAreLights) {
   const Drawn drawn(TestPattern::kCorners, Ring());
   const std::vector<uint32_t> lights = drawn.Lights();
   ASSERT_EQ(lights.size(), 40u);
-  EXPECT_EQ(lights[7], 0u);  // there is none
+  EXPECT_EQ(lights[7], 0u);  // no light is there
   std::set<uint32_t> colors(lights.begin(), lights.end());
-  // The ring is flat: a corner in front and one behind have one light, and the greater colour.
+  // The ring is flat: a corner in front and the one behind it share a light, which has the greater
+  // colour.
   for (const uint32_t color : {0xFFFFFFu, 0xFFFF00u, 0x00FFFFu, 0xFF8000u}) {
     EXPECT_TRUE(colors.contains(color)) << std::hex << color;
   }
@@ -212,7 +214,8 @@ TEST(TestPattern, DensityIsARampInTheWholeVolume) {
   }
 }
 
-// A slice of its own resolution: the voxels are the digits' pixels, three wide and five high.
+// A slice with a resolution of its own: the voxels are the digits' pixels, three wide and five
+// high.
 TEST(TestPattern, SlicesShowTheirNumbers) {
   const Drawn drawn(TestPattern::kSlices);
   const auto picture = [&](int x0, int z) {
@@ -235,12 +238,12 @@ TEST(TestPattern, SlicesOfALatticeBeginWithWhite) {
   const std::vector<uint32_t> lights = Drawn(TestPattern::kSlices, Ring()).Lights();
   EXPECT_EQ(lights[0], 0xFFFFFFu);
   EXPECT_EQ(lights[1], 0xFF0000u);
-  EXPECT_EQ(lights[7], 0u);  // there is no light
+  EXPECT_EQ(lights[7], 0u);  // no light is there
   EXPECT_EQ(lights[20], 0xFFFFFFu);
   EXPECT_EQ(lights[21], 0x00FF00u);
 }
 
-// Every pixel of a number lights in its own slice, in every geometry.
+// Every pixel of a number is lit in its own slice, in every geometry.
 TEST(TestPattern, NumbersStandInTheirSlices) {
   display::Rotor rotor;
   rotor.slices_per_turn = 40;

@@ -1,4 +1,4 @@
-// Views by hand.
+// Tests views with values computed by hand.
 #include "daemon/pipeline/view.h"
 
 #include <gmock/gmock.h>
@@ -11,7 +11,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// 100 × 50 × 20 cells of 1 × 2 × 4 mm: 100 × 100 × 80 mm, somewhere off the middle.
+// 100 × 50 × 20 cells of 1 × 2 × 4 mm: 100 × 100 × 80 mm, not centred on the origin.
 const display::VoxelGrid kGrid = {100, 50, 20, {1, 2, 4}, {-10, -20, -30}};
 
 gpu::Point3d At(const ViewOptions& view, const display::VoxelGrid& grid, double x, double y,
@@ -32,7 +32,7 @@ TEST(View, FitByDefaultPutsOneOnTheLongestAxis) {
   ExpectNear(At(fit, kGrid, 0, 0, 0), 50, 25, 10);     // the middle
   ExpectNear(At(fit, kGrid, 1, 1, 0.8), 100, 50, 20);  // 50 mm a unit on every axis
   ExpectNear(At(fit, kGrid, -1, -1, -0.8), 0, 0, 0);
-  // The longest in millimetres, not in voxels.
+  // The longest axis in millimetres, not in voxels.
   const display::VoxelGrid tall = {200, 10, 30, {0.5, 10, 20}, {0, 0, 0}};
   ExpectNear(At(fit, tall, 0, 0, 1), 100, 5, 30);
   ExpectNear(At(fit, tall, 1, 0, 0), 100 + 300 / 0.5, 5, 15);

@@ -1,4 +1,4 @@
-// A system that has no thread to give.
+// A system that cannot create threads.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 
 namespace voxeld::daemon::play {
 
-// While it is there, threads that this process begins want a stack that no machine has.
+// While it exists, threads that this process starts request a stack larger than any machine has.
 class NoThreads {
  public:
   NoThreads() {

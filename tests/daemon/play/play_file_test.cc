@@ -93,7 +93,7 @@ class LeftFolders : public ::testing::Test {
     before_.has_value() ? setenv("TMPDIR", before_->c_str(), 1) : unsetenv("TMPDIR");
   }
   std::string Path(const std::string& name) const { return temporary_->path() + "/" + name; }
-  // A folder as a daemon has it, with a file.
+  // A folder as the daemon makes it, with a file.
   std::string Folder(const std::string& name, mode_t mode = 0700) const {
     EXPECT_EQ(mkdir(Path(name).c_str(), 0700), 0);
     std::ofstream(Path(name) + "/a.obj") << "v 0 0 0\n";
@@ -143,7 +143,7 @@ TEST_F(LeftFolders, AreNothingElse) {
   ASSERT_EQ(symlink((elsewhere + "/a.obj").c_str(), (left + "/link").c_str()), 0);
   std::ofstream(Path("voxeld-play-file")) << "kept";
   std::string of_another;
-  if (geteuid() == 0) {  // nobody else can give folders away
+  if (geteuid() == 0) {  // only root can change the owner of folders
     of_another = Folder("voxeld-play-other");
     ASSERT_EQ(chown(of_another.c_str(), 1, 1), 0);
   }

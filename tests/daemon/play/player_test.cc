@@ -1,4 +1,4 @@
-// The player with scripts in voxelctl's place.
+// Tests the player with scripts in place of voxelctl.
 #include "daemon/play/player.h"
 
 #include <fcntl.h>
@@ -36,7 +36,7 @@ class PlayerTest : public ::testing::Test {
     return absl::StrCat(folder_->path(), "/", name);
   }
 
-  // `script` in place of voxelctl.
+  // Starts a player that runs `script` in place of voxelctl.
   void Start(const std::string& script, PlayerOptions options = {.grace_ns = 60 * sync::kSecond}) {
     const std::string program = Path("voxelctl");
     std::ofstream(program) << "#!/bin/sh\nHERE=" << folder_->path() << "\n" << script << "\n";
@@ -75,10 +75,10 @@ class PlayerTest : public ::testing::Test {
     AwaitState([](const Playing& state) { return state == Playing(); });
   }
 
-  // A pipe in the file system, by which a script says how far it is.
+  // Makes a named pipe, by which a script reports its progress.
   void MakeFifo(const std::string& name) { ASSERT_EQ(mkfifo(Path(name).c_str(), 0600), 0); }
   std::string ReadFifo(const std::string& name) {
-    std::ifstream file(Path(name));  // waits until somebody writes, reads until it closes
+    std::ifstream file(Path(name));  // waits for a writer, and reads until it closes
     return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
   }
 
@@ -96,7 +96,7 @@ class PlayerTest : public ::testing::Test {
   std::unique_ptr<Player> player_;
 };
 
-// A script that says its number, and stays until it is told to go.
+// A script that reports its process id, and runs until it is terminated.
 constexpr char kStays[] = "echo $$ >$HERE/started; exec tail -f /dev/null";
 
 TEST_F(PlayerTest, RunsVoxelctlWithTheFileAndNothingOfTheDaemons) {
@@ -146,7 +146,7 @@ TEST_F(PlayerTest, StopsAndIsReplaced) {
   AwaitNothing();
   EXPECT_TRUE(HasEnded(two, 0));
   EXPECT_NE(access(second.c_str(), F_OK), 0);
-  player_->Stop();  // of nothing
+  player_->Stop();  // nothing is played
   const std::string third = Play("three.stl");
   const Descriptor three = Watch(std::stoi(ReadFifo("started")));
   player_.reset();
@@ -177,7 +177,7 @@ TEST_F(PlayerTest, TellsWhatWasWrongWithWhoeverSaysNothing) {
   chmod(Path("voxelctl").c_str(), 0600);
   Play("c.obj");
   EXPECT_THAT(AwaitFailed("c.obj").why,
-              HasSubstr("ended with"));  // setpriv's; it says so on its own
+              HasSubstr("ended with"));  // setpriv's; it prints its own message
 }
 
 TEST_F(PlayerTest, KeepsLittleOfWhoeverSaysMuch) {
@@ -191,7 +191,7 @@ TEST_F(PlayerTest, KeepsLittleOfWhoeverSaysMuch) {
   EXPECT_THAT(why, ::testing::StartsWith("yyyy"));
 }
 
-// It is asked to go, and then it has to; whoever it has started, too.
+// It is asked to exit, and then killed, together with the processes that it has started.
 TEST_F(PlayerTest, EndsWhoDoesNotListenWithItsChildren) {
   Start("trap '' TERM; tail -f /dev/null & echo $! $$ >$HERE/started; wait; wait; wait",
         {.grace_ns = 50 * sync::kMillisecond});

@@ -12,7 +12,7 @@
 namespace voxeld::daemon::play {
 namespace {
 
-// What one thread waits for until another says so.
+// An event for which a thread waits until another one reports it.
 class Event {
  public:
   void Set() {
@@ -51,7 +51,8 @@ TEST(Worker, DoesInOrderOnOneThreadOfItsOwn) {
   EXPECT_NE(threads[0], std::this_thread::get_id());
 }
 
-// What is under way when it ends, a disk that does not answer say, is waited for; what waits behind it is let go before that.
+// When the worker is destroyed, a task under way, such as one on a disk that does not answer, is
+// waited for; waiting tasks are discarded before that.
 TEST(Worker, DropsWhatHasNotBegunAtItsEnd) {
   Event began, dropped, ended;
   bool finished = false, done = false;

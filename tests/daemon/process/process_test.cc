@@ -1,4 +1,4 @@
-// What a daemon says that cannot start, of what the system refuses.
+// Tests the message of a daemon that cannot start because the system refuses something.
 #include "daemon/process/process.h"
 
 #include <gmock/gmock.h>

@@ -32,7 +32,7 @@ TEST(ProcessWatch, HasTheFiguresOfAll) {
   EXPECT_EQ(watch.figures().clock_steps, 0u);
 }
 
-// An allocator whose calls take the time, and whose count has the value, that a test sets.
+// An allocator whose calls take a time, and whose count has a value, that a test sets.
 class ScriptedAllocator : public ::testing::Test {
  protected:
   ScriptedAllocator() {
@@ -57,7 +57,7 @@ class ScriptedAllocator : public ::testing::Test {
   static inline sync::TimeNs gives_back_for_ = 0, counts_for_ = 0;
   static inline int given_back_ = 0;
   static inline uint64_t counted_ = 0;
-  static inline std::optional<uint64_t> bytes_;  // none: the number of counts
+  static inline std::optional<uint64_t> bytes_;  // nullopt: the number of counts
   Logger log_{Logger::Level::kOff, Logger::Format::kText};
   ProcessWatch watch_{clock_,
                       log_,
@@ -160,7 +160,7 @@ TEST(ProcessWatch, TellsWhatIsAllocated) {
 }
 
 TEST(Process, WhatIsFreeBetweenWhatIsHeldIsGivenBack) {
-  // Every other of many places of four pages is let go.
+  // Every other place, of many of four pages each, is freed.
   constexpr size_t kPlace = 16 << 10, kPlaces = 4096;
   std::vector<std::unique_ptr<char[]>> places(kPlaces);
   for (std::unique_ptr<char[]>& place : places) {
@@ -176,7 +176,7 @@ TEST(Process, WhatIsFreeBetweenWhatIsHeldIsGivenBack) {
   };
   const size_t before = resident();
   GiveBackFreeMemory();
-  // Of each the pages that are its own alone.
+  // For each, the pages that it shares with no other.
   EXPECT_LT(resident(), before - kPlaces / 2 * kPlace / 2);
 }
 #endif

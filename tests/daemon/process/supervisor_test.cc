@@ -21,7 +21,7 @@ Supervisor::Environment Of(std::map<std::string, std::string> variables) {
   };
 }
 
-// What a supervisor listens with.
+// The socket on which a supervisor listens.
 class Ear {
  public:
   explicit Ear(const std::string& path) : socket_(socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {

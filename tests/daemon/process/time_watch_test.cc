@@ -16,7 +16,7 @@ using ::testing::HasSubstr;
 
 class TimeWatchTest : public ::testing::Test {
  protected:
-  // A turn after that long, in which the wall clock goes as far and `step` farther.
+  // Makes a turn after that long, in which the wall clock advances by that and by `step`.
   void Turn(sync::TimeNs after, sync::TimeNs step = 0) {
     time_.running += after;
     time_.wall += after + step;

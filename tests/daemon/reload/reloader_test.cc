@@ -26,7 +26,7 @@ using ::testing::IsEmpty;
 constexpr char kDisplay[] =
     "[[display]]\nname = \"cube\"\ndriver = \"simulated\"\nsize = \"8x8x8\"\npower_full = 40\n";
 
-// A core with the file's displays, which run.
+// A core with the configured displays, which run.
 class ReloaderTest : public ::testing::Test {
  protected:
   void SetUp() override { std::filesystem::create_directory(folder_); }
@@ -87,7 +87,7 @@ class ReloaderTest : public ::testing::Test {
   }
   std::string AnonymousScopes() { return access_->Identify({})->scopes.ToString(); }
 
-  bool names_file_ = true;  // on the command line; else it is found by itself
+  bool names_file_ = true;  // named on the command line; otherwise it is found by itself
   const std::string folder_ = absl::StrCat(::testing::TempDir(), "/voxeld-reload-", getpid());
   const std::string file_ = folder_ + "/voxeld.toml", grants_ = folder_ + "/grants.toml";
   const Environment nothing_ = [](const char*) { return std::nullopt; };
@@ -117,7 +117,7 @@ TEST_F(ReloaderTest, WhatARunningDaemonTakesIsInForceAtOnce) {
   EXPECT_THAT(lines_.str(), HasSubstr("finer than before"));
   EXPECT_EQ(reloader_->trouble(), "");
 
-  // And back: what the file does not say is the default.
+  // And back: options that the file does not set have their defaults.
   const auto back = Reload(kDisplay);
   ASSERT_TRUE(back.ok()) << back.status();
   EXPECT_EQ(back->at_once, changes->at_once);

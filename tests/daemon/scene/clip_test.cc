@@ -8,7 +8,7 @@
 namespace voxeld::daemon {
 namespace clip_test {
 
-// Whether a point of the scene lies in all that the record has.
+// Returns whether a point of the scene is in all parts of the record.
 bool Has(const gpu::LayerRecord& record, const double (&p)[3]) {
   for (uint32_t i = 0; i < record.plane_count; ++i) {
     const gpu::ClipPlane& plane = record.planes[i];

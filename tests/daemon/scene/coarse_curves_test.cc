@@ -1,4 +1,4 @@
-// Curves that may be drawn coarser than stated are told, wherever their maps come from.
+// Curves that may be drawn coarser than stated are reported, whichever transform causes it.
 #include "daemon/scene/scene_store.h"
 
 #include <gmock/gmock.h>
@@ -23,7 +23,7 @@ using testing::Scale;
 using testing::SetLayer;
 using testing::Shift;
 using testing::StoreFixture;
-// So many spans, each of which takes 5 pieces, and 36 if it is 64 times as large.
+// Returns that many spans, each of which takes 5 pieces, or 36 if it is 64 times as large.
 GeometryPtr Waves(uint32_t count) {
   auto data = std::make_shared<GeometryData>();
   data->record.kind = gpu::PrimitiveKind::kCurves;
@@ -41,7 +41,7 @@ GeometryPtr Waves(uint32_t count) {
 
 TEST(CoarseCurves, WhatMayBeDrawnCoarserIsToldAndTaken) {
   StoreFixture f;
-  f.strict = true;  // it is no refusal
+  f.strict = true;  // it is not a refusal
   f.store.SetViews({{"coarse", Scale(1, 1, 1)}, {"fine", Scale(64, 64, 64)}});
   EXPECT_TRUE(f.Commit(Put("a", "few", Entity1(Waves(1000)))).issues.empty());
   const CommitResult result = f.Commit(Put("a", "many", Entity1(Waves(60'000))));
@@ -57,7 +57,7 @@ TEST(CoarseCurves, WhatMayBeDrawnCoarserIsToldAndTaken) {
   EXPECT_EQ(issue.sequence, f.last_sequence);
   EXPECT_THAT(issue.message, HasSubstr("straight pieces on display \"fine\" to be within 0.125 of "
                                        "a voxel; 1048576 are made, so it may be drawn coarser"));
-  // Smaller it is fine; larger it is not again.
+  // When it is smaller, it is fine; when it is larger, it is reported again.
   EXPECT_TRUE(f.Commit(Move("a", "many", Scale(0.1, 0.1, 0.1))).issues.empty());
   const CommitResult moved = f.Commit(Move("a", "many", Scale(1, 2, 1)));
   ASSERT_EQ(moved.issues.size(), 1u);
@@ -66,7 +66,7 @@ TEST(CoarseCurves, WhatMayBeDrawnCoarserIsToldAndTaken) {
   EXPECT_EQ(f.Get("a", "many")->data.transform.m[5], 2);
 }
 
-// One whose second differences are 6 units.
+// A patch whose second differences are 6 units.
 GeometryPtr Patches(uint32_t count, float bulge) {
   auto data = std::make_shared<GeometryData>();
   data->record.kind = gpu::PrimitiveKind::kPatches;

@@ -1,4 +1,4 @@
-// Deltas between any two snapshots, checked by an engine's model of the scene.
+// Tests deltas between any two snapshots, checked by an engine's model of the scene.
 #include "daemon/scene/engine_delta.h"
 
 #include <gmock/gmock.h>
@@ -28,7 +28,7 @@ using testing::Shift;
 using testing::StoreFixture;
 using testing::Undefine;
 
-// An EngineScene and the engine at its other end.
+// An EngineScene and the engine that receives its deltas.
 struct Pair {
   EngineScene scene;
   SceneModel model;
@@ -53,7 +53,7 @@ TEST(EngineDelta, PutsWhatIsNewAndDropsWhatIsGone) {
   StoreFixture f;
   Pair pair;
   ASSERT_TRUE(pair.Bring(f.store.snapshot()).ok());
-  EXPECT_EQ(pair.size, gpu::DeltaWriter::kSizeOfReset);  // an engine nobody knows
+  EXPECT_EQ(pair.size, gpu::DeltaWriter::kSizeOfReset);  // an engine in an unknown state
   ASSERT_TRUE(pair.Bring(f.store.snapshot()).ok());
   EXPECT_EQ(pair.size, 0u);
 
@@ -64,7 +64,7 @@ TEST(EngineDelta, PutsWhatIsNewAndDropsWhatIsGone) {
 
   f.Commit(Move("a", "x", Shift(4)));
   ASSERT_TRUE(pair.Bring(f.store.snapshot()).ok());
-  EXPECT_EQ(pair.model.puts(), 1);  // the geometry is there already
+  EXPECT_EQ(pair.model.puts(), 1);  // the geometry exists already
   EXPECT_EQ(pair.model.drops(), 0);
   EXPECT_EQ(pair.size, gpu::DeltaWriter::SizeOf(gpu::DrawableRecord()));
 
@@ -148,11 +148,11 @@ TEST(EngineDelta, AMaskIsTheLayerOfThatName) {
   EXPECT_EQ(layer().has_mask, 1u);
   EXPECT_EQ(layer().mask, f.GetLayer("b")->number);
   EXPECT_EQ(bring(testing::SetMask("a", "b")), 0);  // the same again
-  // One that is not there is no layer's number.
+  // A layer that does not exist has no number.
   EXPECT_EQ(bring(testing::SetMask("a", "c")), 1);
   EXPECT_EQ(layer().has_mask, 1u);
   EXPECT_EQ(layer().mask, 0u);
-  // When it comes, and when it is gone, the layer that it masks is told.
+  // When it is created, and when it is removed, the layer that it masks is updated.
   const SnapshotPtr without = f.store.snapshot();
   EXPECT_EQ(bring(Put("c", "z")), 4);  // layer, geometry, drawable; and a
   EXPECT_EQ(layer().mask, f.GetLayer("c")->number);
@@ -176,7 +176,7 @@ TEST(EngineDelta, AMaskIsOfTheSameOwner) {
 
 TEST(EngineDelta, InstancesShareGeometriesAndComposeFromTheOutside) {
   StoreFixture f;
-  gpu::Affine turn;  // a quarter about z
+  gpu::Affine turn;  // a quarter turn about z
   turn.m[0] = 0;
   turn.m[1] = -1;
   turn.m[4] = 1;
@@ -198,7 +198,7 @@ TEST(EngineDelta, InstancesShareGeometriesAndComposeFromTheOutside) {
   }
   EXPECT_EQ(found, 2);
 
-  // A changed definition changes every instance, nested ones too, and nothing else.
+  // A changed definition changes every instance, including nested ones, and nothing else.
   f.Commit(Define("pair", {{Dots(5), Shift(1)}}), Put("c", "z"));
   ASSERT_TRUE(pair.Bring(f.store.snapshot()).ok());
   EXPECT_EQ(pair.model.geometries().size(), 2u);  // one of the object's, one of z
@@ -272,7 +272,7 @@ TEST(EngineDelta, ArraysInBulkMemoryAreReferredTo) {
   EXPECT_EQ(seen, 3000u);
 }
 
-// Along random paths over random snapshots: what the engine holds is what a new engine would.
+// Along random paths over random snapshots, the engine holds what a new engine would hold.
 TEST(EngineDelta, AnyPathLeadsToTheSameScene) {
   for (uint32_t seed = 1; seed <= 30; ++seed) {
     std::mt19937 random(seed);
@@ -296,7 +296,7 @@ TEST(EngineDelta, AnyPathLeadsToTheSameScene) {
     }
     Pair walker;
     for (int step = 0; step < 120; ++step) {
-      // Mostly forwards by one, as in life; else anywhere.
+      // Mostly one step forward, as in production; otherwise to any snapshot.
       const size_t at = step < 41 ? step % snapshots.size() : random() % snapshots.size();
       const absl::Status status = walker.Bring(snapshots[at]);
       ASSERT_TRUE(status.ok()) << status << " seed " << seed << " step " << step;
@@ -331,7 +331,7 @@ TEST(EngineDelta, EntitiesAreDrawnWhereTheyAreChosenToBe) {
     }
     return all;
   };
-  // What is drawn in both ways is there twice.
+  // A geometry that is drawn in both ways exists twice.
   EXPECT_EQ(ways(), (std::multiset<gpu::DrawnBy>{gpu::DrawnBy::kEngine, gpu::DrawnBy::kCpu}));
   EXPECT_EQ(pair.model.geometries().size(), 2u);
   cpu = DrawnWhere::kEngine;

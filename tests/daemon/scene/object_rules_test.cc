@@ -1,4 +1,4 @@
-// Objects and their instances.
+// Tests objects and their instances.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -61,7 +61,7 @@ TEST(ObjectRules, ObjectsBelongToTheirOwner) {
   EXPECT_EQ(f.Commit(PutInstance("a", "x", "theirs")).issues[0].reason, Reason::kNotFound);
 }
 
-// A primitive of three geometries, as a text of three letters, each a step further along x.
+// A primitive of three geometries, like a text of three letters, each a step further along x.
 Content Letters(float x) {
   auto group = std::make_shared<GroupData>();
   const Content dot = Dots(x);
@@ -117,7 +117,7 @@ TEST(ObjectRules, DepthIsLimitedFromBothEnds) {
   ASSERT_EQ(above.issues.size(), 1u);
   EXPECT_EQ(above.issues[0].reason, Reason::kCycle);
   EXPECT_THAT(above.issues[0].message, HasSubstr("4 deep"));
-  // Deepening what lies below deepens what lies above.
+  // Deepening the lower objects deepens the upper ones.
   f.Commit(Define("0", {Part(1)}));
   EXPECT_EQ(f.Commit(Define("1", {Use("0")})).issues[0].reason, Reason::kCycle);
   EXPECT_EQ(Find(f, "1")->depth, 1u);
@@ -212,7 +212,7 @@ TEST(ObjectRules, AForgottenOwnersObjectsGoOnceNothingIsLeft) {
   StoreFixture f;
   f.Commit(Define("o", {Part(1)}), Define("p", {Use("o")}), PutInstance("a", "x", "p"));
   f.store.ForgetOwner(1);
-  EXPECT_NE(Find(f, "o"), nullptr);  // a layer is left that draws it
+  EXPECT_NE(Find(f, "o"), nullptr);  // a remaining layer draws it
   f.store.RemoveLayers([](const OwnedName&, const Layer&) { return true; }, false);
   f.store.ForgetOwner(1);
   EXPECT_EQ(f.store.snapshot()->objects.size(), 0u);

@@ -1,4 +1,4 @@
-// Commits that are applied in slices, while other owners' commits are applied.
+// Tests commits that are applied in slices, while other owners' commits are applied.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -34,7 +34,7 @@ using testing::StoreFixture;
 
 using Pending = std::unique_ptr<SceneStore::PendingCommit>;
 
-// A commit of the fixture's author that has begun.
+// Begins a commit of the fixture's author.
 template <typename... Ops>
 Pending Start(StoreFixture& f, Ops... ops) {
   std::vector<Operation> all = Sequence(f.last_sequence, std::move(ops)...);
@@ -42,7 +42,7 @@ Pending Start(StoreFixture& f, Ops... ops) {
   return f.store.Begin(f.me, std::move(all), f.now);
 }
 
-// All of the scene but numbers, in which another order of commits may differ.
+// Returns the whole scene without numbers, in which another order of commits may differ.
 std::string Everything(const Snapshot& snapshot) {
   std::string text;
   snapshot.layers.ForEach([&](const OwnedName& key, const LayerPtr& layer) {
@@ -101,7 +101,8 @@ TEST(PendingCommit, AFrameTakesEffectInSlicesToo) {
   while (!f.store.Continue(*pending, 1)) ++slices;
   EXPECT_EQ(
       slices,
-      8);  // four operations, two of which are replayed, the frame's end, and what finds that all is done
+      8);  // four operations, two of which are replayed, the frame's end, and the step that finds
+           // that everything is done
   const CommitResult result = f.store.Finish(std::move(pending));
   EXPECT_EQ(result.applied_operations, 4u);
   EXPECT_EQ(f.Scene(), "a: x y");
@@ -233,7 +234,7 @@ TEST(PendingCommit, ANewViewMustFitWhatItHasBroughtSoFar) {
   pending.reset();
   EXPECT_TRUE(f.store.CheckNewView({"disp", Scale(2, 1, 1)}).ok());
 
-  // What others have removed since the last slice does not count.
+  // Entities that others have removed since the last slice does not count.
   const Author other = MakeAuthor(2, 22);
   f.Commit(other, Put("b", "far", 60));
   pending = Start(f, Put("a", "near", 1));
@@ -243,8 +244,8 @@ TEST(PendingCommit, ANewViewMustFitWhatItHasBroughtSoFar) {
   EXPECT_TRUE(f.store.CheckNewView({"disp", Scale(2, 1, 1)}).ok());
 }
 
-// Several owners' random commits in random slices make the scene that the same commits make whole, in the order in which
-// they were finished.
+// Random commits of several owners in random slices result in the scene that the same commits,
+// applied whole, result in, in the order in which they were finished.
 TEST(PendingCommit, SlicesMakeWhatWholeCommitsMake) {
   uint64_t overlapping = 0;
   for (uint32_t seed = 1; seed <= 300; ++seed) {
@@ -252,7 +253,7 @@ TEST(PendingCommit, SlicesMakeWhatWholeCommitsMake) {
     struct Client {
       Author author;
       Pending pending;
-      std::vector<Operation> operations;  // of it, for the other store
+      std::vector<Operation> operations;  // its operations, for the other store
       uint64_t sequence = 0;
       bool strict = false;
     };
@@ -266,7 +267,7 @@ TEST(PendingCommit, SlicesMakeWhatWholeCommitsMake) {
         std::vector<Operation> operations;
         for (Operation& operation : testing::RandomOperations(random, 20)) {
           operation.sequence = ++client.sequence;
-          // Lifetimes count from the beginning; what they do to a commit under way is tested above.
+          // Lifetimes count from the beginning; their effect on a commit under way is tested above.
           if (auto* upsert = std::get_if<Upsert>(&operation.op)) upsert->entity.lifetime_ns = 0;
           operations.push_back(std::move(operation));
         }

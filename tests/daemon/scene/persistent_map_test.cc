@@ -1,4 +1,4 @@
-// PersistentMap against std::map.
+// Compares PersistentMap with std::map.
 #include "daemon/scene/persistent_map.h"
 
 #include <gmock/gmock.h>
@@ -66,7 +66,7 @@ TEST(PersistentMap, RandomPathsAgreeWithStdMap) {
     const int keys = seed % 2 == 0 ? 20 : 300;
     std::vector<std::pair<Map, Model>> versions = {{}};
     for (int step = 0; step < 60; ++step) {
-      // From any version there is, not only the newest.
+      // Starts from any version, not only from the newest.
       auto [map, model] = versions[random() % versions.size()];
       for (uint32_t n = random() % 30; n > 0; --n) {
         const std::string key = absl::StrCat("k", random() % keys);
@@ -105,7 +105,7 @@ TEST(PersistentMap, ADifferenceCanBeTakenUpAnywhere) {
       }
     }
     const std::vector<Change> whole = Diff(ToModel(a), ToModel(b));
-    // In pieces: each as many as chance says, the next from just beyond the last key.
+    // In pieces of random size, each starting just beyond the last key of the one before.
     std::vector<Change> pieces;
     std::string from;
     size_t left = 0;
@@ -163,7 +163,7 @@ TEST(PersistentMap, ACopyStaysAsItWas) {
   EXPECT_EQ(map.size(), 50u);
 }
 
-// Counts comparisons of values: equal subtrees must not be looked into.
+// Counts comparisons of values: equal subtrees must not be searched.
 struct Counted {
   int value = 0;
   static inline int comparisons = 0;
@@ -198,7 +198,7 @@ TEST(PersistentMap, VersionsMayBeUsedFromSeveralThreads) {
       copy.ForEach([&](const std::string&, int value) { sums[t] += value; });
     });
   }
-  base = Map();  // let go of at the same time
+  base = Map();  // released at the same time
   for (std::thread& thread : threads) thread.join();
   const int all = 1999 * 2000 / 2;
   for (int t = 0; t < 4; ++t) {

@@ -1,4 +1,4 @@
-// Random commits over few names, so that everything meets everything.
+// Random commits over few names, so that their operations often affect each other.
 #pragma once
 
 #include <random>
@@ -10,7 +10,7 @@
 
 namespace voxeld::daemon::testing {
 
-// Up to `most` operations; some will be refused.
+// Returns up to `most` operations; some will be refused.
 inline std::vector<Operation> RandomOperations(std::mt19937& random, uint32_t most) {
   const auto name = [&](const char* prefix, uint32_t count) {
     return absl::StrCat(prefix, random() % count);

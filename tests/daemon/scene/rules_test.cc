@@ -1,5 +1,5 @@
-// What a scene refuses on sight and by its rules: quotas that an operator set, what is beyond a limit or not finite, and that
-// of several faults the first is told.
+// Tests what a scene refuses by itself and by its rules: quotas set by an operator, values that are
+// beyond a limit or not finite, and that of several faults the first is reported.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -36,7 +36,7 @@ using testing::StoreFixture;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// The one issue of a commit of one operation.
+// Returns the one issue of a commit of one operation.
 Issue Refused(StoreFixture& f, const Author& author, Operation operation) {
   const std::string before = f.Scene();
   const CommitResult result = f.Commit(author, std::move(operation));
@@ -61,7 +61,7 @@ TEST(Rules, AnOperatorsQuotaIsTheOneThatIsNamed) {
             "its owner would have 3 entities (an instance counts as what it draws); what an "
             "operator has set for it is 2");
   EXPECT_EQ(f.Commit(few, Put("a", "2", 5)).refused_operations, 0u) << "in place of another";
-  // A greater one than the limit changes nothing.
+  // A quota that is greater than the limit changes nothing.
   Author many = f.me;
   many.max_entities = 100;
   EXPECT_EQ(f.Commit(many, Put("a", "3"), Put("a", "4"), Put("a", "5")).refused_operations, 0u);
@@ -73,7 +73,7 @@ TEST(Rules, AnOperatorsQuotaIsTheOneThatIsNamed) {
   issue = Refused(f, small, Put("a", "5", Entity1(Dots(0, 1, 100))));
   EXPECT_THAT(issue.message,
               HasSubstr(absl::StrCat("what an operator has set for it is ", small.max_bytes)));
-  // An empty layer takes some, too.
+  // An empty layer takes some memory, too.
   issue = Refused(f, small, SetLayer("b", true));
   EXPECT_EQ(issue.field, "layer_state.layer");
   EXPECT_EQ(issue.reason, Reason::kQuotaExceeded);
@@ -203,7 +203,7 @@ TEST(Rules, OfAnObjectWithVeryManyInstancesTheFirstAreLookedAt) {
     f.CommitAll(f.me, std::move(puts));
   }
   ASSERT_EQ(f.Tally().drawables, static_cast<uint64_t>(kInstances));
-  // A curve that is coarser than told wherever it is drawn.
+  // A curve that is drawn coarser than stated, at any place.
   auto data = std::make_shared<GeometryData>();
   data->record.kind = gpu::PrimitiveKind::kCurves;
   data->record.vertex_count = 4 * 60'000;
@@ -273,7 +273,7 @@ TEST(PutClip, KnowsWhatIsNotSound) {
   const ClipBox good = {{0, 0, 0}, {1, 1, 1}, {}};
   const ClipBox far = {{1.5e308, 0, 0}, {1.7e308, 1, 1}, {}};  // its far side is beyond all numbers
   const ClipBox small = {
-      {0, 0, 0}, {1, 1, 1}, Scale(1e-100, 1e-100, 1e-110)};  // its volume is next to none
+      {0, 0, 0}, {1, 1, 1}, Scale(1e-100, 1e-100, 1e-110)};  // its volume is nearly zero
   EXPECT_TRUE(boxes({good, good}));
   EXPECT_FALSE(boxes({far}));
   EXPECT_FALSE(boxes({small}));

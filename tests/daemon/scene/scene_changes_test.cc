@@ -1,4 +1,4 @@
-// What is told to those who watch, applied to plain maps, makes any snapshot into any other.
+// The changes that watchers receive, applied to plain maps, turn any snapshot into any other.
 #include "daemon/scene/scene_changes.h"
 
 #include <gmock/gmock.h>
@@ -22,7 +22,7 @@ using testing::Put;
 using testing::Shift;
 using testing::StoreFixture;
 
-// Of a layer, what is told beside its entities.
+// The properties of a layer that are reported beside its entities.
 struct LayerLook {
   uint64_t number = 0;
   bool visible = true;
@@ -50,7 +50,7 @@ struct LayerModel {
   bool operator==(const LayerModel&) const = default;
 };
 
-// What a watcher knows. Whatever is told must be news.
+// The state that a watcher knows. Every reported change must be new to it.
 class Watcher final : public SceneChangeVisitor {
  public:
   bool OnObject(const OwnedName& key, const Object& object) override {
@@ -72,7 +72,7 @@ class Watcher final : public SceneChangeVisitor {
       EXPECT_FALSE(it->second.look == LookOf(layer)) << "no news of " << key.name;
     }
     layers[key].look = LookOf(layer);
-    if (std::exchange(removed_, {}) == key) ++room_;  // the two go together
+    if (std::exchange(removed_, {}) == key) ++room_;  // the two are removed together
     return Room();
   }
   bool OnRemovedLayer(const OwnedName& key) override {
@@ -96,7 +96,7 @@ class Watcher final : public SceneChangeVisitor {
     return Room();
   }
 
-  // Tells from `before` to `after`, with room for up to `most` changes at a time.
+  // Reports the changes from `before` to `after`, with room for up to `most` changes at a time.
   void Bring(const SceneFilter& filter, SnapshotPtr before, SnapshotPtr after, uint32_t most,
              std::mt19937& random) {
     SceneChanges changes(filter, std::move(before), std::move(after));
@@ -154,7 +154,7 @@ std::map<OwnedName, const ObjectData*> ObjectsOf(const Snapshot& scene, const Sc
   return objects;
 }
 
-// Some watchers with filters, each of which looks when it likes; a scene of three owners.
+// Several watchers with filters, each of which looks at random times, and a scene of three owners.
 TEST(SceneChanges, AnyWatcherComesToAnySnapshot) {
   for (uint32_t seed = 1; seed <= 250; ++seed) {
     std::mt19937 random(seed);
@@ -192,7 +192,7 @@ TEST(SceneChanges, AnyWatcherComesToAnySnapshot) {
       all.push_back(f.store.snapshot());
       for (Watch& watch : watches) {
         if (random() % 3 != 0) continue;
-        // Mostly the newest; at times any, also an older one.
+        // Mostly the newest snapshot; at times any, also an older one.
         SnapshotPtr next = random() % 4 == 0 ? all[random() % all.size()] : all.back();
         watch.watcher.Bring(watch.filter, watch.told, next, 1 + random() % 6, random);
         watch.told = next;
@@ -256,14 +256,14 @@ TEST(SceneChanges, CountsAreNoNewsButOrphansAre) {
   const SnapshotPtr orphaned = f.store.snapshot();
   f.Orphan(11);
   EXPECT_EQ(f.store.snapshot(), orphaned);
-  // Who writes it next makes it theirs.
+  // The session that writes it next becomes its owner.
   f.Commit(MakeAuthor(1, 12), Move("a", "y", Shift(3)));
   watcher.Bring({}, orphaned, f.store.snapshot(), 100, random);
   EXPECT_EQ(watcher.changes_told, 2);
   EXPECT_FALSE((watcher.layers[{1, "a"}].look.orphaned));
 }
 
-// An object is put anew when one that it refers to changes; what it says of itself is the same.
+// An object is inserted again when one that it refers to changes; its own definition is the same.
 TEST(SceneChanges, AnObjectIsNewsByItsOwnDefinitionOnly) {
   StoreFixture f;
   f.Commit(Define("leaf", {{Dots(1), {}}}), Define("tree", {{InstanceRef{"leaf"}, {}}}));

@@ -1,4 +1,4 @@
-// What a scene may hold: of an owner, of all owners, of an entity, in bytes.
+// Tests the limits of a scene: per owner, for all owners, per entity, and in bytes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -34,7 +34,7 @@ TEST(SceneStore, QuotasRefuseWhatGoesBeyondThem) {
   limits.max_layers_per_owner = 2;
   StoreFixture f(limits);
   const Author other = MakeAuthor(2, 22);
-  f.Commit(other, Put("a", "theirs"), Put("b", "theirs"));  // counts for them only
+  f.Commit(other, Put("a", "theirs"), Put("b", "theirs"));  // counts only for them
   CommitResult result = f.Commit(Put("a", "1"), Put("a", "2"), Put("b", "3"), Put("a", "4"),
                                  Put("c", "5"), SetLayer("c", true), Begin("c"), End("c"));
   ASSERT_EQ(result.issues.size(), 4u);
@@ -43,7 +43,7 @@ TEST(SceneStore, QuotasRefuseWhatGoesBeyondThem) {
   EXPECT_THAT(result.issues[1].message, HasSubstr("max_layers_per_owner, 2"));
   EXPECT_EQ(result.applied_operations, 3u);
   EXPECT_EQ(result.refused_operations, 5u);
-  // Replacing costs nothing, and a frame counts without what it replaces.
+  // Replacing costs nothing, and a frame counts without the entities that it replaces.
   EXPECT_EQ(f.Commit(Put("a", "1", 7)).refused_operations, 0u);
   EXPECT_EQ(f.Commit(Begin("a"), Put("a", "8"), Put("a", "9"), End("a")).refused_operations, 0u);
   EXPECT_EQ(f.Commit(Begin("a"), Put("a", "8"), Put("a", "9"), Put("a", "10"), End("a"))
@@ -69,7 +69,7 @@ TEST(SceneStore, QuotasOverAllOwnersRefuseTheLastToCome) {
   EXPECT_THAT(result.issues[1].message, HasSubstr("max_layers, 3"));
   EXPECT_THAT(result.issues[2].message, HasSubstr("max_layers, 3"));
   EXPECT_EQ(CheckIndices(*f.store.snapshot()), "");
-  // What others let go is there to be had.
+  // Memory that others release is available.
   f.Commit(other, DeleteAllMine());
   EXPECT_EQ(f.Commit(Put("a", "5"), Put("c", "6")).refused_operations, 0u);
   EXPECT_EQ(f.Commit(other, Put("z", "big", Entity1(Dots(0, 1, 1)))).refused_operations, 1u);
@@ -125,7 +125,7 @@ TEST(SceneStore, AnInstanceThatDerivesMoreThanThereIsRoomForIsRefused) {
   EXPECT_THAT(result.issues[0].message,
               HasSubstr("max_memory_bytes leaves " + std::to_string(needed)));
   EXPECT_EQ(f.Scene(), "");
-  // The entity itself is held, too.
+  // The entity itself takes memory, too.
   f.store.SetMemoryRoom({.bytes = needed + 4096, .engines = 2});
   EXPECT_EQ(f.Commit(Put("a", "it", Entity1(InstanceRef{"many"}))).refused_operations, 0u);
   EXPECT_EQ(f.Tally().derived, 1024 * kOfADot);

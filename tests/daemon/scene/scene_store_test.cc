@@ -1,4 +1,4 @@
-// What commits do to the scene, rule by rule.
+// Tests the effects of commits on the scene, rule by rule.
 #include "daemon/scene/scene_store.h"
 
 #include <gmock/gmock.h>
@@ -50,7 +50,7 @@ TEST(SceneStore, ACommitMakesOneSnapshotAndLeavesTheOldOneAsItWas) {
   EXPECT_EQ(f.Scene(), "a: z; b: y");
   EXPECT_NE(first->FindEntity({1, "a"}, "x"), nullptr);
   EXPECT_EQ(empty->layers.size(), 0u);
-  // An untouched layer is the very same.
+  // An untouched layer is the same object.
   EXPECT_EQ(first->FindLayer({1, "b"}), f.GetLayer("b"));
 }
 
@@ -121,10 +121,10 @@ TEST(SceneStore, ALayersTransformIsCheckedAgainstAllThatItHolds) {
   EXPECT_EQ(refused.issues[0].reason, Reason::kOutOfRange);
   EXPECT_EQ(refused.issues[0].field, "layer_state.transform");
   EXPECT_TRUE(f.GetLayer("a")->visible);  // nothing of it was applied
-  // What has moved away since no longer counts.
+  // An entity that has since moved away no longer counts.
   f.Commit(Put("a", "x", 0.5f));
   EXPECT_EQ(f.Commit(SetLayer("a", std::nullopt, Scale(1e9, 1, 1))).refused_operations, 0u);
-  // And new entities are seen through it.
+  // And new entities are transformed by it.
   EXPECT_EQ(f.Commit(Put("a", "y", 2)).issues[0].reason, Reason::kOutOfRange);
 }
 
@@ -154,7 +154,7 @@ TEST(SceneStore, SingularTransformsAreRefusedOnSight) {
     EXPECT_EQ(result.issues[3].field, "define_object.definition.parts[0].transform");
   }
   EXPECT_EQ(f.Commit(Put("a", "x", Entity1(Dots(0), nan))).issues[0].reason, Reason::kInvalidValue);
-  // Stretching and shrinking alone are never singular.
+  // Stretching and shrinking alone never make a transform singular.
   EXPECT_EQ(f.Commit(Put("a", "x", Entity1(Dots(0), Scale(1e-9, 1e6, 1e-12)))).issues.size(), 0u);
   EXPECT_EQ(f.Scene(), "a: x");
 }
@@ -240,7 +240,7 @@ TEST(SceneStore, StrictRefusesTheWholeCommit) {
   EXPECT_FALSE(result.applied);
   EXPECT_EQ(result.refused_operations, 1u);
   EXPECT_EQ(f.store.snapshot(), before);
-  // Also if it was refused on arrival.
+  // Also if the operation was refused on arrival.
   EXPECT_FALSE(f.store.Apply(f.me, {}, f.now, true, 1).applied);
   EXPECT_TRUE(f.Commit(Put("a", "y")).applied);
 }
@@ -254,7 +254,7 @@ TEST(SceneStore, DeletesByIdPrefixLayerAndAllMine) {
   EXPECT_EQ(f.Commit(DeleteId("a", "nobody"), DeleteId("nowhere", "x")).refused_operations, 0u);
   f.Commit(DeletePrefix("a", "p"));
   EXPECT_EQ(f.Scene(), "a: q; b: r; a: theirs");
-  // A layer's state outlives what it holds; all mine takes the layers too.
+  // A layer's state outlives its contents; deleting all mine removes the layers too.
   f.Commit(SetLayer("a", false), DeleteAllOf("a"));
   EXPECT_EQ(f.Scene(), "a:; b: r; a: theirs");
   EXPECT_FALSE(f.GetLayer("a")->visible);
@@ -337,7 +337,7 @@ TEST(SceneStore, LifetimesEndInOrderOfTime) {
   EXPECT_TRUE(f.store.Expire(f.now + 10));
   EXPECT_EQ(f.Scene(), "a: ever second stays; b:");
   EXPECT_EQ(f.store.snapshot()->number, number + 1);
-  // Replacing counts anew, moving does not, removing forgets.
+  // Replacing restarts the lifetime, moving does not, removing ends it.
   f.now += 15;
   f.Commit(Put("a", "second", lasting(20)), Put("a", "third", lasting(50)));
   f.Commit(Move("a", "third", Shift(1)));
@@ -365,7 +365,7 @@ TEST(SceneStore, AViewIsCheckedAgainstWhatIsThere) {
   EXPECT_EQ(wrong.code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(wrong.message(), HasSubstr("layer \"a\" of owner 1"));
   EXPECT_THAT(wrong.message(), HasSubstr("must stay within ±100"));
-  // The bounds of a layer stay wide when something in it goes; that refuses nothing.
+  // The bounds of a layer stay wide when an entity in it is removed; that refuses nothing.
   f.Commit(DeleteId("a", "far"));
   EXPECT_TRUE(f.store.CheckNewView(view).ok());
 }
@@ -376,7 +376,7 @@ TEST(SceneStore, HiddenMeansThatEveryOperationWasInAHiddenLayer) {
   EXPECT_TRUE(f.Commit(Put("h", "x")).hidden);
   EXPECT_TRUE(f.Commit(Put("h", "x"), SetLayer("new", false), Put("new", "x")).hidden);
   EXPECT_FALSE(f.Commit(Put("h", "x"), Put("a", "x")).hidden);
-  EXPECT_FALSE(f.Commit(SetLayer("a", false)).hidden);  // that is seen
+  EXPECT_FALSE(f.Commit(SetLayer("a", false)).hidden);  // that is visible
   EXPECT_TRUE(f.Commit(DeleteAllOf("a")).hidden);
   EXPECT_FALSE(f.Commit(SetLayer("a", true)).hidden);
   EXPECT_FALSE(f.Commit(SetLayer("h", true), SetLayer("a", true)).hidden);
@@ -384,7 +384,7 @@ TEST(SceneStore, HiddenMeansThatEveryOperationWasInAHiddenLayer) {
   f.Commit(SetLayer("a", false));
   EXPECT_FALSE(f.Commit(testing::Define("o", {})).hidden);
   EXPECT_TRUE(f.Commit(Begin("a"), Put("a", "y"), End("a")).hidden);
-  // A refused one does not count.
+  // A refused operation does not count.
   EXPECT_TRUE(f.Commit(Put("a", "y"), Move("b", "nobody", Shift(1))).hidden);
 }
 

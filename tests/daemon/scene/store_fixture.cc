@@ -43,7 +43,7 @@ std::string CheckIndices(const Snapshot& snapshot) {
       return sum;
     }
     const Object* object = snapshot.FindObject({owner, std::get<InstanceRef>(content).object});
-    if (object == nullptr) return 0;  // told above
+    if (object == nullptr) return 0;  // reported above
     for (const ObjectPart& part : object->data->parts) sum += derived(owner, part.content);
     if (sum != object->derived) wrong += "bytes derived from an object\n";
     return sum;

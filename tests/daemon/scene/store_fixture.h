@@ -1,4 +1,4 @@
-// A SceneStore with one author, and short ways to look inside.
+// A SceneStore with one author, and helpers to look inside.
 #pragma once
 
 #include <memory>
@@ -19,8 +19,8 @@ class StoreFixture {
  public:
   explicit StoreFixture(Limits limits = {}) : store(limits), limits_(limits) {}
 
-  // One commit by `author`, operations numbered on;
-  // what CheckAlone refuses is left out and listed first.
+  // Makes one commit by `author`, with operations numbered consecutively; those that CheckAlone
+  // refuses are left out and listed first.
   template <typename... Ops>
   CommitResult Commit(const Author& author, Ops... ops) {
     std::vector<Operation> all = Sequence(last_sequence, std::move(ops)...);
@@ -31,7 +31,7 @@ class StoreFixture {
   CommitResult Commit(Ops... ops) {
     return Commit(me, std::move(ops)...);
   }
-  // As when a session has ended: the layers that it last wrote are orphaned.
+  // Orphans the layers that the session last wrote, as when it has ended.
   void Orphan(uint64_t session) {
     store.HandOver(session, std::make_shared<const Writer>(Writer{session, "client", true}));
   }
@@ -50,7 +50,7 @@ class StoreFixture {
     return result;
   }
 
-  // "layer: id id; layer: …" of all owners, in order.
+  // Returns "layer: id id; layer: …" of all owners, in order.
   std::string Scene() const {
     std::string text;
     store.snapshot()->layers.ForEach([&](const OwnedName& key, const LayerPtr& layer) {
@@ -80,8 +80,8 @@ class StoreFixture {
   const Limits limits_;
 };
 
-// What a snapshot's indices and tallies must be, worked out from its layers and objects alone; an
-// empty text if all is in step.
+// Compares a snapshot's indices and totals with those computed from its layers and objects alone.
+// Returns an empty text if they agree.
 std::string CheckIndices(const Snapshot& snapshot);
 
 }  // namespace voxeld::daemon::testing

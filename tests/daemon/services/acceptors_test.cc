@@ -1,4 +1,4 @@
-// Connections of unix sockets, and what their calls are told of their users.
+// Tests connections of Unix sockets, and what their calls learn about their users.
 #include "daemon/services/acceptors.h"
 
 #include <fcntl.h>
@@ -25,7 +25,8 @@
 namespace voxeld::daemon::services {
 namespace {
 
-// Answers every call, and keeps the most users that one was told of, and the last of them.
+// Answers every call, and keeps the greatest number of users that a call was told, and the last of
+// them.
 class Asks final : public grpc::CallbackGenericService {
  public:
   std::atomic<size_t> calls = 0, most = 0, none = 0;
@@ -50,7 +51,7 @@ class Asks final : public grpc::CallbackGenericService {
   }
 };
 
-// Of one connection all calls share what is known of it, and a connection may live for a year.
+// All calls of a connection share what is known of it, since a connection may live for a year.
 TEST(Acceptors, AConnectionsUserIsToldOnceHoweverManyCallsItMakes) {
   Asks asks;
   Acceptors acceptors(nullptr);
@@ -79,7 +80,7 @@ TEST(Acceptors, AConnectionsUserIsToldOnceHoweverManyCallsItMakes) {
         std::promise<grpc::Status> done;
         stub.UnaryCall(&context, "/voxeld.test/Ask", grpc::StubOptions(), &request, &response,
                        [&](grpc::Status status) { done.set_value(std::move(status)); });
-        // No message comes; what counts is that the call was made.
+        // No message arrives; all that counts is that the call was made.
         done.get_future().wait();
         ++answered;
       }

@@ -1,4 +1,4 @@
-// Who may call what, over every kind of connection.
+// Tests which callers may make which calls, over every kind of connection.
 #include <gmock/gmock.h>
 #include <google/protobuf/descriptor.h>
 #include <grpcpp/generic/generic_stub.h>
@@ -57,7 +57,7 @@ class ServicesAccess : public ::testing::Test {
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
   void Start(const access::TlsStore* tls = nullptr) {
-    // The fixture's own calls come over the unix socket, as a user who may look.
+    // The fixture's own calls arrive over the Unix socket, as a user with the view scope.
     daemon_ = std::make_unique<Daemon>(
         DaemonOptions{.listen = {kAnyPort, tls == nullptr ? kAnyPort : "tls:127.0.0.1:0"},
                       .access = access_.get(),
@@ -76,7 +76,8 @@ class ServicesAccess : public ::testing::Test {
     return grpc::CreateChannel(Target(1), grpc::InsecureChannelCredentials());
   }
 
-  // How a call with an empty request ends that names `token`, if it is not empty.
+  // Makes a call with an empty request, which names `token` unless that is empty. Returns its final
+  // status.
   static grpc::Status Call(const std::shared_ptr<grpc::Channel>& channel, const std::string& method,
                            const std::string& token) {
     grpc::GenericStub stub(channel);
@@ -92,7 +93,7 @@ class ServicesAccess : public ::testing::Test {
     const grpc::Slice nothing("");
     call->WriteLast(grpc::ByteBuffer(&nothing, 1), grpc::WriteOptions(), nullptr);
     EXPECT_TRUE(queue.Next(&tag, &ok));
-    // What is allowed may go on for ever: the first answer is enough.
+    // An allowed call may never end: the first answer is enough.
     grpc::ByteBuffer answer;
     call->Read(&answer, nullptr);
     EXPECT_TRUE(queue.Next(&tag, &ok));
@@ -115,7 +116,8 @@ class ServicesAccess : public ::testing::Test {
   std::unique_ptr<Daemon> daemon_;
 };
 
-// What each method takes, written down a second time: a method that is added must be added here.
+// The scopes that each method requires, written down a second time: a method that is added must be
+// added here.
 const std::map<std::string, std::string>& ScopesOfMethods() {
   static const std::map<std::string, std::string> scopes = {
       {"SceneService/Stream", "draw"},          {"SceneService/ApplyUpdate", "draw"},
@@ -159,7 +161,7 @@ TEST_F(ServicesAccess, EveryMethodAsksForItsScope) {
   }
   EXPECT_EQ(methods, ScopesOfMethods().size());
   EXPECT_GT(daemon_->Stats().connections().calls_turned_away(), 40u);
-  // What anybody may ask.
+  // Calls that need no scope.
   EXPECT_TRUE(Call(channel, "/grpc.health.v1.Health/Check", "").ok());
 }
 
@@ -169,7 +171,7 @@ TEST_F(ServicesAccess, ControlIsRefusedWhileARequiredAuditLogCannotBeWritten) {
   audit_ = *std::move(audit);
   Start();
   const auto channel = Plain();
-  // The first entry is the first that cannot be written.
+  // The first entry is also the first that cannot be written.
   audit_->Record("a", "", "First", "", absl::OkStatus());
   for (const auto& [method, token] : {std::pair("DisplayService/UpdateDisplay", "boss"),
                                       {"SceneService/ControlOwner", "boss"},
@@ -193,7 +195,7 @@ TEST_F(ServicesAccess, AHeaderThatIsNoneIsRefused) {
   EXPECT_THAT(status.error_message(), HasSubstr("Bearer"));
 }
 
-// Which of two would count is nothing to guess at.
+// The server does not guess which of two headers counts.
 TEST_F(ServicesAccess, TwoHeadersAreRefused) {
   Start();
   const auto stub = v1::DisplayService::NewStub(Plain());
@@ -243,7 +245,7 @@ TEST_F(ServicesAccess, ThePrincipalIsTheOwner) {
   const auto first = open("painter"), second = open("painter"), other = open("artist");
   EXPECT_EQ(std::get<0>(first).owner(), std::get<0>(second).owner());
   EXPECT_NE(std::get<0>(first).owner(), std::get<0>(other).owner());
-  // What names another's owner or session is as good as a guess.
+  // Naming the owner or session of another caller is treated like a guess.
   EXPECT_EQ(std::get<1>(open("artist", std::get<0>(first).owner_token())).error_code(),
             StatusCode::NOT_FOUND);
   EXPECT_EQ(std::get<1>(open("artist", "", std::get<0>(first).resume_token())).error_code(),
@@ -355,7 +357,7 @@ TEST_F(ServicesAccess, ATokenThatIsTakenAwayEndsItsCallsAndNobodyElses) {
   EXPECT_EQ(stats.connections().calls_revoked(), 2u);
   EXPECT_EQ(stats.sessions(), 0u);
 
-  // A file that is wrong takes nothing from who is there.
+  // An invalid file does not affect connected clients.
   PutFile(grants_, "[[token]]\nname =");
   EXPECT_FALSE(access_->Look(true).ok());
   for (int i = 0; i < 10; ++i) ASSERT_TRUE(watch->Read(&stats));
@@ -402,14 +404,15 @@ class ServicesTls : public ServicesAccess {
 TEST_F(ServicesTls, BothSidesAreVerified) {
   const std::string& ca = authority_.certificate();
   EXPECT_TRUE(Ask(authority_.Issue("cube.example"), ca).ok());
-  // Signed by the right authority, and named by nobody.
+  // Signed by the right authority, but not named in the grants.
   EXPECT_EQ(Ask(authority_.Issue("other.example"), ca).error_code(), StatusCode::PERMISSION_DENIED);
   EXPECT_TRUE(Ask(authority_.Issue("other.example"), ca, "viewer").ok());
-  // Of one without a subject the name is the first that it is for.
+  // Without a subject, the name is the first one for which the certificate is issued.
   EXPECT_TRUE(Ask(authority_.IssueWithoutSubject("cube.example"), ca).ok());
   EXPECT_EQ(Ask(authority_.IssueWithoutSubject("other.example"), ca).error_code(),
             StatusCode::PERMISSION_DENIED);
-  // By none, by another, expired, not valid yet; and a server that the client does not know.
+  // No certificate, one of another authority, an expired one, one that is not valid yet; and a
+  // server that the client does not trust.
   EXPECT_EQ(Ask({}, ca, "viewer").error_code(), StatusCode::UNAVAILABLE);
   EXPECT_EQ(Ask(stranger_.Issue("cube.example"), ca, "viewer").error_code(),
             StatusCode::UNAVAILABLE);
@@ -419,7 +422,7 @@ TEST_F(ServicesTls, BothSidesAreVerified) {
             StatusCode::UNAVAILABLE);
   EXPECT_EQ(Ask(authority_.Issue("cube.example"), stranger_.certificate()).error_code(),
             StatusCode::UNAVAILABLE);
-  // Without TLS it is nobody's address.
+  // Without TLS, the address cannot be used.
   EXPECT_EQ(Call(grpc::CreateChannel(Target(2), grpc::InsecureChannelCredentials()),
                  "/voxeld.v1.DisplayService/ListDisplays", "viewer")
                 .error_code(),
@@ -430,7 +433,7 @@ TEST_F(ServicesTls, WhatIsExchangedHoldsForNewConnections) {
   const std::string old_ca = authority_.certificate();
   const access::Issued client = authority_.Issue("cube.example");
   ASSERT_TRUE(Ask(client, old_ca).ok());
-  // What does not fit together changes nothing.
+  // A certificate and a key that do not match change nothing.
   PutFile(files_.certificate, stranger_.Issue("display.example").certificate);
   EXPECT_FALSE(store_->Look(true).ok());
   EXPECT_TRUE(Ask(client, old_ca).ok());

@@ -1,4 +1,4 @@
-// Calls that are open, and who is told to end.
+// Tests the open calls, and which of them must end.
 #include "daemon/services/active_calls.h"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,5 @@
-// Assets over the wire: brought piece by piece, over calls that break off, and drawn by their hash.
+// Tests assets over the wire: uploaded in pieces, over calls that are interrupted, and drawn by
+// their hash.
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -21,7 +22,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// Twelve bytes, the point (1, 2, 3) as floats; by sha256sum.
+// Twelve bytes: the point (1, 2, 3) as floats; the hash is from sha256sum.
 const std::string kPoint = absl::HexStringToBytes("0000803f0000004000004040");
 const std::string kPointHash =
     absl::HexStringToBytes("8e628779e6a74ee0b36991c10158f63cafec7d340ad4e075592502c8708524dd");
@@ -34,7 +35,7 @@ class Assets : public ::testing::Test {
     std::filesystem::remove_all(folder_);
   }
 
-  // `folder`: empty: in memory.
+  // If `folder` is empty, assets are in memory.
   void Start(bool keeps = true, sync::TimeNs silence = 30 * sync::kSecond,
              const std::string& folder = "") {
     store_ = assets::AssetStore::Open(folder, {.max_asset_bytes = 1000, .max_bytes = 100'000},
@@ -47,7 +48,7 @@ class Assets : public ::testing::Test {
     std::string bytes;
     uint64_t offset = 0;
   };
-  // `stored_before_break`: not 0: the call is cancelled once so many bytes are there.
+  // If `stored_before_break` is not 0, the call is cancelled once that many bytes are stored.
   grpc::Status Upload(const std::string& hash, uint64_t size, const std::vector<Piece>& pieces,
                       uint64_t stored_before_break = 0) {
     grpc::ClientContext context;
@@ -74,7 +75,7 @@ class Assets : public ::testing::Test {
     return call->Finish();
   }
 
-  // A call that has brought the first four bytes of the point.
+  // A call that has uploaded the first four bytes of the point.
   struct Begun {
     explicit Begun(Assets& test) {
       SetDeadline(context);
@@ -165,7 +166,7 @@ TEST_F(Assets, GoOnAfterACallThatBrokeOff) {
   EXPECT_EQ(List(kPointHash).assets(0).stored(), 7u);
   EXPECT_FALSE(List(kPointHash).assets(0).complete());
   grpc::Status status;
-  do {  // the call that was cancelled may have to be heard of first
+  do {  // the server may not have noticed the cancelled call yet
     status = Upload(kPointHash, 12, {{kPoint.substr(7), 7}});
   } while (status.error_code() == grpc::StatusCode::ABORTED);
   EXPECT_TRUE(status.ok()) << status.error_message();
@@ -225,7 +226,7 @@ TEST_F(Assets, AnUploadThatFallsSilentEnds) {
   Start(true, sync::kSecond / 5);
   Begun begun(*this);
   ASSERT_TRUE(begun.written);
-  const grpc::Status silent = begun.call->Finish();  // the client says nothing more
+  const grpc::Status silent = begun.call->Finish();  // the client sends nothing more
   EXPECT_EQ(silent.error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
   EXPECT_THAT(silent.error_message(), HasSubstr("upload_silence_limit_ns"));
   EXPECT_EQ(List(kPointHash).assets(0).stored(), 4u);
@@ -291,7 +292,7 @@ TEST_F(Assets, ManyCallsAreNotHeld) {
     calls.back()->call =
         daemon_->scene().UploadAsset(&calls.back()->context, &calls.back()->response);
   }
-  // Those that came in stay open until so many have ended as are to be refused.
+  // Accepted calls stay open until as many calls have ended as must be refused.
   std::atomic<int> refused = 0, ended = 0;
   std::latch enough(kCalls - kMost);
   std::vector<std::thread> waiting;

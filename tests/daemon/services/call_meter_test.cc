@@ -1,4 +1,4 @@
-// Which calls of a connection count as cancelled, by gRPC's own figures.
+// Tests which calls of a connection count as cancelled, by gRPC's own statistics.
 #include "daemon/services/call_meter.h"
 
 #include <gtest/gtest.h>

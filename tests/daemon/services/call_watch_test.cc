@@ -1,4 +1,4 @@
-// Which answers authorise a connection, by a server that answers anything.
+// Tests which answers authorise a connection, with a server that answers anything.
 #include "daemon/services/call_watch.h"
 
 #include <gmock/gmock.h>
@@ -27,7 +27,7 @@ grpc::ByteBuffer SomeBytes() {
   return {&slice, 1};
 }
 
-// What a call comes to.
+// How a call is handled.
 struct Plan {
   bool hears = true;    // its message is read
   bool answers = true;  // with a message
@@ -65,7 +65,7 @@ class AnswersAnything final : public grpc::CallbackGenericService {
     peer = context->peer();
     return new Reactor(plan);
   }
-  Plan plan;  // between calls
+  Plan plan;  // changed between calls
   std::string peer;
 };
 
@@ -94,7 +94,7 @@ class CallWatchTest : public ::testing::Test {
     server_ = builder.BuildAndStart();
     stub_ = std::make_unique<grpc::GenericStub>(
         grpc::CreateChannel(absl::StrCat("127.0.0.1:", port), grpc::InsecureChannelCredentials()));
-    Call(kOthers, {});  // says under which name the connection is known
+    Call(kOthers, {});  // the name under which the connection is known
   }
 
   grpc::Status Call(const char* method, const Plan& plan) {
@@ -108,7 +108,7 @@ class CallWatchTest : public ::testing::Test {
     return done.get_future().get();
   }
 
-  // Whether a connection that was not trusted is so after the call.
+  // Returns whether a connection that was not authorised is so after the call.
   bool Authorises(const char* method, const Plan& plan) {
     bool trusted = false;
     const listen::Peer peer{listen::PeerName(service_.peer), "127.0.0.1", false};

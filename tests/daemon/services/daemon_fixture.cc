@@ -83,7 +83,7 @@ Daemon::Daemon(DaemonOptions options)
   channel_ = NewChannel();
   scene_ = v1::SceneService::NewStub(channel_);
   displays_ = v1::DisplayService::NewStub(channel_);
-  // A display that is still being looked for would answer commits with ABSENT.
+  // A display that is still attaching would answer commits with ABSENT.
   EXPECT_TRUE(Await([](const v1::Stats& stats) {
     return std::all_of(stats.displays().begin(), stats.displays().end(), [](const auto& display) {
       return display.state() == v1::DISPLAY_STATE_SHOWING;

@@ -1,4 +1,4 @@
-// A real daemon in this process: core, simulated displays, the gRPC server on a unix socket.
+// A real daemon in this process: core, simulated displays, and the gRPC server on a Unix socket.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -19,16 +19,16 @@
 
 namespace voxeld::daemon::services {
 
-// No call of a test may take longer.
+// Sets the time limit for every call of a test.
 inline void SetDeadline(grpc::ClientContext& context,
                         std::chrono::seconds patience = std::chrono::seconds(60)) {
   context.set_deadline(std::chrono::system_clock::now() + patience);
 }
 
-// Until the figures are as `right` wants them; the last ones, or nothing after a generous time.
+// Waits until the statistics satisfy `right`. Returns them, or nullopt after a generous time.
 std::optional<v1::Stats> AwaitStats(v1::DisplayService::Stub& displays,
                                     const std::function<bool(const v1::Stats&)>& right);
-// Every display has attached: what is committed before has no display to be shown on.
+// Returns whether every display has attached: commits before that have no display to be shown on.
 bool AllShowing(const v1::Stats& stats);
 
 struct DaemonOptions {
@@ -43,13 +43,13 @@ struct DaemonOptions {
   uint32_t max_stats_watches = 64;
   uint32_t max_volume_watches = 16;
   bool local_socket = false;
-  bool stuck = false;               // displays that take volumes and never show one
+  bool stuck = false;               // displays that accept volumes and never show one
   std::vector<std::string> listen;  // more addresses
   const access::Access* access = nullptr;
   const access::TlsStore* tls = nullptr;
   access::Audit* audit = nullptr;
   assets::AssetStore* assets = nullptr;  // outlives the daemon
-  sync::Clock* clock = nullptr;          // the server's; outlives the daemon; none: the system's
+  sync::Clock* clock = nullptr;  // the server's clock; outlives the daemon; null: the system's
 };
 
 class Daemon {
@@ -60,7 +60,7 @@ class Daemon {
   Daemon& operator=(const Daemon&) = delete;
 
   const std::string& target() const { return target_; }
-  const std::string& folder() const { return folder_; }  // for a test's own files
+  const std::string& folder() const { return folder_; }  // a folder for the test's own files
   std::shared_ptr<grpc::Channel> NewChannel() const;     // a connection of its own
   v1::SceneService::Stub& scene() { return *scene_; }
   v1::DisplayService::Stub& displays() { return *displays_; }
@@ -69,7 +69,7 @@ class Daemon {
 
   v1::Stats Stats();
   v1::ListEntitiesResponse Entities();
-  // Until the figures are as `right` wants them; false after a generous time.
+  // Waits until the statistics satisfy `right`. Returns false after a generous time.
   bool Await(const std::function<bool(const v1::Stats&)>& right) {
     return AwaitStats(*displays_, right).has_value();
   }
@@ -85,10 +85,10 @@ class Daemon {
   std::unique_ptr<v1::DisplayService::Stub> displays_;
 };
 
-// One stream, written and read by the test's thread.
+// One stream, written and read in the test's thread.
 class Client {
  public:
-  // `patience`: for the whole stream.
+  // `patience` limits the whole stream.
   explicit Client(v1::SceneService::Stub& stub,
                   std::chrono::seconds patience = std::chrono::seconds(60))
       : call_(Begin(stub, patience)) {}
@@ -101,12 +101,12 @@ class Client {
   void Cancel() { context_.TryCancel(); }
 
   std::optional<v1::StreamResponse> Read();
-  // Reads until that many outcomes have come (and whatever comes with them).
+  // Reads until that many outcomes have arrived (and whatever arrives with them).
   void ReadOutcomes(size_t count);
   // Reads to the end.
   grpc::Status Finish();
 
-  // All that has been read.
+  // Everything that has been read.
   std::vector<v1::Issue> issues;
   std::vector<v1::Receipt> answers;  // Accepted and Refused
   std::vector<v1::Receipt> outcomes;

@@ -1,4 +1,4 @@
-// DisplayService against a real server.
+// Tests DisplayService with a real server.
 #include <gmock/gmock.h>
 
 #include "tests/daemon/services/daemon_fixture.h"
@@ -170,14 +170,14 @@ TEST(Capture, NoMoreAtOnceThanAllowed) {
   v1::CaptureVolumeRequest second;
   second.set_timeout_ns(50 * sync::kMillisecond);
   second.set_at_least_snapshot(1'000'000);
-  // Whichever of the two the server hears first, one is refused and one waits.
+  // Whichever of the two the server receives first, one is refused and one waits.
   grpc::Status status = Capture(daemon, second).status;
   while (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED) {
     status = Capture(daemon, second).status;
   }
   EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
   EXPECT_THAT(status.error_message(), ::testing::HasSubstr("max_captures"));
-  // The place of one that has ended is free again.
+  // The place of a call that has ended is free again.
   context.TryCancel();
   EXPECT_EQ(first->Finish().error_code(), grpc::StatusCode::CANCELLED);
   do {
@@ -242,7 +242,7 @@ TEST(Stats, AreWatchedByNoMoreAtOnceThanAllowed) {
     grpc::ClientContext context;
     std::unique_ptr<grpc::ClientReader<v1::Stats>> call;
   };
-  // The one that waited for the displays may still be there for a moment.
+  // The call that waited for the displays may still exist for a moment.
   const auto begin = [&daemon] {
     auto watch = std::make_unique<Watch>(daemon);
     while (!watch->Read()) {
@@ -259,7 +259,7 @@ TEST(Stats, AreWatchedByNoMoreAtOnceThanAllowed) {
   EXPECT_THAT(refused.error_message(), HasSubstr("max_stats_watches"));
   first->context.TryCancel();
   EXPECT_EQ(first->call->Finish().error_code(), grpc::StatusCode::CANCELLED);
-  // The place of one that has ended is free again.
+  // The place of a call that has ended is free again.
   for (bool free = false; !free;) {
     Watch another(daemon);
     free = another.Read();
@@ -269,7 +269,7 @@ TEST(Stats, AreWatchedByNoMoreAtOnceThanAllowed) {
   }
 }
 
-// What a client puts together from a watch.
+// The state that a client assembles from a watch.
 struct Watched {
   explicit Watched(Daemon& daemon, const std::string& name = "") {
     SetDeadline(context);
@@ -279,7 +279,7 @@ struct Watched {
   }
   ~Watched() { context.TryCancel(); }
 
-  // One more message.
+  // Reads one more message.
   bool Read() {
     v1::VolumeChunk chunk;
     if (!call->Read(&chunk)) return false;
@@ -327,7 +327,7 @@ TEST(WatchVolume, TellsWhatChangesAndIsWhatACaptureTells) {
   EXPECT_EQ(watch.rgb, Whole(daemon));
   EXPECT_THAT(watch.rgb, HasSubstr(std::string(1, '\xff')));
 
-  // A point in one slice alone: that slice alone comes.
+  // A point in one slice only: only that slice is sent.
   v1::StreamRequest point;
   point.mutable_upsert()->set_layer("l");
   point.mutable_upsert()->set_id("point");

@@ -54,7 +54,7 @@ TEST_F(HealthWatchTest, IsOfWhatIsDrawnToo) {
   watch_.OnEngine({"a", What::kLost, "hung"});
   watch_.OnEngine({"a", What::kHolding, "hung"});
   watch_.Tell([this](bool serving) { serving_ = serving; });
-  EXPECT_EQ(serving_, false);  // as it is, not as it was when somebody began to listen
+  EXPECT_EQ(serving_, false);  // the state now, not that when the watcher started
   watch_.OnDisplay("a", DisplayState::kLost, "unplugged");
   watch_.OnEngine({"a", What::kTookOver, "hung", 5});
   EXPECT_EQ(serving_, false);

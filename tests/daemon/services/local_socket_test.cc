@@ -1,4 +1,4 @@
-// Memory handed over beside the stream, through a whole daemon.
+// Tests memory passed beside the stream, through a whole daemon.
 #include <gmock/gmock.h>
 
 #include <cstring>
@@ -69,7 +69,7 @@ void ShowVoxelsAsTheyAre(Daemon& daemon) {
   ASSERT_TRUE(daemon.displays().UpdateDisplay(&context, view, &ignored).ok());
 }
 
-// Commits what was sent, and answers what the display shows of it.
+// Commits what was sent, and returns what the display shows of it.
 std::string CommitAndCapture(Daemon& daemon, Client& client) {
   client.Commit(1);
   client.ReadOutcomes(1);
@@ -114,7 +114,7 @@ TEST(LocalSocket, LinesInMemoryAreTheLinesThatWereSent) {
   LocalClient local(opened.local_socket());
   const v1::LocalAnswer welcome = local.Hello(opened.local_token());
   EXPECT_EQ(welcome.welcome().max_bytes(), opened.limits().max_local_bytes());
-  // Positions in a memory of their own, the rest in one.
+  // Positions are in a memory of their own, the rest in another.
   const std::string both = lines.colors + lines.indices;
   ASSERT_TRUE(
       local.Call(MemoryMessage(1, lines.positions.size()), {MakeMemfd(lines.positions).get()})
@@ -131,7 +131,7 @@ TEST(LocalSocket, LinesInMemoryAreTheLinesThatWereSent) {
   EXPECT_EQ(named, sent);
   EXPECT_NE(named.find_first_not_of('\0'), std::string::npos) << "nothing is lit";
 
-  // What was copied stays when the memory goes.
+  // Copied content stays when the memory is released.
   EXPECT_TRUE(local.Call(ReleaseMessage(1)).has_released());
   EXPECT_EQ(daemon.Entities().total(), 1u);
   client.HalfClose();
@@ -218,7 +218,7 @@ TEST(LocalSocket, AStreamThatTakesUpASessionHasItsOwn) {
   ASSERT_TRUE(last.has_value());
   EXPECT_THAT(last->refused().message(), HasSubstr("the session has ended"));
 
-  // The older stream is gone, and took nothing along that is not its own.
+  // The older stream has ended, and its removal has deleted nothing of the newer one.
   EXPECT_NE(resumed.local_token(), opened.local_token());
   LocalClient newer(resumed.local_socket());
   ASSERT_TRUE(newer.Hello(resumed.local_token()).has_welcome());
@@ -271,7 +271,7 @@ TEST(LocalSocket, MuchMemoryGoesThroughFewBytes) {
   const v1::Opened opened = client.Open();
   LocalClient local(opened.local_socket());
   ASSERT_TRUE(local.Hello(opened.local_token()).has_welcome());
-  // More than may be in flight at once: it is read as the core takes it in.
+  // More than may be in flight at once: it is read as the core accepts it.
   constexpr uint32_t kPoints = 30'000;
   const std::string positions(size_t{kPoints} * 6, '\1');
   ASSERT_TRUE(

@@ -1,4 +1,4 @@
-// SceneService's other calls against a real server.
+// Tests SceneService's other calls with a real server.
 #include <gmock/gmock.h>
 
 #include <span>
@@ -15,14 +15,14 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-// How often `part` stands in `text`.
+// Returns how often `part` occurs in `text`.
 int Occurrences(std::string_view part, std::string_view text) {
   int count = 0;
   for (size_t at = text.find(part); at != text.npos; at = text.find(part, at + 1)) ++count;
   return count;
 }
 
-// One call, with its status and answer.
+// Makes one call. Returns its status and answer.
 template <typename Response, typename Method, typename Request>
 std::pair<grpc::Status, Response> Call(v1::SceneService::Stub& stub, Method method,
                                        const Request& request) {
@@ -129,7 +129,7 @@ TEST(ApplyUpdate, IsAnsweredAlsoByACoreThatStops) {
                 [&](const absl::Status& status, const v1::ApplyUpdateResponse&) {
                   answers.push_back(status);
                 });
-    // Opens the session, and has no place for its operations any more.
+    // It can open the session, but no longer accepts its operations.
     ASSERT_TRUE(core.Stop(sync::kSecond).ok());
     ASSERT_EQ(answers.size(), 1u);
     EXPECT_TRUE(absl::IsUnavailable(answers[0])) << answers[0];

@@ -1,4 +1,4 @@
-// WatchScene over a real server.
+// Tests WatchScene over a real server.
 #include <gmock/gmock.h>
 #include <grpcpp/generic/generic_stub.h>
 
@@ -16,7 +16,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// A client that watches, and knows what it was told.
+// A client that watches, and records what it was told.
 class Watcher {
  public:
   explicit Watcher(v1::SceneService::Stub& stub, v1::WatchSceneRequest request = {})
@@ -25,7 +25,7 @@ class Watcher {
     call_ = stub.WatchScene(&context_, request_);
   }
 
-  // One message; false at the end.
+  // Reads one message; returns false at the end.
   bool Read() {
     v1::WatchSceneResponse message;
     if (!call_->Read(&message)) return false;
@@ -34,7 +34,7 @@ class Watcher {
     scene_.Apply(message);
     return true;
   }
-  // Until it knows that snapshot or a later one.
+  // Reads until it knows that snapshot or a later one.
   void ReadTo(uint64_t snapshot) {
     while (scene_.in_sync() < snapshot) {
       if (!Read()) {
@@ -43,7 +43,7 @@ class Watcher {
       }
     }
   }
-  // Reads to the newest snapshot, and expects to know it whole.
+  // Reads up to the newest snapshot, and checks that it knows all of it.
   void ExpectNewest(Daemon& daemon) {
     const SnapshotPtr newest = daemon.core().scene_watch().newest();
     ReadTo(newest->number);
@@ -89,7 +89,7 @@ v1::StreamRequest PointsIn(const std::string& layer, const std::string& id, uint
   return request;
 }
 
-// Commits and waits for its snapshot's number.
+// Commits, and waits. Returns the number of its snapshot.
 uint64_t CommitNow(Client& client, uint64_t frame_id) {
   client.Commit(frame_id);
   const size_t before = client.answers.size();
@@ -141,7 +141,7 @@ TEST(WatchScene, WhoComesLateGetsTheStateAndThenWhatChanges) {
   EXPECT_TRUE(nobody.scene().words().layers.empty());
   EXPECT_GT(whole.messages, 3);
 
-  // Each change is told to each, and is all that is.
+  // Each watcher receives each change, and nothing else.
   v1::StreamRequest move;
   move.mutable_set_transform()->set_layer("balls");
   move.mutable_set_transform()->set_id("ball7");
@@ -163,7 +163,7 @@ TEST(WatchScene, WhoComesLateGetsTheStateAndThenWhatChanges) {
   for (Watcher* watcher : {&known, &whole, &one, &nobody}) watcher->ExpectNewest(daemon);
   EXPECT_TRUE(one.scene().words().entities.empty());
 
-  // The client goes, and all that it had.
+  // The client leaves, and its scene is removed.
   client.HalfClose();
   EXPECT_TRUE(client.Finish().ok());
   ASSERT_TRUE(daemon.Await([](const v1::Stats& stats) { return stats.layers() == 0; }));
@@ -190,11 +190,11 @@ TEST(WatchScene, OrphansAreTold) {
   EXPECT_TRUE(daemon.Entities().layers(0).orphaned());
 }
 
-// One that does not read holds two snapshots, however many there are, and holds nobody up; then it
-// comes to the newest by few change sets.
+// A watcher that does not read holds two snapshots, however many there are, and delays nobody; then
+// it reaches the newest with few change sets.
 constexpr uint32_t kPoints = 80'000;  // near a megabyte
 
-// A connection whose transport takes no more unread as time goes on.
+// A connection whose transport does not accept more unread bytes as time goes on.
 std::unique_ptr<v1::SceneService::Stub> StubOfFixedWindow(const Daemon& daemon) {
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
@@ -205,7 +205,7 @@ std::unique_ptr<v1::SceneService::Stub> StubOfFixedWindow(const Daemon& daemon) 
 
 TEST(WatchScene, WhoTakesNothingForTooLongHoldsNothing) {
   DaemonOptions options;
-  options.watch_write_limit_ns = sync::kSecond;  // the busy one is held up as well, and shorter
+  options.watch_write_limit_ns = sync::kSecond;  // the busy one is delayed, too, but shorter
   options.max_scene_watches = 2;
   Daemon daemon(options);
   Client client(daemon.scene());
@@ -243,7 +243,7 @@ TEST(WatchScene, NothingIsQueuedForWhoDoesNotRead) {
   const auto stub = StubOfFixedWindow(daemon);
   Watcher idle(*stub, Request(0, "", true));
   Watcher busy(daemon.scene(), Request(0, "", true));
-  ASSERT_TRUE(idle.Read());  // the first cloud: it has begun
+  ASSERT_TRUE(idle.Read());  // the first cloud: it has started
   EXPECT_EQ(idle.change_sets, 0);
 
   std::vector<std::weak_ptr<const Snapshot>> snapshots;
@@ -260,7 +260,7 @@ TEST(WatchScene, NothingIsQueuedForWhoDoesNotRead) {
     for (const auto& snapshot : snapshots) count += snapshot.expired() ? 0 : 1;
     return count;
   };
-  // The newest; and for a moment what displays, and the core that frees it for them, have in hand.
+  // The newest; and, for a moment, those that displays, and the core that frees them, still hold.
   for (int tries = 0; alive() > 1 && tries < 10'000; ++tries) daemon.Stats();
   EXPECT_EQ(alive(), 1);
 
@@ -281,7 +281,7 @@ TEST(WatchScene, NoMoreAtOnceThanAllowed) {
   EXPECT_EQ(refused.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
   EXPECT_THAT(refused.error_message(), HasSubstr("2 watches of the scene are open"));
   EXPECT_THAT(refused.error_message(), HasSubstr("max_scene_watches"));
-  // The place of one that has ended is free again.
+  // The place of a call that has ended is free again.
   first.Cancel();
   EXPECT_EQ(first.Finish().error_code(), grpc::StatusCode::CANCELLED);
   for (bool free = false; !free;) {
@@ -314,7 +314,7 @@ TEST(WatchScene, BytesThatAreNoRequestAreRefused) {
   SetDeadline(context);
   const grpc::Slice slice(
       std::string("\x12\x05"
-                  "abc"));  // a layer of 5 bytes that has 3
+                  "abc"));  // a layer name of 5 bytes of which 3 are sent
   const grpc::ByteBuffer request(&slice, 1);
   grpc::ByteBuffer response;
   std::promise<grpc::Status> done;
@@ -325,7 +325,7 @@ TEST(WatchScene, BytesThatAreNoRequestAreRefused) {
   EXPECT_THAT(status.error_message(), HasSubstr("WatchSceneRequest"));
 }
 
-// Watchers that come and go at any moment, under commits that do not stop.
+// Watchers that start and end at any moment, while commits continue.
 TEST(WatchScene, WatchersComeAndGoAtAnyTime) {
   Daemon daemon;
   std::atomic<bool> enough = false;

@@ -1,4 +1,4 @@
-// The server itself: addresses, health, reflection, shutdown.
+// Tests the server itself: addresses, health, reflection, shutdown.
 #include "daemon/services/server.h"
 
 #include <gmock/gmock.h>
@@ -38,7 +38,7 @@ std::string Bytes(const grpc::ByteBuffer& buffer) {
   return bytes;
 }
 
-// A method of a service for which this project has no stubs, on raw messages.
+// Calls a method of a service for which this project has no stubs, with raw messages.
 grpc::Status RawCall(const std::shared_ptr<grpc::Channel>& channel, const std::string& method,
                      const std::string& request, std::string* response) {
   grpc::GenericStub stub(channel);
@@ -54,7 +54,7 @@ grpc::Status RawCall(const std::shared_ptr<grpc::Channel>& channel, const std::s
   return status;
 }
 
-// grpc.health.v1: {1: service}, answered by {1: status}; 1 serves, 2 does not.
+// grpc.health.v1: {1: service}, answered by {1: status}; 1 is serving, 2 is not serving.
 std::string HealthRequest(const std::string& service) {
   std::string request = {'\x0a', static_cast<char>(service.size())};
   return request.append(service);
@@ -79,7 +79,7 @@ TEST(Health, KnowsEachServiceAndTheWhole) {
       grpc::StatusCode::NOT_FOUND);
 }
 
-// Collects what a server stream says.
+// Collects the messages of a server stream.
 class Watch final : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
  public:
   Watch(const std::shared_ptr<grpc::Channel>& channel, const std::string& method,
@@ -134,7 +134,7 @@ TEST(Health, IsNotServingWhileDraining) {
   EXPECT_THAT(watch.AwaitDone(), ElementsAre(kServing, kNotServing));
 }
 
-// Keeps the core's thread busy until it is let go.
+// Keeps the core's thread busy until it is released.
 class BusyCore {
  public:
   explicit BusyCore(Core& core) {
@@ -167,7 +167,7 @@ TEST(Shutdown, DoesNotWaitForABusyCore) {
   std::promise<grpc::Status> updated;
   scene->async()->ApplyUpdate(&context, &request, &response,
                               [&](grpc::Status status) { updated.set_value(std::move(status)); });
-  std::string answer;  // on the same connection, so the update is there too
+  std::string answer;  // on the same connection, so the update has arrived too
   ASSERT_TRUE(RawCall(channel, "/grpc.health.v1.Health/Check", HealthRequest(""), &answer).ok());
 
   daemon.server().Shutdown(100 * sync::kMillisecond);
@@ -266,7 +266,7 @@ TEST_F(Addresses, OnesThatCannotBeHadSayWhy) {
   const auto unknown = Start({"no-such-host.invalid:1"});
   EXPECT_TRUE(absl::IsInvalidArgument(unknown.status())) << unknown.status();
   EXPECT_THAT(std::string(unknown.status().message()), HasSubstr("no-such-host.invalid"));
-  const auto elsewhere = Start({"192.0.2.1:50551"});  // nobody's own address
+  const auto elsewhere = Start({"192.0.2.1:50551"});  // an address of no machine
   EXPECT_FALSE(elsewhere.ok());
   EXPECT_THAT(std::string(elsewhere.status().message()), HasSubstr("192.0.2.1:50551"));
 }

@@ -1,4 +1,5 @@
-// StreamSession on a port of the test's: what is read, what waits, what goes on, step by step.
+// Tests StreamSession on a port of the test's: what is read, what waits, what continues, step by
+// step.
 #include "daemon/services/stream_session.h"
 
 #include <gmock/gmock.h>
@@ -74,7 +75,7 @@ class StreamSessionTest : public ::testing::Test {
   }
 
   bool AReadIsPending() const { return port_.reads > arrived_; }
-  // The pending read brings a message; false if there is none.
+  // Completes the pending read with a message; returns false if no read is pending.
   bool Arrive(const v1::StreamRequest& request) {
     if (!AReadIsPending()) return false;
     ++arrived_;
@@ -90,14 +91,14 @@ class StreamSessionTest : public ::testing::Test {
   uint64_t Arriving() { return sim_->core->budget()->used_bytes(Budget::Use::kArriving); }
   uint64_t Applied() { return sim_->GetStats().commits_accepted; }
 
-  // A commit that waits, and what fills an intake of 500 bytes behind it.
+  // Sends a commit that waits, and fills an intake of 500 bytes behind it.
   void Fill() {
     for (const v1::StreamRequest& request : CommitOf(10)) EXPECT_TRUE(Arrive(request));
     EXPECT_TRUE(Arrive(CommitOf(200)[0]));
     EXPECT_TRUE(Arrive(CommitOf(200)[0]));
     EXPECT_TRUE(Arrive(CommitOf(200)[0]));
   }
-  // An upsert that weighs at least `bytes` on the wire (256 at most), and a commit.
+  // Returns an upsert that weighs at least `bytes` on the wire (256 at most), and a commit.
   static std::vector<v1::StreamRequest> CommitOf(size_t bytes) {
     std::vector<v1::StreamRequest> requests(2);
     v1::Upsert* upsert = requests[0].mutable_upsert();
@@ -121,7 +122,7 @@ TEST_F(StreamSessionTest, WhatArrivesWhileTheIntakeIsFullWaitsAndGoesOnInOrder) 
   Limits limits;
   limits.credit_bytes = 500;
   Begin(limits);
-  // The core applies none yet. The first waits; what comes after it holds its credit.
+  // The core applies no commit yet. The first waits; those after it hold its credit.
   uint64_t commits = 0;
   while (AReadIsPending() && commits < 40) {
     const std::vector<v1::StreamRequest> commit = CommitOf(200);
@@ -144,7 +145,7 @@ TEST_F(StreamSessionTest, WhatWasReadAheadIsNotHandedToAFullIntake) {
   limits.credit_bytes = 500;
   Begin(limits);
   Fill();
-  // As if these had been on their way when it filled.
+  // As if these had been on their way when the intake filled.
   port_.reads += 2;
   EXPECT_TRUE(Arrive(CommitOf(0)[1]));
   for (const v1::StreamRequest& request : CommitOf(200)) EXPECT_TRUE(Arrive(request));
@@ -193,7 +194,7 @@ TEST_F(StreamSessionTest, OutcomesKeptForASessionThatIsTakenUpAreNotLeftUnread) 
   EXPECT_FALSE(port_.finished.has_value());
   WriteAll();
   EXPECT_EQ(port_.outcomes, 40u);
-  // Its own are, however many there were before.
+  // Its own outcomes are sent, however many there were before.
   for (int i = 0; i < 60 && !port_.finished.has_value(); ++i) session_->OnReceipt(outcome(0));
   ASSERT_TRUE(port_.finished.has_value());
   EXPECT_EQ(port_.finished->code(), absl::StatusCode::kResourceExhausted);
@@ -228,7 +229,7 @@ TEST_F(StreamSessionTest, WhatWaitsWhenTheClientIsGoneIsDroppedAndGivenBack) {
   ASSERT_TRUE(port_.finished.has_value());
   session_->OnPortDone();
   EXPECT_EQ(Arriving(), 0u);
-  session_->OnTurn();  // late ones find nothing
+  session_->OnTurn();  // late ones have no effect
   session_->OnAlarm();
   sim_->core->Step();
   EXPECT_EQ(Applied(), 1u) << "what had been handed over";

@@ -1,4 +1,4 @@
-// SceneService.Stream against a real server.
+// Tests SceneService.Stream with a real server.
 #include <gmock/gmock.h>
 
 #include <set>
@@ -60,7 +60,7 @@ TEST(Stream, OpenMustComeInTime) {
   const grpc::Status status = silent.Finish();
   EXPECT_EQ(status.error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
   EXPECT_THAT(status.error_message(), HasSubstr("no open came within 50 ms"));
-  open.Commit(1);  // later than that, and of no concern to it
+  open.Commit(1);  // later than that, and without effect on it
   open.ReadOutcomes(1);
 }
 
@@ -256,7 +256,7 @@ TEST(Stream, CreditComesForWhatIsApplied) {
   uint64_t credit = client.Open().credit_bytes();
   const uint64_t first = credit;
   uint64_t sent = 0;
-  // Never more than the credit, and yet it goes on.
+  // Never more than the credit at once, and yet it continues.
   for (uint64_t frame = 1; sent < 10 * limits.credit_bytes; ++frame) {
     const v1::StreamRequest upsert = SphereIn("layer", "ball");
     v1::StreamRequest commit;
@@ -408,7 +408,7 @@ TEST(Stream, MessagesKeepTheirOrder) {
   v1::Open open;
   open.set_no_outcomes(true);
   client.Open(open);
-  // One that overtook another would leave a frame open, or stand outside it.
+  // If one overtook another, it would leave a frame open, or be outside it.
   constexpr int kFrames = 500;
   for (int i = 1; i <= kFrames; ++i) {
     v1::StreamRequest request;
@@ -457,8 +457,8 @@ TEST(Stream, AClientThatDoesNotReadIsEnded) {
   Daemon daemon({.max_queued_answers = 100});
   Client client(daemon.scene());
   client.Open();
-  // Each commit is answered; none is read,
-  // until flow control stops the answers and the queue fills.
+  // Each commit is answered, but no answer is read, until flow control stops the answers and the
+  // queue fills.
   int sent = 0;
   while (client.Commit(1) && sent < 1'000'000) ++sent;
   EXPECT_LT(sent, 1'000'000);

@@ -1,4 +1,5 @@
-// Uploads that end while something of them is under way: told to, or for want of memory.
+// Tests uploads that end while a part of them is under way: because they were told to, or because
+// they ran out of memory.
 #include <gmock/gmock.h>
 #include <unistd.h>
 
@@ -27,12 +28,12 @@ using assets::DiskCalls;
 using grpc::StatusCode;
 using ::testing::HasSubstr;
 
-// By sha256sum.
+// The hash is from sha256sum.
 const std::string kHello = "hello";
 const std::string kHelloDigest =
     absl::HexStringToBytes("2cf24dba5fb0a30e26e83b2ac5b9e29e1b161e5c1fa7425e73043362938b9824");
 
-// Stands still, and counts how often it is asked.
+// A clock that stands still, and counts how often it is read.
 class StandingClock final : public sync::Clock {
  public:
   sync::TimeNs Now() const override {
@@ -67,7 +68,7 @@ class UploadAsset : public ::testing::Test {
     options.assets = store_.get();
     daemon_ = std::make_unique<Daemon>(options);
   }
-  // Whoever uploads has a token, which can be taken away.
+  // Starts the daemon with a token for uploads, which can be revoked.
   void StartWithToken() {
     PutGrants(absl::StrCat("[[token]]\nname = \"painter\"\nsha256 = \"", access::HashOf("painter"),
                            "\"\nscopes = [\"draw\"]\n"));
@@ -83,7 +84,7 @@ class UploadAsset : public ::testing::Test {
     painters_ = v1::SceneService::NewStub(grpc::CreateChannel(
         daemon_->server().addresses()[1].ToString(), grpc::InsecureChannelCredentials()));
   }
-  // Its calls have been told to end when this returns.
+  // Revokes the token. When this returns, its calls have been told to end.
   void TakeTokenAway() {
     PutGrants("");
     ASSERT_TRUE(access_->Look(true).ok());
@@ -128,7 +129,7 @@ class UploadAsset : public ::testing::Test {
   std::unique_ptr<v1::SceneService::Stub> painters_;
 };
 
-// The first call of that kind waits until it may go on.
+// The first call of that kind waits until it is released.
 class Held {
  public:
   explicit Held(DiskCall kind)
@@ -195,7 +196,7 @@ TEST_F(UploadAsset, BegunWhileTheServerEndsItEndsToo) {
   Call late(daemon_->scene());
   grpc::ClientContext asks;
   SetDeadline(asks);
-  v1::ListAssetsResponse listed;  // comes behind the late one
+  v1::ListAssetsResponse listed;  // arrives after the late one
   EXPECT_TRUE(daemon_->scene().ListAssets(&asks, {}, &listed).ok());
   disk.GoOn();
   for (Call* call : {&first, &late}) {
@@ -235,7 +236,7 @@ TEST_F(UploadAsset, IsSilentByTheServersClockAlone) {
   Call call(daemon_->scene());
   ASSERT_TRUE(call.Send("hel"));
   AwaitStored(3);
-  // Its alarm goes off again and again, and asks the time.
+  // Its alarm fires again and again, and reads the clock.
   for (const uint64_t asked = clock.asked(); clock.asked() < asked + 100;) {
     std::this_thread::yield();
   }

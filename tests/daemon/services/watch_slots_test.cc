@@ -22,7 +22,7 @@ TEST(WatchSlots, AreAsManyAsAllowed) {
   EXPECT_THAT(refused.message(), HasSubstr("2 watches of volumes are open, which is "
                                            "max_volume_watches"));
   first->Release();
-  first->Release();  // twice is once
+  first->Release();  // releasing twice is the same as once
   EXPECT_TRUE(slots.Take("user 3").ok());
 }
 

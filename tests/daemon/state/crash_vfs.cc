@@ -180,7 +180,7 @@ bool CrashDisk::Step() {
 void CrashDisk::PowerCycle(uint32_t seed) {
   std::mt19937 lot(seed);
   const auto heads = [&] { return (lot() & 1) != 0; };
-  // Removals that nobody synced may not have happened.
+  // Removals that were not synced may not have happened.
   for (auto& [name, file] : removed_) {
     if (!files_.contains(name) && heads()) files_[name] = file;
   }
@@ -197,7 +197,7 @@ void CrashDisk::PowerCycle(uint32_t seed) {
         if (heads()) after.resize(write.at);
         continue;
       }
-      // Sector by sector: there, or not.
+      // Each sector is there, or not.
       for (uint64_t at = write.at; at < write.at + write.bytes.size();) {
         const uint64_t end =
             std::min<uint64_t>((at / kSector + 1) * kSector, write.at + write.bytes.size());

@@ -1,10 +1,11 @@
-// A disk that forgets: a VFS for SQLite that holds files in memory, and knows of each write whether it was
-// synced. When the power goes at a chosen point, whatever was not is there, or not, or in part, by lot.
+// A disk that loses unsynced data: a VFS for SQLite that holds files in memory, and records for
+// each write whether it was synced. When the power fails at a chosen point, everything that was not
+// synced is there, or not, or in part, at random.
 //
-// It takes fsync at its word, sectors of 512 bytes as what is written whole or not at all, and the order of
-// unsynced writes as nobody's: the worst that SQLite says it lives with (its PSOW is not claimed). Which
-// files there are is unsynced as well until the folder is, which SQLite's own VFS does with the first sync
-// of a journal that it has made.
+// It trusts fsync, treats sectors of 512 bytes as atomic, and assumes no order of unsynced writes:
+// the worst case that SQLite claims to survive (its PSOW is not claimed). The existence of files is
+// unsynced as well until the folder is synced, which SQLite's own VFS does with the first sync of a
+// journal that it has made.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +21,8 @@ class CrashDisk {
  public:
   static constexpr size_t kSector = 512;
 
-  // Under the name `vfs`, until it goes. One file system for all that is opened with it.
+  // Registered under the name `vfs` until it is destroyed. One file system for all files that are
+  // opened with it.
   explicit CrashDisk(std::string vfs);
   ~CrashDisk();
   CrashDisk(const CrashDisk&) = delete;
@@ -28,13 +30,13 @@ class CrashDisk {
 
   const std::string& vfs() const { return vfs_; }
 
-  // Calls that change something or sync it, so far.
+  // Returns the number of calls so far that change something or sync it.
   uint64_t steps() const { return steps_; }
-  // From this step on everything fails, as if the machine had stopped there.
+  // From this step on every call fails, as if the machine had stopped there.
   void StopAt(uint64_t step) { stop_at_ = step; }
   bool stopped() const { return steps_ >= stop_at_; }
 
-  // The n-th call of any kind from now on, reading included, fails once with an error of the disk's; 0: none.
+  // The n-th call of any kind from now on, including reads, fails once with an I/O error; 0: none.
   void FailCall(uint64_t n) {
     calls_ = 0;
     fails_at_ = n;
@@ -42,13 +44,14 @@ class CrashDisk {
   // Since FailCall.
   uint64_t calls() const { return calls_; }
 
-  // The power was off and is back: what was not synced is lost by lot. All files are closed.
+  // The power was off and is back: data that was not synced is lost at random. All files are
+  // closed.
   void PowerCycle(uint32_t seed);
 
-  // Room left; writes that would need more fail with SQLITE_FULL.
+  // Sets the room left; writes that would need more fail with SQLITE_FULL.
   void SetRoom(uint64_t bytes) { room_ = bytes; }
 
-  // Flips bits of what lies in the file, synced.
+  // Flips bits of the file's synced data.
   void Damage(const std::string& name, size_t at, uint8_t with);
   size_t SizeOf(const std::string& name) const;
 
@@ -57,19 +60,19 @@ class CrashDisk {
   friend struct CrashCalls;
 
   struct File {
-    std::string now;     // as the running machine sees it
-    std::string synced;  // as it is after the power was off, at least
+    std::string now;     // the content as the running machine sees it
+    std::string synced;  // the content that is certain after the power was off
     struct Write {
       uint64_t at = 0;
       std::string bytes;
-      bool truncate = false;  // to `at`
+      bool truncate = false;  // truncates to `at`
     };
     std::vector<Write> unsynced;
     bool exists_synced = false;
   };
 
   void SyncFolder();
-  bool Step();  // false: the machine has stopped
+  bool Step();  // returns false once the machine has stopped
   bool Fails() { return ++calls_ == fails_at_; }
 
   const std::string vfs_;

@@ -1,4 +1,4 @@
-// When what is kept is written, and what becomes of a file that fails.
+// Tests when persistent state is written, and how file errors are handled.
 #include "daemon/state/keeper.h"
 
 #include <gmock/gmock.h>
@@ -105,7 +105,8 @@ TEST_F(KeeperTest, OnlyWhatDiffersIsWritten) {
     Commit(absl::StrCat("e", i));
     AwaitDurable(newest());
   }
-  // The first writes the owner and the layer as well; a layer's entities are not its own row's.
+  // The first writes the owner and the layer as well; entities of a layer are not part of the
+  // layer's own row.
   EXPECT_EQ(keeper_->figures().rows, 52u);
 }
 
@@ -138,7 +139,7 @@ TEST_F(KeeperTest, AFileThatIsDamagedIsReplacedByWhatTheSceneHas) {
   Begin();
   Commit("first");
   AwaitDurable(newest());
-  keeper_.reset();  // which puts all into the file itself
+  keeper_.reset();  // which writes everything into the file itself
   {
     std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
     for (std::streamoff at = 100; at < 12'000; at += 97) file.seekp(at).put('Z');
@@ -152,7 +153,8 @@ TEST_F(KeeperTest, AFileThatIsDamagedIsReplacedByWhatTheSceneHas) {
   EXPECT_EQ(std::remove((path_ + ".damaged-1").c_str()), 0);
 }
 
-// ------------------------------------------------------------------------------------ seen from a client
+// ------------------------------------------------------------------------------------ the client's
+// view
 
 class RecordingState final : public StateSink {
  public:

@@ -1,4 +1,5 @@
-// What is kept comes back the same: random scenes through the file into another core.
+// Tests that persistent state is restored unchanged: random scenes through the file into another
+// core.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -31,7 +32,8 @@ using testing::StoreFixture;
 
 constexpr int64_t kUnixNs = 1'700'000'000'000'000'000;
 
-// All that must come back, in words: of layers their order among themselves instead of their numbers.
+// Returns everything that must be restored, as text: the order of layers among themselves instead
+// of their numbers.
 std::string KeptInWords(const SnapshotPtr& snapshot, sync::TimeNs now) {
   const SnapshotPtr view = KeptView(snapshot);
   std::vector<std::pair<uint64_t, std::string>> layers;
@@ -88,7 +90,7 @@ class KeptScene : public ::testing::Test {
         KeeperOptions{.interval_ns = 0, .unix_ns = [](sync::TimeNs now) { return kUnixNs + now; }},
         clock_);
   }
-  // Into a core of its own, which lives as long as the answer's snapshot is looked at.
+  // Restores into a core of its own, which must live as long as the returned snapshot is used.
   SnapshotPtr Restored(std::unique_ptr<Core>* core, uint64_t* expired = nullptr) {
     const auto file = OpenFile();
     *core = std::make_unique<Core>(CoreOptions{.version = "test", .threads = false}, clock_);
@@ -104,12 +106,12 @@ class KeptScene : public ::testing::Test {
 
   int64_t UnixNs() const { return kUnixNs + clock_.Now(); }
 
-  OwnerRecords owners_;  // as they were restored last
+  OwnerRecords owners_;  // as last restored
   const std::string folder_ = absl::StrCat(::testing::TempDir(), "/voxeld-kept-", getpid());
   sync::FakeClock clock_;
 };
 
-// As a file that somebody wrote may have them; the stack does not grow with it.
+// As in a file written by others; the stack does not grow with the chain.
 TEST_F(KeptScene, ObjectsInALongChainAreRead) {
   constexpr int kObjects = 50'000;
   const auto name = [](int i) { return absl::StrCat("o", 1'000'000 + i); };
@@ -207,7 +209,7 @@ TEST_F(KeptScene, RandomScenesComeBackTheSame) {
     EXPECT_EQ(KeptInWords(restored, clock_.Now()), before);
     EXPECT_EQ(testing::CheckIndices(*restored), "");
 
-    // And again, as what was restored goes on being kept.
+    // And again, since restored state continues to be persistent.
     auto again = MakeKeeper();
     again->Knows(restored, owners_);
     again->Offer(restored, records, true);
@@ -262,7 +264,7 @@ TEST_F(KeptScene, OwnersComeBackWithTheirTokensQuotasAndNames) {
   EXPECT_EQ(owners[0].principal, "stage");
   EXPECT_EQ(owners[0].max_bytes, 5000000u);
   EXPECT_EQ(owners[0].orphaned_layers, 1u);
-  // Who has the token, or the name, is the owner again.
+  // A client with the token, or the name, is the owner again.
   for (const OpenOptions& open :
        {OpenOptions{.owner_token = "nine"}, OpenOptions{.principal = "stage"}, OpenOptions{}}) {
     absl::StatusOr<SessionInfo> info;
@@ -286,7 +288,7 @@ TEST_F(KeptScene, LifetimesGoOnByTheWallClock) {
   keeper->Offer(f.store.snapshot(),
                 std::make_shared<const OwnerRecords>(OwnerRecords{{1, {.token = "one"}}}), true);
   ASSERT_TRUE(keeper->Stop().ok());
-  // The machine was off for four seconds, and its monotonic clock begins anew.
+  // The machine was off for four seconds, and its monotonic clock starts again.
   const auto file = OpenFile();
   sync::FakeClock later;
   Core core({.version = "test", .threads = false}, later);
@@ -321,7 +323,7 @@ TEST_F(KeptScene, RowsThatAreWrongAreLeftOutAndTheOthersCome) {
   ASSERT_EQ(state->why.size(), 3u);
   EXPECT_TRUE(state->why[2].ends_with("its layer is not there")) << state->why[2];
   EXPECT_EQ(state->layers, 1u);
-  // What a message may be now is no limit of what was taken before.
+  // The present limit on messages does not apply to what was accepted before.
   Limits small;
   small.max_message_bytes = 1;
   state = ReadState(*file, {clock_.Now(), kUnixNs}, small, nullptr, nullptr);
@@ -329,7 +331,7 @@ TEST_F(KeptScene, RowsThatAreWrongAreLeftOutAndTheOthersCome) {
   EXPECT_EQ(state->entities, 1u);
 }
 
-// Rows of every kind that cannot be read, and rows of owners that are not there.
+// Unreadable rows of every kind, and rows of owners that do not exist.
 TEST_F(KeptScene, EachRowThatIsLeftOutIsToldUpToALimit) {
   const auto file = OpenFile();
   const std::string wrong = "\xff\xff\xff";
@@ -363,7 +365,7 @@ TEST_F(KeptScene, EachRowThatIsLeftOutIsToldUpToALimit) {
   EXPECT_EQ(state->why.size(), RestoredState::kMostSaid);
 }
 
-// Steps are of a bounded size; what they hold is what was kept, in whole.
+// Steps are of a bounded size; together they hold everything that was persistent.
 TEST_F(KeptScene, ALargeLayerComesInSeveralSteps) {
   constexpr size_t kEntities = 4096 + 1;
   StoreFixture f;
@@ -390,7 +392,7 @@ TEST_F(KeptScene, ALargeLayerComesInSeveralSteps) {
   EXPECT_EQ(all, kEntities + 1) << "and the layer";
 }
 
-// What is made of an object whose row is lost is refused by name, and nothing else is.
+// Only what refers to an object whose row is lost is refused, by name.
 TEST_F(KeptScene, WhatRefersToALostObjectIsNotRestored) {
   StoreFixture f;
   f.CommitAll(

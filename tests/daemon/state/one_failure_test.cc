@@ -1,4 +1,5 @@
-// The state file where one thing fails once, each in its turn, in ten lives of it: what SQLite asks of the disk, and of memory.
+// Tests the state file when one thing fails once, each in its turn, in ten lives of the file:
+// SQLite's calls to the disk, and its allocations.
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
@@ -18,7 +19,7 @@
 namespace voxeld::daemon::state {
 namespace {
 
-// Of each call and allocation; sanitizers make them long, and have every fifth.
+// Fails each call and allocation; sanitizers make this slow, so there only every fifth fails.
 #ifdef VOXELD_SANITIZED
 constexpr uint64_t kStep = 5;
 #else
@@ -38,7 +39,7 @@ absl::Status RowsOf(StateFile& file, Rows* rows) {
       [&](const RowKey& key, std::string_view bytes) { rows->emplace(key, std::string(bytes)); });
 }
 
-// What a transaction leaves.
+// Applies a transaction to the model.
 void Carry(const std::vector<Change>& changes, Rows* model) {
   for (const Change& change : changes) {
     switch (change.what) {
@@ -68,7 +69,7 @@ Change Put(const RowKey& key, size_t size, int turn) {
   return {Change::What::kPut, key, std::string(size, static_cast<char>('a' + turn % 26))};
 }
 
-// The turn-th transaction; some rows do not fit into a page.
+// Returns the turn-th transaction; some rows do not fit into a page.
 std::vector<Change> Mixed(int turn) {
   std::vector<Change> changes;
   for (int i = 0; i < 8; ++i) {
@@ -112,14 +113,14 @@ absl::Status Apply(StateFile& file, std::vector<Change> changes) {
   return file.Apply([&] { return std::exchange(changes, {}); });
 }
 
-// A life of a file: what there is before, and what is done with it.
+// A life of a file: its state at first, and the actions on it.
 struct Life {
   const char* name;
-  int before;  // transactions that made the file; 0: there is none
+  int before;  // transactions that made the file; 0: no file exists
   int turns;   // transactions
   std::vector<Change> (*changes)(int turn);
   bool reopens = false;    // before each turn
-  bool power_off = false;  // it was, while a transaction was written
+  bool power_off = false;  // the power was off while a transaction was written
   uint64_t least_calls = 50;
 };
 void PrintTo(const Life& life, std::ostream* out) { *out << life.name; }
@@ -139,8 +140,8 @@ const Life kLives[] = {
 
 class OneFailure : public ::testing::TestWithParam<Life> {
  protected:
-  // Opened, read, written to. Whatever fails is tried again, which has to work, as nothing fails
-  // twice; it must have changed nothing. `failed`: how often something did.
+  // Opens, reads and writes the file. An action that fails is tried again, which must succeed since
+  // nothing fails twice; the failure must have changed nothing. `failed`: the number of failures.
   void Live(CrashDisk& disk, int* failed, Rows* model) const;
   void MakeFile(CrashDisk& disk, Rows* model) const;
   static void ExpectKept(CrashDisk& disk, const Rows& model);
@@ -206,7 +207,7 @@ void OneFailure::MakeFile(CrashDisk& disk, Rows* model) const {
     Carry(changes, model);
   }
   if (!life.power_off) return;
-  // While the next one is written: in its log is the beginning of it.
+  // While the next one is written: its log has the beginning of it.
   disk.StopAt(disk.steps() + 3);
   ASSERT_FALSE(Apply(**file, life.changes(life.before)).ok());
   file->reset();
@@ -223,7 +224,8 @@ void OneFailure::ExpectKept(CrashDisk& disk, const Rows& model) {
   EXPECT_EQ(rows, model) << "after it was opened anew";
 }
 
-// What a life asks for at all, and how much of it its caller was told of when it failed.
+// Checks that a life makes enough calls, and that enough of the failures were reported to its
+// caller.
 void OneFailure::ExpectTold(uint64_t asked, int failed) const {
   EXPECT_GE(asked, GetParam().least_calls);
   EXPECT_GT(failed, static_cast<int>(asked / kStep / 3)) << "they fail, and nobody is told";
@@ -243,7 +245,7 @@ TEST_P(OneFailure, EachCallOfTheDisk) {
     if (n == 0) calls = disk.calls();
     disk.FailCall(0);
     ExpectKept(disk, model);
-    // What is told to be on the disk outlives the power too.
+    // Data reported as being on the disk also survives a power failure.
     disk.PowerCycle(static_cast<uint32_t>(n));
     ExpectKept(disk, model);
     EXPECT_EQ(now > 1, false) << "one failure was two";
@@ -266,7 +268,7 @@ void* Realloc(void* from, int bytes) {
   return MemoryFails() ? nullptr : memory.real.xRealloc(from, bytes);
 }
 
-// SQLite asks us for memory. To be made while nothing of it is open.
+// Provides SQLite's memory. Must be created while none of it is in use.
 class SqliteMemory {
  public:
   SqliteMemory() {
@@ -276,7 +278,7 @@ class SqliteMemory {
     own.xMalloc = &Malloc;
     own.xRealloc = &Realloc;
     EXPECT_EQ(sqlite3_config(SQLITE_CONFIG_MALLOC, &own), SQLITE_OK);
-    // It keeps pieces for itself that would then be given without a question.
+    // SQLite keeps pieces for itself that would then be given out without a call.
     EXPECT_EQ(sqlite3_config(SQLITE_CONFIG_LOOKASIDE, 0, 0), SQLITE_OK);
     sqlite3_initialize();
   }

@@ -147,7 +147,7 @@ TEST_F(StateFileTest, TriggersAndTablesOfOthersHaveNoSay) {
 }
 
 TEST_F(StateFileTest, RowsOutOfOrderArePutAside) {
-  // Rows are found by their order: one that stands elsewhere can be read, and not removed.
+  // Rows are found by their order: one in the wrong place can be read, but not removed.
   {
     auto file = Open();
     ASSERT_TRUE(file.ok());
@@ -196,7 +196,7 @@ absl::StatusOr<std::unique_ptr<StateFile>> OpenOn(const CrashDisk& disk) {
       {.path = "/state.db", .vfs = disk.vfs(), .now = [] { return int64_t{1}; }});
 }
 
-// Transactions of random rows, as a client's commits would make them, some large.
+// Returns transactions of random rows, as a client's commits would make them, some of them large.
 std::vector<Change> RandomChanges(std::mt19937& lot, Rows& model) {
   std::vector<Change> changes;
   const size_t count = 1 + lot() % 20;
@@ -225,8 +225,8 @@ std::vector<Change> RandomChanges(std::mt19937& lot, Rows& model) {
   return changes;
 }
 
-// Runs until the machine stops at `cut`; answers what Apply has said to be on the disk, and what was
-// under way.
+// The result of running until the machine stops at `cut`: the rows that Apply has reported to be on
+// the disk, and those under way.
 struct Lost {
   Rows durable, under_way;
   uint64_t steps = 0;
@@ -264,7 +264,7 @@ TEST(PowerLoss, NoDurableTransactionIsLostAndNoneIsHalfThereAtAThousandPoints) {
     ASSERT_TRUE(file.ok()) << "cut at " << cut << ": " << file.status();
     EXPECT_EQ((*file)->quarantined(), "") << "cut at " << cut;
     const Rows rows = AllRows(**file);
-    // The one under way may have come through whole.
+    // The transaction under way may have been written whole.
     ASSERT_TRUE(rows == lost.durable || rows == lost.under_way) << "cut at " << cut;
     with_more += rows != lost.durable;
     ASSERT_TRUE(Put(**file, {PutOf(kEntity, "goes on")}).ok()) << "cut at " << cut;
@@ -273,7 +273,8 @@ TEST(PowerLoss, NoDurableTransactionIsLostAndNoneIsHalfThereAtAThousandPoints) {
 }
 
 TEST(PowerLoss, ADiskThatForgetsMoreIsFoundOut) {
-  // The disk itself is judged: without syncs something must get lost, or it would prove nothing.
+  // The disk itself is judged: without syncs, something must get lost; otherwise it would prove
+  // nothing.
   size_t lost_some = 0;
   for (uint32_t seed = 0; seed < 20; ++seed) {
     CrashDisk disk("liar");

@@ -1,4 +1,4 @@
-// Letters from the fonts that the tests' machines have (fonts-dejavu-core).
+// Tests letters of the fonts on the tests' machines (fonts-dejavu-core).
 #include "daemon/text/fonts.h"
 
 #include <gmock/gmock.h>
@@ -94,13 +94,13 @@ TEST_F(FontsTest, LongLinesAreBrokenBetweenWords) {
 }
 
 TEST_F(FontsTest, ArabicJoinsAndRunsFromRightToLeft) {
-  // beh alone, and beh before beh: another form of it.
+  // beh alone, and beh before beh, which has another form.
   const LaidOut alone = Lay("\xD8\xA8"), two = Lay("\xD8\xA8\xD8\xA8");
   ASSERT_EQ(alone.glyphs.size(), 1u);
   ASSERT_EQ(two.glyphs.size(), 2u);
   EXPECT_NE(two.glyphs[0].glyph, alone.glyphs[0].glyph);
   EXPECT_NE(two.glyphs[0].glyph, two.glyphs[1].glyph);
-  // Hebrew: alef, then bet, which stands to the left of it; digits in between stay as they are.
+  // Hebrew: alef, then bet, which is to the left of it; digits in between keep their order.
   const LaidOut hebrew = Lay("\xD7\x90\xD7\x91"), alef = Lay("\xD7\x90");
   ASSERT_EQ(hebrew.glyphs.size(), 2u);
   EXPECT_EQ(hebrew.glyphs[1].glyph, alef.glyphs[0].glyph);
@@ -111,7 +111,7 @@ TEST_F(FontsTest, ArabicJoinsAndRunsFromRightToLeft) {
 }
 
 TEST_F(FontsTest, WhatNoFontHasIsSaid) {
-  // U+10FFFE is no character, and will be none.
+  // U+10FFFE is a noncharacter.
   EXPECT_EQ(fonts_.Lay("a\xF4\x8F\xBF\xBE", {}).status(),
             absl::InvalidArgumentError("has U+10fffe, which no font of the server has"));
   EXPECT_EQ(Lay("a\xE2\x80\x8D\tb").glyphs.size(), 2u) << "joiners and tabs are not seen";

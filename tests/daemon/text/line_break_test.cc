@@ -7,7 +7,7 @@
 namespace voxeld::text {
 namespace {
 
-// Letters are words of width 1, blanks are blanks; lines come back with | between them.
+// Letters are words of width 1, blanks are blanks; lines are returned with | between them.
 std::string Broken(const std::string& text, double width) {
   std::vector<Word> words;
   for (size_t i = 0; i < text.size(); ++i) words.push_back({i, i + 1, 1, text[i] == ' '});

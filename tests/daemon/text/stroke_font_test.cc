@@ -11,7 +11,7 @@ TEST(StrokeFont, LettersStandOnTheBaselineAndHaveTheirHeight) {
   const absl::StatusOr<StrokeFont> font = StrokeFont::Load("futural");
   ASSERT_TRUE(font.ok()) << font.status();
   const StrokeFont::Line line = font->Lay("HE");
-  // Two posts and a bar; a post and three bars, of which some may be one stroke.
+  // Two posts and a bar; a post and three bars, some of which may be one stroke.
   EXPECT_GE(line.strokes.size(), 5u);
   float least = 9, most = -9, right = 0;
   for (const Stroke& stroke : line.strokes) {

@@ -1,4 +1,5 @@
-// What a command line has, as a table, as a manual page, and in what is said of wrong ones.
+// Tests the description of a command line: as a table, as a manual page, and in the errors for
+// wrong ones.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

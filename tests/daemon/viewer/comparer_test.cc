@@ -1,4 +1,4 @@
-// Scenes drawn as they were sent: what the engine has of them is what the comparison counts.
+// Tests scenes drawn as they were sent: what the engine has drawn is what the comparison counts.
 #include "daemon/viewer/comparer.h"
 
 #include <gtest/gtest.h>
@@ -65,13 +65,13 @@ TEST_F(ComparerTest, VoxelsAreWhereTheSceneHasThem) {
   EXPECT_EQ(c->voxels, 2u);
   EXPECT_EQ(c->missing, 2u) << "nothing is shown";
   ASSERT_EQ(c->sent.size(), 2u);
-  // Voxel (2, 0, 0) of cells of 1 by 1 by 2 mm from −4 on; the box is around their centres.
+  // Voxel (2, 0, 0) of cells of 1 by 1 by 2 mm from −4 on; the box surrounds their centres.
   EXPECT_NEAR(c->sent.x[0] * 7.0 / kPlaceSteps - 3.5, -1.5, 0.001);
   EXPECT_NEAR(c->sent.y[0] * 7.0 / kPlaceSteps - 3.5, -3.5, 0.001);
   EXPECT_NEAR(c->sent.z[0] * 6.0 / kPlaceSteps - 3, -3, 0.001);
   EXPECT_EQ(c->sent.rgb[0], 255);
 
-  // The next scene, and the one before again: by what differs.
+  // The next scene, and then the previous one again: only the differences are applied.
   const Comparer::Task before = TaskOf();
   scene_.Commit(DeleteId("a", "x"), Put("b", "z", 6), Put("b", "w", 7));
   EXPECT_EQ(Run(TaskOf())->voxels, 3u);
@@ -145,7 +145,7 @@ TEST_F(ComparerTest, ASceneThatNobodyAsksForAnyMoreIsLetGo) {
   task.done = [&](const absl::StatusOr<Comparison>& c) { promise.set_value(c.ok()); };
   comparer.Post(std::move(task));
   EXPECT_TRUE(promise.get_future().get());
-  scene_.Commit(DeleteId("a", "x"));  // from now on it is the comparer's alone
+  scene_.Commit(DeleteId("a", "x"));  // from now on only the comparer holds it
   idle();
   clock.Advance(Comparer::kLinger - 1);
   idle();
@@ -161,7 +161,7 @@ TEST_F(ComparerTest, OneMoreThanMayWaitIsRefusedAndThoseThatWaitAreCancelledAtTh
   Comparer::Task first = TaskOf();
   first.done = [&](const absl::StatusOr<Comparison>&) {
     first_is_done.set_value();
-    go_on.get_future().wait();  // the thread is held up here, and nothing else is begun
+    go_on.get_future().wait();  // the thread is blocked here, and no other task is started
   };
   comparer->Post(std::move(first));
   first_is_done.get_future().wait();

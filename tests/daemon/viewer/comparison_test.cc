@@ -1,4 +1,4 @@
-// Comparisons of scenes and lights that are counted by hand.
+// Tests comparisons of scenes and lights that were counted by hand.
 #include "daemon/viewer/comparison.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ using Cell = std::tuple<int, int, int>;
 class ComparisonTest : public ::testing::Test {
  protected:
   void Send(int x, int y, int z, uint32_t rgb) { voxels_[{x, y, z}] = rgb; }
-  // A light in the middle of a cell, or `off` millimetres from it along x.
+  // Lights a pixel in the middle of a cell, or `off` millimetres from it along x.
   void Show(int x, int y, int z, uint32_t rgb, double off = 0) {
     const auto step = [](double mm, int n) {
       return static_cast<uint16_t>(mm / n * kPlaceSteps + 0.5);
@@ -70,7 +70,7 @@ TEST_F(ComparisonTest, NothingIsTheSameAsNothing) {
   EXPECT_EQ(c.voxels + c.missing + c.pixels + c.stray + c.off, 0u);
   EXPECT_EQ(c.sent.size() + c.difference.size(), 0u);
   EXPECT_EQ(c.mean, 0);
-  // The box is around the centres of voxels and the places of pixels, which reach farther here.
+  // The box surrounds the centres of voxels and the places of pixels, which reach farther here.
   EXPECT_EQ(c.box.low_mm, (display::Vec3{0, 0, 0}));
   EXPECT_EQ(c.box.high_mm, (display::Vec3{8, 6, 5}));
   EXPECT_EQ(c.pitch_mm, 1);
@@ -107,7 +107,7 @@ TEST_F(ComparisonTest, AVoxelWithoutLightNearIsMissing) {
   EXPECT_EQ(c.stray, 1u);
   EXPECT_EQ(c.off, 0u);
   ASSERT_EQ(c.difference.size(), 2u);
-  // Blue at the voxel, orange at the pixel, both as bright as their greatest channel, which is all there is.
+  // Blue at the voxel, orange at the pixel, each as bright as its greatest channel.
   const auto place = [&](size_t i) { return c.difference.x[i] * 8.0 / kPlaceSteps; };
   const size_t missing = place(0) < place(1) ? 0 : 1, stray = 1 - missing;
   EXPECT_NEAR(place(missing), 5.5, 0.001);
@@ -131,7 +131,7 @@ TEST_F(ComparisonTest, ThePlanesBetweenDoNotHideALightThatIsTooFar) {
 TEST_F(ComparisonTest, TheVoxelThatAPixelIsLikestCounts) {
   Send(2, 2, 2, 0xFF0000);
   Send(3, 2, 2, 0x00FF00);
-  Show(2, 2, 2, 0x00F000);  // in the red one's cell, like the green one but for 15
+  Show(2, 2, 2, 0x00F000);  // in the cell of the red one, like the green one except for 15
   Show(3, 2, 2, 0xC80000);  // 55 darker than the red one
   const Comparison c = Run();
   EXPECT_EQ(c.missing + c.stray, 0u);
@@ -152,7 +152,7 @@ TEST_F(ComparisonTest, ALevelOfTheDisplayIsNoDifference) {
   const Comparison c = Run();
   EXPECT_EQ(c.off, 0u);
   EXPECT_EQ(c.most, 0x80 - 0x55);
-  layout_.sub_frames = 4;  // in which levels between can be had: 21 of blue
+  layout_.sub_frames = 4;  // with which levels in between are possible: 21 of blue
   EXPECT_EQ(Run().off, 1u);
 }
 
@@ -302,7 +302,7 @@ TEST_F(ComparisonTest, OfManyPointsAPartIsDrawnAndAllAreCounted) {
     EXPECT_LT(points->size(), Comparison::kMostPoints);
     EXPECT_GE(points->size(), Comparison::kMostPoints / 2);
     EXPECT_EQ(points->rgb.size(), 3 * points->size());
-    // Of the last plane as of the first.
+    // The last plane, like the first.
     EXPECT_LT(points->z.front(), kPlaceSteps / 80);
     EXPECT_GT(points->z.back(), kPlaceSteps - kPlaceSteps / 80);
   }

@@ -15,7 +15,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// What is wrong with it; empty: nothing.
+// Returns what is wrong with the message; empty: nothing.
 std::string Wrong(const std::string& text, bool control = true) {
   const absl::StatusOr<Message> message = Read(text, control);
   if (message.ok()) return "";

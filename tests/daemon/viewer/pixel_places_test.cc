@@ -1,4 +1,4 @@
-// Places that a page is told, beside where the geometry says that pixels are.
+// Compares the places that a page receives with the positions of pixels according to the geometry.
 #include "daemon/viewer/pixel_places.h"
 
 #include <gtest/gtest.h>
@@ -61,7 +61,7 @@ Geometry Helix() {
 
 class PlacesOf : public ::testing::TestWithParam<Geometry (*)()> {};
 
-// Every pixel by itself: the one place that comes is its own, within half a step.
+// Every pixel by itself: the only place that arrives is its own, within half a step.
 TEST_P(PlacesOf, EveryPixel) {
   const Geometry geometry = GetParam()();
   ASSERT_TRUE(display::ValidateGeometry(geometry).ok()) << display::ValidateGeometry(geometry);

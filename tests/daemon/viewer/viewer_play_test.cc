@@ -1,4 +1,5 @@
-// Files that pages send over HTTP: who may, and what all pages are told. Scripts are in voxelctl's place.
+// Tests files that pages send over HTTP: who may send them, and which messages all pages receive.
+// Scripts run in place of voxelctl.
 #include "daemon/viewer/viewer_play.h"
 
 #include <gmock/gmock.h>
@@ -35,7 +36,7 @@ using ::testing::Not;
 
 constexpr char kOrigin[] = "http://localhost:8088";
 
-// Where temporary files are while it is there.
+// Sets the folder of temporary files while it exists.
 class TemporaryFiles {
  public:
   explicit TemporaryFiles(const std::string& path) {
@@ -84,7 +85,7 @@ class ViewerPlayTest : public ::testing::Test {
     player_ = *std::move(player);
   }
 
-  // `script`: none: nothing is played.
+  // If `script` is empty, nothing can be played.
   void Start(const std::string& script, ViewerPlayOptions options = {},
              sync::TimeNs answer_limit = 60 * sync::kSecond) {
     if (script.empty()) {
@@ -150,7 +151,7 @@ class ViewerPlayTest : public ::testing::Test {
   static void Say(Page& page, const nlohmann::json& message) {
     page.write(boost::asio::buffer(message.dump()));
   }
-  // The next message, if it is the one that has `key`.
+  // Reads the next message, which must have `key`.
   static nlohmann::json HearOf(Page& page, const std::string& key) {
     boost::beast::flat_buffer buffer;
     page.read(buffer);
@@ -208,7 +209,7 @@ TEST_F(ViewerPlayTest, TheyAreToldWhyItDoesNotPlay) {
   EXPECT_EQ(Post("/play?name=bad.obj").result_int(), 202u);
   nlohmann::json failed;
   while (!failed.contains("failed"))
-    failed = HearOf(*page, "play");  // it may be told before that it plays
+    failed = HearOf(*page, "play");  // a message that it plays may come first
   EXPECT_FALSE(failed.contains("playing"));
   EXPECT_EQ(failed["failed"], "bad.obj");
   EXPECT_EQ(failed["why"], "bad.obj: is not a model");
@@ -246,7 +247,7 @@ TEST_F(ViewerPlayTest, IsForPagesOfThisOriginWithControl) {
       HasSubstr("evil.example"));
   EXPECT_EQ(player_->state(), play::Playing());
 
-  const auto looking = Open(false);  // is told nothing of it
+  const auto looking = Open(false);  // is not told
   EXPECT_EQ(Post(path).result_int(), 202u);
   Say(*looking, {{"stop", true}});
   EXPECT_THAT(HearOf(*looking, "error").get<std::string>(), HasSubstr("may only look"));
@@ -282,12 +283,12 @@ TEST_F(ViewerPlayTest, OneIsSentAtATime) {
       "\r\nCookie: ", cookie_, "\r\nExpect: 100-continue\r\nContent-Length: 8\r\n\r\n");
   boost::asio::write(first, boost::asio::buffer(begun));
   char answer[25];
-  boost::asio::read(first, boost::asio::buffer(answer));  // 100: it is awaited
+  boost::asio::read(first, boost::asio::buffer(answer));  // 100 Continue: the file is awaited
   const Answer second = Post("/play?name=b.obj");
   EXPECT_EQ(second.result_int(), 409u);
   EXPECT_THAT(second.body(), HasSubstr("another file is being sent"));
   first.close();
-  // Until the daemon has seen that the first is gone.
+  // Until the daemon has noticed that the first has disconnected.
   while (Post("/play?name=b.obj").result_int() == 409u) {
   }
   EXPECT_EQ(player_->state().name, "b.obj");
@@ -327,7 +328,7 @@ TEST_F(ViewerPlayTest, ADiskThatHangsKeepsNobodyOut) {
     EXPECT_EQ(answer.result_int(), 503u);
     EXPECT_THAT(answer.body(), HasSubstr("did not answer in time")) << name;
   }
-  // What waits for it is bounded.
+  // The number of waiting files is bounded.
   Answer answer = Post("/play?name=c.obj");
   for (int i = 0; i < 20 && answer.body().find("TMPDIR") == std::string::npos; ++i) {
     answer = Post("/play?name=c.obj");
@@ -340,14 +341,14 @@ TEST_F(ViewerPlayTest, ADiskThatHangsKeepsNobodyOut) {
     hangs = false;
   }
   changed.NotifyAll();
-  // What was given up is gone when it comes back, and not played.
+  // A file that was given up is not played when the worker answers again.
   while (Post("/play?name=late.obj").result_int() == 503u) {
   }
   EXPECT_EQ(player_->state().name, "late.obj");
   for (const char* name : {"a.obj", "b.obj", "c.obj"}) {
     EXPECT_THAT(Audited(), Not(HasSubstr(name)));
   }
-  // Those that it took the place of, if it was sent twice, are about to go.
+  // If it was sent twice, the files that it replaced are about to be removed.
   while (std::distance(std::filesystem::directory_iterator(temporary->path()), {}) > 1) {
   }
   server_.reset();
@@ -392,7 +393,7 @@ TEST_F(ViewerPlayTest, WhereThereIsNoThreadItIsSaid) {
   EXPECT_EQ(Post("/play?name=a.obj").result_int(), 202u) << "there is one now";
 }
 
-// A page that does something when it is told.
+// A page that runs a function when it is notified.
 class TellingPeer final : public http::WebSocketPeer {
  public:
   explicit TellingPeer(std::function<void()> told) : told_(std::move(told)) {}
@@ -413,7 +414,7 @@ TEST_F(ViewerPlayTest, PagesThatAreGoneAreNotTold) {
   play->Join(gone);
   gone.reset();
   play->Join(page);
-  play->Join(page);  // once more: it is told once all the same
+  play->Join(page);  // again: it is notified only once
   EXPECT_EQ(told, 2);
   gone = std::make_shared<TellingPeer>([&] { ++gone_told; });
   play->Join(gone);
@@ -423,7 +424,7 @@ TEST_F(ViewerPlayTest, PagesThatAreGoneAreNotTold) {
   EXPECT_EQ(gone_told, 2);
 }
 
-// Who sent it is gone as it is whole, and the worker has not come to it yet.
+// Its sender disconnects when the file is complete, before the worker has handled it.
 TEST_F(ViewerPlayTest, WhatIsGivenUpIsNotPlayed) {
   ASSERT_NO_FATAL_FAILURE(StartPlayer(kPlays));
   const auto temporary = play::PrivateFolder::Make();
@@ -457,7 +458,7 @@ TEST_F(ViewerPlayTest, WhatIsGivenUpIsNotPlayed) {
   EXPECT_TRUE(std::filesystem::is_empty(temporary->path()));
 }
 
-// Its end waits for the thread that writes, so it may not be that thread which has it last.
+// Its destructor waits for the thread that writes, so that thread must not hold the last reference.
 TEST_F(ViewerPlayTest, MayEndWhilePagesAreTold) {
   ASSERT_NO_FATAL_FAILURE(StartPlayer(kPlays));
   std::shared_ptr<ViewerPlay> play = ViewerPlay::Make({.player = player_.get()}, nullptr);

@@ -1,4 +1,5 @@
-// One page's messages, answered in an order that the test chooses: a page that says nothing more of what has ended meanwhile.
+// Tests the messages of one page, answered in an order that the test chooses: a page is sent
+// nothing more about what has ended in the meantime.
 #include "daemon/viewer/viewer_socket.h"
 
 #include <gmock/gmock.h>
@@ -23,7 +24,8 @@ using Json = nlohmann::json;
 
 constexpr char kVolume = 1, kDark = 2;
 
-// The other end: keeps what is sent, and what is to be done on the server's thread until the test does it.
+// The peer: keeps the messages that are sent, and the work for the server's thread until the test
+// does it.
 class Peer final : public http::WebSocketPeer {
  public:
   void Send(std::string message, bool binary) override {
@@ -55,7 +57,7 @@ struct Page {
   std::unique_ptr<http::WebSocketService> service;
 
   void Say(const Json& message) { service->OnText(message.dump()); }
-  // What it was told since it was asked last.
+  // Returns the messages with `key` since the last call.
   std::vector<Json> Heard(const std::string& key) {
     std::vector<Json> heard;
     for (const std::string& text : peer->texts) {
@@ -65,7 +67,7 @@ struct Page {
     peer->texts.clear();
     return heard;
   }
-  // The kinds of the binary messages since they were asked for last.
+  // Returns the kinds of the binary messages since the last call.
   std::vector<char> Kinds() {
     std::vector<char> kinds;
     for (const std::string& binary : std::exchange(peer->binaries, {})) kinds.push_back(binary[0]);
@@ -96,7 +98,7 @@ class ViewerSocketTest : public ::testing::Test {
     std::filesystem::remove_all(folder_, ignored);
   }
 
-  // Pages that are opened from now on record their actions in `audit`.
+  // Makes pages that are opened from now on record their actions in `audit`.
   void UseAudit(access::Audit* audit) {
     shared_ = std::make_shared<ViewerShared>(
         ViewerShared{*sim_.core,
@@ -112,7 +114,7 @@ class ViewerSocketTest : public ::testing::Test {
     return page;
   }
 
-  // All that the daemon has to do is done, and all that displays have to show is shown.
+  // Does everything that the daemon has to do, and shows everything that displays have to show.
   void Step() {
     sim_.core->Step();
     for (const int display : {0, 1}) {
@@ -120,7 +122,7 @@ class ViewerSocketTest : public ::testing::Test {
       }
     }
   }
-  // Until nothing is left to be done.
+  // Answers until nothing is left to do.
   void Answer(Page& page) {
     for (;;) {
       Step();
@@ -133,7 +135,7 @@ class ViewerSocketTest : public ::testing::Test {
   void Watch(uint16_t id, const std::string& display = "main") {
     page_.Say({{"watch", display}, {"id", id}});
   }
-  // The display shows something else.
+  // Makes the display show another volume.
   void ShowAnother() {
     if (!client_.has_value()) client_ = sim_.Open();
     ++shown_;

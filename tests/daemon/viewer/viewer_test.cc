@@ -1,4 +1,5 @@
-// The viewer over HTTP and WebSocket: who may look, who may control, and what a page is told.
+// Tests the viewer over HTTP and WebSocket: who may view, who may control, and which messages a
+// page receives.
 #include "daemon/viewer/viewer.h"
 
 #include <gmock/gmock.h>
@@ -92,7 +93,7 @@ class ViewerTest : public ::testing::Test {
     socket.read(buffer);
     return beast::buffers_to_string(buffer.data());
   }
-  // The next message that has `key`; binary ones are passed over.
+  // Reads the next message that has `key`; skips binary ones.
   static Json HearOf(Socket& socket, const std::string& key) {
     while (true) {
       const Json message = Json::parse(Hear(socket), nullptr, false);
@@ -172,7 +173,8 @@ TEST_F(ViewerTest, APageIsToldDisplaysAndVolumesAndPacesThem) {
   EXPECT_EQ(first[0], 1);
   EXPECT_EQ(first[1], 1) << "whole";
   EXPECT_EQ(first[2], 7);
-  // Not a second one before the first is shown, though the display shows others: what comes next is what is asked.
+  // No second one before the first is shown, even if the display shows others: the next message is
+  // the requested answer.
   DisplayUpdate update;
   update.pattern = TestPattern::kWhite;
   core_->UpdateDisplay("two", update, [](absl::StatusOr<DisplayDescription>) {});
@@ -180,7 +182,7 @@ TEST_F(ViewerTest, APageIsToldDisplaysAndVolumesAndPacesThem) {
   EXPECT_EQ(Hear(*socket)[0], 2);
   Say(*socket, {{"shown", 7}});
   std::string next = Hear(*socket);
-  while (next.size() < 24 + 4 * 8 + 4 * 64 * 9) {  // until all are lit
+  while (next.size() < 24 + 4 * 8 + 4 * 64 * 9) {  // until all of them are lit
     ASSERT_EQ(next[0], 1);
     Say(*socket, {{"shown", 7}});
     next = Hear(*socket);
@@ -193,7 +195,7 @@ TEST_F(ViewerTest, APageIsToldDisplaysAndVolumesAndPacesThem) {
 
 TEST_F(ViewerTest, WhatIsShownIsHeldAgainstWhatWasSent) {
   const auto socket = Open();
-  Say(*socket, {{"update", {{"name", "one"}}}});  // not a page's to ask, and no harm
+  Say(*socket, {{"update", {{"name", "one"}}}});  // a page may not ask for it, and it does no harm
   Say(*socket, {{"compare", 7}});
   EXPECT_THAT(HearOf(*socket, "compared")["why"].get<std::string>(), HasSubstr("no such watch"));
   Say(*socket, {{"watch", "one"}, {"id", 7}});
@@ -228,13 +230,14 @@ TEST_F(ViewerTest, WhatIsWrongIsSaidAndTheSocketGoesOn) {
   for (int id = 2; id < 18; ++id) Say(*socket, {{"watch", "one"}, {"id", id}});
   Say(*socket, {{"watch", "one"}, {"id", 18}});
   EXPECT_THAT(HearOf(*socket, "error").get<std::string>(), HasSubstr("16 watches"));
-  // A message that is too long is the end of the connection, and of nothing else.
+  // A message that is too long ends the connection, and nothing else.
   socket->write(asio::buffer(std::string(http::kGreatestMessage + 1, 'x')));
   EXPECT_THROW(while (true) Hear(*socket), boost::system::system_error);
   EXPECT_NO_THROW(Open());
 }
 
-// Answers that nobody reads wait in bounded room: nothing more is read of who asks for them, and others go on.
+// Unread answers wait in bounded room: nothing more is read from the page that requested them, and
+// others continue.
 TEST_F(ViewerTest, WhoDoesNotReadIsNotReadEither) {
   const auto socket = Open();
   Say(*socket, {{"watch", "one"}, {"id", 1}});
@@ -350,7 +353,7 @@ TEST_F(ViewerTest, ThereIsNoKeyWhereNobodyIsToControl) {
   auto viewer = Viewer::Make(*core_, clock_, {.version = "1.2", .control = false});
   ASSERT_TRUE(viewer.ok());
   EXPECT_EQ((*viewer)->ControlAddress(server_->address()), "");
-  // Nor does the empty key open anything.
+  // Nor does the empty key give access.
   std::optional<http::Response> response;
   const http::Handler handler =
       (*viewer)->Handler([](const http::Request&, const http::Done&) { return false; });

@@ -1,4 +1,4 @@
-// The bytes of a change, read by hand as docs/protocols/viewer.md has them.
+// Tests the bytes of a change, parsed by hand according to docs/protocols/viewer.md.
 #include "daemon/viewer/volume_message.h"
 
 #include <gtest/gtest.h>
@@ -52,7 +52,7 @@ TEST(VolumeMessage, IsAsItIsDocumented) {
   EXPECT_EQ(Read<uint32_t>(bytes, 28), 1u);
   EXPECT_EQ(Read<uint32_t>(bytes, 32), 2u);
   EXPECT_EQ(Read<uint32_t>(bytes, 36), 2u);
-  // x of the three, then z: two pixels beside one another, in the first and in the last plane.
+  // x of the three, then z: two adjacent pixels, in the first and in the last plane.
   EXPECT_EQ(Read<uint16_t>(bytes, 40), 0);
   EXPECT_EQ(Read<uint16_t>(bytes, 42), 0);
   EXPECT_EQ(Read<uint16_t>(bytes, 44), kPlaceSteps);

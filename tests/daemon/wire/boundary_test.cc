@@ -1,4 +1,5 @@
-// Smooth boundaries as lines: how far these are from the curves, which are computed here by their own formulas.
+// Tests smooth boundaries as lines: how far these are from the curves, which are computed here by
+// their own formulas.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -22,13 +23,14 @@ using ::testing::HasSubstr;
 using P = v1::Primitive;
 using Point = std::array<double, 2>;
 
-constexpr int kSamples = 400;  // of each span
+constexpr int kSamples = 400;  // in each span
 
 MaybeFault FaultOf(const P& primitive, Content* content, const Limits& limits = {}) {
   return ToContent(FieldPath("primitive"), primitive, {limits}, content);
 }
 
-// The plane within curves through the vertices: `outline` across the axis, at heights that are not one plane's.
+// Returns the plane within curves through the vertices: `outline` across the axis, at heights that
+// do not lie in one plane.
 P Bounded(const std::vector<Point>& outline, v1::Boundary::Form form, v1::Boundary::Axis axis) {
   P p;
   p.mutable_implicit()->mutable_surface()->set_text("z = 0");
@@ -49,7 +51,7 @@ P Bounded(const std::vector<Point>& outline, v1::Boundary::Form form, v1::Bounda
   return p;
 }
 
-// The lines' ends across the axis.
+// Returns the ends of the lines, across the axis.
 std::vector<Point> LinesOf(const P& primitive, const Limits& limits = {}) {
   Content content;
   const MaybeFault fault = FaultOf(primitive, &content, limits);
@@ -98,7 +100,7 @@ double Distance(const Point& p, const Point& a, const Point& b) {
   return std::hypot(a[0] + t * x - p[0], a[1] + t * y - p[1]);
 }
 
-// The farthest that any of `points` is from closed lines.
+// Returns the greatest distance of any of `points` from closed lines.
 double Farthest(const std::vector<Point>& points, const std::vector<Point>& lines) {
   double farthest = 0;
   for (const Point& p : points) {
@@ -141,7 +143,7 @@ TEST(Boundaries, PolylinesStayAsTheyAre) {
 }
 
 TEST(Boundaries, EachCurveClosesOnItself) {
-  // Two outlines far apart: no line goes from the one to the other.
+  // Two outlines far apart: no line leads from one to the other.
   std::vector<Point> both = kOutline;
   for (const Point& p : kOutline) both.push_back({p[0] + 1000, p[1]});
   P two = Bounded(both, v1::Boundary::CATMULL_ROM, v1::Boundary::Z);

@@ -1,4 +1,4 @@
-// Payloads in bulk memory: what goes there, and what does not fit.
+// Tests payloads in bulk memory: which ones go there, and which do not fit.
 #include <gmock/gmock.h>
 
 #include <memory>
@@ -13,7 +13,7 @@
 namespace voxeld::daemon::wire {
 namespace bulk_payload_test {
 
-// Large payloads, cut as gRPC cuts them, lie in the pool as they were sent.
+// Large payloads, in the pieces that gRPC makes of them, are in the pool as they were sent.
 TEST(Bulk, PayloadsLieInThePool) {
   const auto pool = gpu::BulkPool::Create();
   v1::StreamRequest request = UpsertRequest();

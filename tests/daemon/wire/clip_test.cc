@@ -1,4 +1,4 @@
-// Clips of boxes and cylinders that are refused, with the field and what would be right.
+// Tests clips of boxes and cylinders that are refused, with the field and the accepted values.
 #include "daemon/wire/clip.h"
 
 #include <gmock/gmock.h>
@@ -15,7 +15,7 @@ using ::testing::HasSubstr;
 
 class ClipTest : public ::testing::Test {
  protected:
-  // "FIELD: MESSAGE", or nothing if it is taken.
+  // Returns "FIELD: MESSAGE", or an empty text if the clip is accepted.
   std::string FaultOf(const v1::Clip& message, const Limits& limits = {}) {
     Clip clip;
     const MaybeFault fault = ToClip(FieldPath("clip"), message, limits, &clip);

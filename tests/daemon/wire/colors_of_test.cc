@@ -1,4 +1,5 @@
-// Colours of segments and triangles, and what shells and fills make of boxes, spheres, cylinders and patches.
+// Tests colours of segments and triangles, and the results of shells and fills for boxes, spheres,
+// cylinders and patches.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -39,7 +40,7 @@ std::vector<float> RowOf(const GeometryData& data) {  // x of each vertex
   return x;
 }
 
-// Vertices at x = 0, 1, 2 …, and colours 1, 2, 3 … of `colors` elements.
+// Returns vertices at x = 0, 1, 2 …, and colours 1, 2, 3 … of `colors` elements.
 v1::Vertices Row(uint32_t count, int colors) {
   v1::Vertices vertices;
   std::vector<float> positions;
@@ -145,7 +146,8 @@ TEST(ColorsOfElements, WhatIsWrongIsSaid) {
   EXPECT_THAT(fault->message, HasSubstr("makes 6 corners of elements"));
 }
 
-// ----------------------------------------------------------------------- boxes, spheres and cylinders otherwise
+// ----------------------------------------------------------------------- boxes, spheres and
+// cylinders with shells and fills
 
 P Box() {
   P p;
@@ -166,7 +168,7 @@ P Cylinder() {
   p.mutable_cylinder()->set_height(6);
   return p;
 }
-// The same as shapes with shells.
+// The same primitives as shapes with shells.
 P GeneralBox() {
   P p;
   Set(p.mutable_parallelepiped()->mutable_center(), 1, 2, 3);
@@ -225,7 +227,7 @@ TEST(Shells, TooThickOnesAreRefused) {
   EXPECT_EQ(fault->field, "primitive.sphere.shell.value");
 }
 
-// A patch whose 16 points are at x = 0 to 15, corners in colours 1, 4, 13 and 16.
+// A patch whose 16 points are at x = 0 to 15, with corners in colours 1, 4, 13 and 16.
 P Patches(v1::Fill fill) {
   P p;
   *p.mutable_bezier_surface()->mutable_vertices() = Row(16, 16);

@@ -14,7 +14,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-// Every value there and back; a value beyond the last is refused with the number.
+// Converts every value there and back; a value beyond the last is refused with its number.
 template <typename Ours, typename Theirs>
 void CheckEnum(int last, int unknown) {
   for (int value = 0; value <= last; ++value) {
@@ -236,8 +236,8 @@ TEST(Convert, DisplayUpdatesHoldWhatIsPresent) {
   EXPECT_THAT(std::string(FromWire(request).status().message()), HasSubstr("test_pattern"));
 }
 
-// The wire's messages of figures and limits have a field for each of ours: give each its own value
-// and see that no two of the message's are alike.
+// The wire's messages of statistics and limits have a field for each of ours: gives each its own
+// value, and checks that no two fields of the message are alike.
 template <typename Message>
 void ExpectAllDifferent(const Message& message) {
   std::set<std::string> seen;

@@ -1,4 +1,5 @@
-// Good primitives of the kinds that become curves, letters and frames, and what the decoder makes of them.
+// Valid primitives of the kinds that become curves, letters and frames, and the results of decoding
+// them.
 #pragma once
 
 #include <gtest/gtest.h>

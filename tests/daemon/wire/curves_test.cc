@@ -1,5 +1,5 @@
-// Curves, wire frames, text and tints from the wire: what is wrong with them, what becomes
-// of good ones, and that they can be told to watchers as they were sent.
+// Tests curves, wire frames, text and tints from the wire: the errors for wrong ones, the results
+// for valid ones, and that watchers receive them as they were sent.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -223,7 +223,7 @@ TEST_F(CurvesTest, FramesOfPlaneThingsAndArrows) {
   p.mutable_patch()->set_fill(v1::FILL_DOTS);
   EXPECT_EQ(Geometry(p).record.vertex_count, 4u);
 
-  // A square with a triangle's hole.
+  // A square with a triangular hole.
   for (const double number : {0, 0, 0, 9, 0, 0, 9, 9, 0, 0, 9, 0, 2, 2, 0, 5, 2, 0, 2, 5, 0}) {
     p.mutable_polygon()->add_points(number);
   }
@@ -309,7 +309,7 @@ TEST_F(CurvesTest, InstancesHaveTints) {
 }
 
 TEST_F(CurvesTest, AMessageMakesNoMoreThanMayWait) {
-  // A few bytes that become many.
+  // A few bytes that expand to many.
   limits_.max_uncommitted_bytes = 1'000'000;
   v1::ApplyUpdateRequest request;
   for (int i = 0; i < 20; ++i) {

@@ -1,4 +1,5 @@
-// How streams begin: Open, and what else is no operation or is said of a commit.
+// Tests how streams begin: Open, and other requests that are not operations or that qualify a
+// commit.
 #include <gmock/gmock.h>
 
 #include <limits>

@@ -175,7 +175,7 @@ TEST(Decode, LimitsAreQuotas) {
 }
 
 TEST(Decode, AbsurdlyManyElementsAreNotEvenParsed) {
-  // Two bytes an entity: tag 15, length 0.
+  // Two bytes for each entity: tag 15, length 0.
   std::string entities;
   for (int i = 0; i < 100; ++i) entities += std::string("\x7a\x00", 2);
   const std::string batch = absl::StrCat("\x7a\xc8\x01", entities);  // 200 bytes of Batch
@@ -235,7 +235,7 @@ TEST(Decode, SequencesAscendOrAreCounted) {
   decoded = Decode(request, {}, 41);
   EXPECT_THAT(decoded.refused.issues, SizeIs(1));
   EXPECT_THAT(decoded.operations, SizeIs(1)) << "a commit is answered whatever is wrong with it";
-  // Nothing comes after the greatest number.
+  // No sequence follows the greatest number.
   request.set_sequence(0);
   EXPECT_THAT(Decode(request, {}, UINT64_MAX).refused.issues, SizeIs(1));
 }
@@ -266,7 +266,7 @@ TEST(Decode, ClipsAndRegions) {
   request.mutable_layer_state()->set_layer("l");
   v1::Clip* clip = request.mutable_layer_state()->mutable_clip();
   const auto decode = [&] { return std::get<LayerState>(Decode(request).operations.at(0).op); };
-  // Nothing in it: there is to be none any more.
+  // An empty one: the clip is removed.
   ASSERT_NE(decode().clip, nullptr);
   EXPECT_EQ(decode().clip->count, 0u);
   EXPECT_FALSE(decode().region.has_value());
@@ -319,7 +319,7 @@ TEST(Decode, SolidMeshesAreFilledIfTheyAreClosed) {
   v1::Mesh* mesh = request.mutable_upsert()->mutable_entity()->mutable_primitive()->mutable_mesh();
   mesh->set_fill(v1::FILL_SOLID);
   Decoded decoded = Decode(request);
-  // Of one triangle: its surface, and a word about it.
+  // For one triangle: its surface, and an Issue about it.
   ASSERT_THAT(decoded.operations, SizeIs(1));
   EXPECT_EQ(GeometryOf(decoded).record.kind, gpu::PrimitiveKind::kTriangles);
   ASSERT_THAT(decoded.refused.issues, SizeIs(1));
@@ -331,7 +331,7 @@ TEST(Decode, SolidMeshesAreFilledIfTheyAreClosed) {
   EXPECT_EQ(issue.message,
             "fill is FILL_SOLID, but the mesh is open: the edge of vertices 0 and 1 belongs to 1 "
             "triangle, and it takes an even number; its surface is drawn");
-  // With the same one behind it, it is closed, however thin.
+  // Together with a second copy of the triangle it is closed, however thin.
   v1::Vertices* vertices = mesh->mutable_vertices();
   vertices->set_positions(vertices->positions() + vertices->positions());
   vertices->set_count(2 * vertices->count());

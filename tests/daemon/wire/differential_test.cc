@@ -1,5 +1,5 @@
-// The decoder that leaves payloads where they lie, against protobuf's own parser: whatever comes in,
-// however it is cut, both must say the same.
+// Compares the decoder that leaves payloads in place with protobuf's own parser: whatever arrives,
+// however it is divided, both must give the same result.
 #include <gmock/gmock.h>
 #include <google/protobuf/message.h>
 #include <google/protobuf/stubs/logging.h>
@@ -26,7 +26,7 @@ namespace differential_test {
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 
-// ------------------------------------------------------------------------------ what was understood
+// ------------------------------------------------------------------------------ results
 
 template <typename T>
 std::string Bytes(std::span<const T> values) {
@@ -66,7 +66,7 @@ std::string Describe(const Operation& operation) {
   return text;
 }
 
-// Everything that a decoder can say.
+// Returns everything that a decoder can return, as text.
 std::vector<std::string> Describe(const Decoded& decoded) {
   std::vector<std::string> all = {absl::StrCat(static_cast<int>(decoded.status.code()), " ",
                                                std::string(decoded.status.message())),
@@ -82,7 +82,7 @@ std::vector<std::string> Describe(const Decoded& decoded) {
   return all;
 }
 
-// ------------------------------------------------------------------------------------- what comes in
+// ------------------------------------------------------------------------------------- inputs
 
 class Generator {
  public:
@@ -120,8 +120,8 @@ class Generator {
     return request;
   }
 
-  // The same message as protobuf may also write it: fields in any order, some of them twice, the
-  // first time with something else, and fields that nobody knows.
+  // Writes the same message in other forms that protobuf allows: fields in any order, some of them
+  // twice, the first time with another value, and unknown fields.
   std::string Scramble(const Message& message) {
     std::vector<const FieldDescriptor*> fields;
     const google::protobuf::Reflection& reflection = *message.GetReflection();
@@ -130,7 +130,7 @@ class Generator {
     for (const FieldDescriptor* field : fields) {
       if (field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) {
         const int count = field->is_repeated() ? reflection.FieldSize(message, field) : 1;
-        std::string part;  // repeated ones keep their order
+        std::string part;  // repeated fields keep their order
         for (int i = 0; i < count; ++i) {
           const Message& sub = field->is_repeated()
                                    ? reflection.GetRepeatedMessage(message, field, i)
@@ -195,7 +195,7 @@ class Generator {
   }
   std::string Delimited(int field, const std::string& body) {
     std::string size = Varint(body.size());
-    if (Chance(0.05)) {  // longer than need be
+    if (Chance(0.05)) {  // longer than necessary
       size.back() = static_cast<char>(size.back() | 0x80);
       size += std::string(Below(3), '\x80') + '\0';
     }
@@ -213,7 +213,7 @@ class Generator {
       case 3:
         return Varint(field << 3 | 3) + Varint(8) + Varint(5) + Varint(field << 3 | 4);  // a group
       case 4:
-        return Varint(field << 3 | 4);  // the end of none
+        return Varint(field << 3 | 4);  // the end of a group that was not begun
       default:
         return Varint(field << 3 | 2) + Varint(3) + "abc";
     }
@@ -264,7 +264,7 @@ class Generator {
       const bool four = Chance(0.5);
       if (four) out->set_color_type(v1::ELEMENT_TYPE_RGBX8);
       uint32_t colors = count;
-      if (Chance(0.3)) {  // of triangles, of pairs, of all but one: right for some
+      if (Chance(0.3)) {  // of triangles, of pairs, of all but one: valid for some
         out->set_colors_of(Chance(0.05) ? static_cast<v1::Vertices::ColorsOf>(Below(9))
                                         : v1::Vertices::ELEMENTS);
         const uint32_t corners = indices > 0 ? indices : count;
@@ -282,7 +282,7 @@ class Generator {
     out->set_unit(static_cast<v1::Thickness::Unit>(Below(Chance(0.05) ? 9 : 3)));
   }
 
-  // Curves of any form, of too few points at times, and with ends that do not ascend.
+  // Makes curves of any form, sometimes with too few points, or with ends that do not ascend.
   void Fill(v1::Boundary* out) {
     out->set_form(static_cast<v1::Boundary::Form>(Below(Chance(0.05) ? 9 : 4)));
     out->set_axis(static_cast<v1::Boundary::Axis>(Below(Chance(0.05) ? 9 : 4)));
@@ -341,12 +341,12 @@ struct Tally {
   int good = 0, refused = 0, bare = 0;
 };
 
-// Both ways to decode `bytes`; the second has nothing to do with skeletons or slices.
+// Decodes `bytes` in both ways; the second does not use skeletons or slices.
 void ExpectAlike(const std::string& bytes, Generator& generator, gpu::BulkPool* pool,
                  Tally* tally) {
   const std::vector<std::string_view> slices = generator.Cut(bytes);
   const Decoded decoded = DecodeStreamRequest(slices, {}, 2, pool);
-  const google::protobuf::LogSilencer silence;  // of what is refused
+  const google::protobuf::LogSilencer silence;  // of refused messages
   v1::StreamRequest request;
   Skeleton skeleton;
   tally->bare += MakeSkeleton(slices, Root::kStreamRequest, &skeleton);
@@ -368,7 +368,7 @@ TEST(Differential, AnyWayToWriteAMessageMeansTheSame) {
     SCOPED_TRACE(seed);
     Generator generator(seed);
     std::string bytes;
-    // What stands side by side is merged.
+    // Adjacent ranges are merged.
     for (uint32_t n = 1 + generator.Below(3); n > 0; --n) {
       bytes += generator.Scramble(generator.Request());
     }
@@ -414,7 +414,7 @@ TEST(Differential, UpdatesToo) {
   }
 }
 
-// Calls `found` for each way that leads from a message to a bytes field of Vertices.
+// Calls `found` for each path from a message to a bytes field of Vertices.
 using Way = std::vector<const FieldDescriptor*>;
 void ForEachWay(const google::protobuf::Descriptor& from, Way& way,
                 const std::function<void(const Way&)>& found) {
@@ -430,7 +430,8 @@ void ForEachWay(const google::protobuf::Descriptor& from, Way& way,
   }
 }
 
-// A new way to a payload needs a line there: the decoder takes every payload for a token otherwise.
+// A new path to a payload needs a line there: otherwise the decoder takes every payload for a
+// token.
 TEST(Skeleton, KnowsEveryWayToAPayload) {
   int ways = 0;
   const auto check = [&](const Message& root, Root kind) {

@@ -1,4 +1,4 @@
-// Content → primitive is the way back of primitive → content.
+// Content → primitive is the inverse of primitive → content.
 #include "daemon/wire/encode_primitive.h"
 
 #include <gmock/gmock.h>
@@ -18,7 +18,7 @@ Content Decoded1(const v1::Primitive& primitive) {
   return content;
 }
 
-// Over the wire and back.
+// Returns the primitive after serialising and parsing it.
 v1::Primitive Sent(const v1::Primitive& primitive) {
   v1::Primitive received;
   EXPECT_TRUE(received.ParseFromString(primitive.SerializeAsString()));
@@ -40,7 +40,7 @@ TEST(EncodePrimitive, DecodesToTheSame) {
     const size_t bytes = encoded.ByteSizeLong();
     EXPECT_GE(EncodedBytes(content), bytes);
     EXPECT_LE(EncodedBytes(content), bytes + 128);
-    // Once in its plainest form it stays as it is.
+    // Once it is in its plainest form, it does not change any longer.
     v1::Primitive again;
     Encode(Decoded1(encoded), &again);
     EXPECT_EQ(again.SerializeAsString(), encoded.SerializeAsString());

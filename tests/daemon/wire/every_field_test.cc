@@ -1,5 +1,6 @@
-// Of every kind of primitive, every number and every enumerated value, found by reflection: what is no number of single precision,
-// or none of the values that there are, is refused, by the name of the field. No list of fields stands here, so one that is added is asked for as well.
+// Finds every number and every enumerated value of every kind of primitive by reflection: a number
+// that single precision cannot represent, or an unknown enumerated value, is refused, by the name
+// of the field. No list of fields is kept here, so an added field is tested as well.
 #include <gmock/gmock.h>
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/message.h>
@@ -28,8 +29,8 @@ MaybeFault FaultOf(const v1::Primitive& primitive) {
                    &content);
 }
 
-// visit(message, field, index or -1, path) for each scalar of `root` that is set, or that has no presence; messages that are absent are
-// left out.
+// Calls visit(message, field, index or -1, path) for each scalar of `root` that is set, or that has
+// no presence; absent messages are left out.
 using Visit = std::function<void(Message*, const FieldDescriptor*, int, const std::string&)>;
 void ForEachField(Message* message, const std::string& path, const Visit& visit) {
   const auto* reflection = message->GetReflection();
@@ -76,7 +77,7 @@ TEST(EveryField, WhatIsNoNumberIsRefusedByName) {
           for (const double value :
                {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
                 -std::numeric_limits<double>::infinity(), 1e39}) {
-            if (!is_double && value == 1e39) continue;  // no float
+            if (!is_double && value == 1e39) continue;  // not a float
             SCOPED_TRACE(absl::StrCat(path, " = ", value));
             double was = 0;
             if (index >= 0) {
@@ -118,7 +119,7 @@ TEST(EveryField, AnUnknownValueIsRefusedByName) {
           const auto* reflection = message->GetReflection();
           if (field->cpp_type() != FieldDescriptor::CPPTYPE_ENUM) return;
           SCOPED_TRACE(path);
-          // Their types say nothing where there are no such arrays.
+          // Their types mean nothing without such arrays.
           if (field->name() == "color_type" || field->name() == "index_type" ||
               field->name() == "colors_of")
             return;

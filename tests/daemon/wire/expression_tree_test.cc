@@ -1,4 +1,5 @@
-// Expressions as trees: each operation is what its text is, and what is wrong with a tree is said.
+// Tests expressions as trees: each operation has the result of its text, and the errors of a tree
+// are reported.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -32,7 +33,7 @@ P Implicit() {
 
 T* TreeOf(P& p) { return p.mutable_implicit()->mutable_surface()->mutable_tree(); }
 
-// The program that the engine gets.
+// Returns the program that the engine gets.
 std::vector<uint32_t> Words(const P& p) {
   Content content;
   const MaybeFault fault = FaultOf(p, &content);

@@ -1,4 +1,5 @@
-// What seldom is: sides of curves, text, grids, scales and textures that no ordinary client comes upon, each with what is said.
+// Tests rare cases: sides of curves, text, grids, scales and textures that ordinary clients do not
+// use, each with its error.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -215,7 +216,8 @@ TEST_F(FarCorners, AHeightMapsTrianglesAreLimited) {
 }
 
 TEST_F(FarCorners, AngleZeroIsAcrossWhateverTheNormalIs) {
-  // Along x there is no x across it: angle 0 is on y's side, as elsewhere on x's.
+  // Along x, the direction across it cannot be x: angle 0 is on the side of y, as it is on the side
+  // of x elsewhere.
   P arc = Arc();
   Set(arc.mutable_arc()->mutable_normal(), 5, 0, 0);
   const GeometryData& along_x = Geometry(arc);
@@ -397,7 +399,7 @@ TEST_F(FarCorners, PicturesThatAreTooHighOrBreakOff) {
   ASSERT_TRUE(fault.has_value());
   EXPECT_EQ(fault->reason, Reason::kQuotaExceeded);
   EXPECT_THAT(fault->message, HasSubstr("is a picture of 1 × 8193; "));
-  // Its size can be read, its pixels cannot.
+  // Its size can be read, but its pixels cannot.
   std::string broken = pictures::PngOf(64, 64, std::vector<uint32_t>(64 * 64, 5));
   broken.resize(broken.size() - 30);
   texture->set_picture(broken);
@@ -409,7 +411,7 @@ TEST_F(FarCorners, PicturesThatAreTooHighOrBreakOff) {
 }
 
 TEST_F(FarCorners, AnOpenMeshIsToldOfWithHowManyTrianglesItsEdgeHas) {
-  // Three triangles on the edge from vertex 0 to 1, whose other edges are each of two.
+  // Three triangles on the edge from vertex 0 to 1, each of whose other edges has two.
   v1::StreamRequest request = MeshRequest();
   v1::Mesh* const mesh = PrimitiveOf(request)->mutable_mesh();
   mesh->mutable_vertices()->set_count(5);
@@ -423,7 +425,7 @@ TEST_F(FarCorners, AnOpenMeshIsToldOfWithHowManyTrianglesItsEdgeHas) {
   ASSERT_EQ(decoded.refused.issues.size(), 1u);
   EXPECT_THAT(decoded.refused.issues[0].message,
               HasSubstr("the edge of vertices 0 and 1 belongs to 3 triangles, and"));
-  // Nobody who would hear of it: the surface all the same.
+  // Without a receiver for the Issue, the surface is drawn all the same.
   Content content;
   EXPECT_FALSE(FaultOf(*PrimitiveOf(request), &content).has_value());
   EXPECT_EQ(std::get<GeometryPtr>(content)->record.kind, gpu::PrimitiveKind::kTriangles);
@@ -475,10 +477,10 @@ TEST(PayloadTable, TokensThatAreNoneFindNothing) {
 }
 
 TEST(ElementCount, BreaksOffWhereAMessageIsBroken) {
-  // Field 1 with two bytes, a good element of field 2 in it.
+  // Field 1 with two bytes, and a valid element of field 2 in it.
   const int path[] = {1, 2};
   const std::string good = {0x0A, 0x02, 0x12, 0x00};
-  // The inner message ends a group that never began, so that what follows it does not count.
+  // The inner message ends a group that was not begun, so what follows it does not count.
   const std::string broken = {0x0A, 0x03, 0x12, 0x00, 0x14, 0x0A, 0x02, 0x12, 0x00};
   const auto count = [&](std::string_view bytes) {
     return CountElements(std::span(&bytes, 1), path);
@@ -487,7 +489,7 @@ TEST(ElementCount, BreaksOffWhereAMessageIsBroken) {
   EXPECT_EQ(count(good + good), 2u);
   EXPECT_EQ(count(good + broken), 2u);
   EXPECT_EQ(count(broken + good), 1u);
-  // Of another wire type it is no message.
+  // With another wire type it is not a message.
   EXPECT_EQ(count(std::string{0x08, 0x02, 0x12, 0x00}), 0u);
 }
 

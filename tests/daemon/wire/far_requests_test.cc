@@ -1,4 +1,5 @@
-// What seldom is sent: ranges in place of a texture's payloads, updates that are wrong, and words of control.
+// Tests rare requests: ranges in place of a texture's payloads, wrong updates, and control
+// requests.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -27,7 +28,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-// Contents under names of 32 bytes; what it was charged when each was looked for.
+// Contents under names of 32 bytes; records what was charged when each was requested.
 class Shelf final : public AssetSource {
  public:
   explicit Shelf(const Budget* budget = nullptr) : budget_(budget) {}
@@ -40,7 +41,7 @@ class Shelf final : public AssetSource {
     const auto copy = std::make_shared<std::string>(found->second.substr(offset, size));
     return MappedRange{*copy, copy};
   }
-  // Out of a field.
+  // Moves the bytes out of a field.
   void Take(std::string* bytes, v1::MemoryRange* range) {
     const std::string digest(32, static_cast<char>('a' + contents_.size()));
     range->set_asset(digest);
@@ -113,7 +114,7 @@ TEST(FarRanges, StandForAHeightMapsPicture) {
   ASSERT_THAT(got.refused.issues, IsEmpty());
   EXPECT_TRUE(
       std::ranges::equal(GeometryOf(got).arrays.colors(), GeometryOf(want).arrays.colors()));
-  // Colours by themselves, too.
+  // Colours alone, too.
   v1::StreamRequest colored = HeightsRequest();
   PrimitiveOf(colored)->mutable_height_map()->clear_picture();
   PrimitiveOf(colored)->mutable_height_map()->set_colors("abcdefghijkl");
@@ -205,7 +206,7 @@ TEST(FarRanges, WhatIsReadOfAssetsIsChargedWhileItIsDecoded) {
     shelf.Take(vertices->mutable_positions(), vertices->mutable_positions_in());
   }
   const Decoded decoded = DecodeFrom(request, &shelf, &budget);
-  // Of 36 bytes each: two have room beside the 100 of the scene, the third has not.
+  // Each takes 36 bytes: two fit in addition to the 100 of the scene, the third does not.
   EXPECT_THAT(shelf.charged, ::testing::ElementsAre(36u, 72u));
   EXPECT_THAT(decoded.operations, SizeIs(2));
   ASSERT_THAT(decoded.refused.issues, SizeIs(1));
@@ -217,7 +218,7 @@ TEST(FarRanges, WhatIsReadOfAssetsIsChargedWhileItIsDecoded) {
       HasSubstr(
           "is 36, beside 172 bytes that are held for all clients; max_memory_bytes allows 200"));
   EXPECT_EQ(budget.used_bytes(), 100u) << "and given back after it";
-  // Who has read nothing gives nothing back.
+  // A decoder that has read nothing gives nothing back.
   EXPECT_THAT(DecodeFrom(MeshRequest(), &shelf, &budget).refused.issues, IsEmpty());
   EXPECT_EQ(budget.used_bytes(), 100u);
 }
@@ -245,7 +246,7 @@ TEST(FarUpdates, AreRefusedWhole) {
   EXPECT_THAT(refusal(), HasSubstr("operations[1].commit is set"));
 }
 
-// What an operation is of is what its message names.
+// An operation belongs to the layer that its message names.
 TEST(FarOperations, NameWhatTheyAreOf) {
   const auto decoded = [](const v1::StreamRequest& request) {
     const Decoded out = Decode(request);

@@ -1,4 +1,4 @@
-// Good primitives that are spoilt one by one: what is said of each.
+// Valid primitives, each with one fault: the error for each.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -18,10 +18,10 @@ struct FaultCase {
   std::function<void(v1::Primitive&)> spoil;
   const char* field;
   Reason reason;
-  const char* message;  // a part of it
+  const char* message;  // a part of the error message
 };
 
-// fault_of(primitive, content): the decoder's answer.
+// fault_of(primitive, content) returns the decoder's error.
 template <typename FaultOf>
 void ExpectFaults(std::span<const FaultCase> cases, FaultOf&& fault_of) {
   for (const FaultCase& c : cases) {

@@ -1,5 +1,5 @@
-// Every kind of primitive with every fill: what becomes of those that have lines and dots, what is said of the others, and that
-// what cannot be kept is refused wherever memory ends.
+// Tests every kind of primitive with every fill: the results for those that have lines and dots,
+// the errors for the others, and the refusals wherever memory runs out.
 #include <gmock/gmock.h>
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/message.h>
@@ -33,7 +33,7 @@ std::string KindOf(const v1::Primitive& primitive) {
   return v1::Primitive::descriptor()->FindFieldByNumber(primitive.kind_case())->name();
 }
 
-// The primitive's message, if it has a fill.
+// Returns the primitive's message, if it has a fill.
 google::protobuf::Message* WithFill(v1::Primitive* primitive) {
   google::protobuf::Message* const message = primitive->GetReflection()->MutableMessage(
       primitive, v1::Primitive::descriptor()->FindFieldByNumber(primitive->kind_case()));
@@ -47,7 +47,7 @@ void SetFill(google::protobuf::Message* message, v1::Fill fill, bool keep_shell)
     message->GetReflection()->ClearField(message, descriptor->FindFieldByName("shell"));
 }
 
-// Those that have no inside, and those that have neither lines nor dots.
+// Kinds that have no inside, and kinds that have neither lines nor dots.
 const std::set<std::string> kNoInside = {"disc", "patch", "polygon", "height_map",
                                          "bezier_surface"};
 const std::set<std::string> kNoEdges = {"implicit", "isosurface"};
@@ -125,13 +125,13 @@ TEST(Fills, SolidIsForWhatHasAnInside) {
       EXPECT_EQ(fault->field, absl::StrCat("primitive.", kind, ".fill"));
       EXPECT_THAT(fault->message, HasSubstr("is FILL_SOLID, but it has no inside"));
     } else if (kind != "isosurface" &&
-               kind != "mesh") {  // a group; what is open has its surface drawn
+               kind != "mesh") {  // a group; if it is open, its surface is drawn
       EXPECT_EQ(std::get<GeometryPtr>(content)->record.fill, gpu::Fill::kSolid);
     }
   }
 }
 
-// With ever more room: until all of it is there each is refused for it, and never half kept.
+// With increasing room: until all of it fits, each attempt is refused, and nothing is kept.
 TEST(Fills, WhatCannotBeKeptIsRefusedWhereverMemoryEnds) {
   std::vector<v1::Primitive> all = FullPrimitives();
   for (v1::Primitive primitive : FullPrimitives()) {
@@ -150,7 +150,7 @@ TEST(Fills, WhatCannotBeKeptIsRefusedWhereverMemoryEnds) {
   mesh.mutable_mesh()->mutable_texture()->set_picture(pictures::PngOf(2, 2, {1, 2, 3, 4}));
   mesh.mutable_mesh()->mutable_texture()->set_coordinates(std::string(6 * 8, '\0'));
   all.push_back(mesh);
-  // Large enough to lie in the pool each time that they are made anew.
+  // Large enough to be in the pool each time that they are made again.
   v1::Primitive large;
   *large.mutable_mesh()->mutable_vertices() = Corners(900);
   all.push_back(large);

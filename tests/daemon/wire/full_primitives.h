@@ -1,4 +1,5 @@
-// A good primitive of each kind with every number that it can have, for what is done with all fields of a message by reflection.
+// A valid primitive of each kind with every number that it can have, for tests of all fields of a
+// message by reflection.
 #pragma once
 
 #include <google/protobuf/text_format.h>

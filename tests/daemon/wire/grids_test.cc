@@ -1,4 +1,5 @@
-// Volumes and isosurfaces from the wire: what is wrong with them, and what becomes of good ones.
+// Tests volumes and isosurfaces from the wire: the errors for wrong ones, and the results for valid
+// ones.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -145,7 +146,7 @@ TEST(Grids, AGridLiesWhereItsEdgesSay) {
   ASSERT_EQ(group.parts.size(), 1u);
   EXPECT_EQ(group.min[0], 10);
   EXPECT_EQ(group.max[1], 26);
-  // The corner of sample (1, 2, 0), of which a cell is 2 by 2 by 1.
+  // The corner of sample (1, 2, 0), whose cell is 2 by 2 by 1.
   const gpu::Point3d at = gpu::Map(group.parts[0].transform, 1, 2, 0);
   EXPECT_EQ(at.x, 12);
   EXPECT_EQ(at.y, 24);
@@ -225,7 +226,7 @@ TEST(Grids, TheyAreToldAsTheyWereSent) {
   }
 }
 
-// A sample is 2 units wide along every axis but the last, where the grid's one is 1 wide.
+// A sample is 2 units wide along every axis but the last, where the grid's only sample is 1 wide.
 TEST(Grids, ScalesColorIsosurfacesByThePlace) {
   P p = Isosurface();
   p.mutable_color_scale()->add_colors(0x000000);

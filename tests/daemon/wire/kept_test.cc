@@ -1,4 +1,4 @@
-// Rows of what outlives the daemon: there and back, and what is said of those that are none.
+// Tests rows of persistent state: encoding and decoding, and the errors for invalid rows.
 #include "daemon/wire/kept.h"
 
 #include <gmock/gmock.h>
@@ -18,7 +18,7 @@ namespace kept_test {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-// A length that goes beyond the end.
+// A length that reaches beyond the end.
 const std::string kBroken = {0x0A, 0x7F, 0x00};
 
 TEST(Kept, OwnersGoThereAndBack) {

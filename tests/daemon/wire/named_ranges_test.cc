@@ -1,5 +1,5 @@
-// Ranges of memory in place of payloads: the same operations as from the bytes themselves, and what
-// is refused.
+// Tests ranges of memory in place of payloads: the same operations as from the bytes themselves,
+// and what is refused.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-// Memories that are strings; what was found is alive as long as somebody has it.
+// Memories that are strings; one that was found lives as long as it is held.
 class Strings final : public MemorySource {
  public:
   absl::StatusOr<MappedRange> Find(uint64_t memory, uint64_t offset, uint64_t size) const override {
@@ -33,14 +33,14 @@ class Strings final : public MemorySource {
     if (offset > bytes.size() || size > bytes.size() - offset) {
       return absl::OutOfRangeError(absl::StrCat("is ", size, "; beyond"));
     }
-    // A copy of exactly that: reading further is an error that sanitizers see.
+    // A copy of exactly that part: sanitizers report a read beyond it.
     const auto copy =
         std::make_shared<std::vector<char>>(bytes.begin() + static_cast<ptrdiff_t>(offset),
                                             bytes.begin() + static_cast<ptrdiff_t>(offset + size));
     return MappedRange{{copy->data(), copy->size()}, copy};
   }
 
-  // As a new memory, or a part of one.
+  // Stores the bytes in a new memory, or as a part of one.
   void Put(const std::string& bytes, uint64_t memory, uint64_t offset, v1::MemoryRange* range) {
     std::string& all = memories[memory];
     if (all.size() < offset) all.resize(offset, '\x55');
@@ -74,7 +74,7 @@ class Contents final : public AssetSource {
     return MappedRange{*copy, copy};
   }
 
-  // Out of a field, into an asset of its own that begins with three other bytes.
+  // Moves the bytes out of a field, into an asset of its own that begins with three other bytes.
   void Move(std::string* bytes, v1::MemoryRange* range) {
     std::string digest(32, static_cast<char>(contents.size()));
     range->set_asset(digest);
@@ -339,7 +339,7 @@ TEST(NamedRanges, OneRequestReadsAtMostWhatMayBeUncommitted) {
                         "max_uncommitted_bytes allows 287 in one"));
 }
 
-// What is kept of it, as it goes to whoever watches.
+// Returns what is kept of it, as watchers receive it.
 v1::Primitive Kept(const Decoded& decoded) {
   v1::Primitive out;
   Encode(std::get<Upsert>(decoded.operations.at(0).op).entity.content, &out);

@@ -37,7 +37,7 @@ int Depth(const Descriptor* message, std::map<const Descriptor*, int>& found) {
   return found[message] = most + 1;
 }
 
-// The messages that services take.
+// Returns the messages that services accept.
 std::vector<const Descriptor*> Requests() {
   std::vector<const Descriptor*> all;
   for (const auto* file :

@@ -33,7 +33,7 @@ TEST(OpenEdges, VerticesAtOnePlaceAreOne) {
   EXPECT_FALSE(FindOpenEdge(positions, {}));
   positions[1] = 1e-30f;
   EXPECT_TRUE(FindOpenEdge(positions, {}));
-  // Each face with vertices of its own, by index.
+  // Each face has vertices of its own, by index.
   std::vector<uint32_t> indices(12);
   for (uint32_t i = 0; i < 12; ++i) indices[i] = i;
   EXPECT_FALSE(FindOpenEdge(Apart(kFaces), indices));

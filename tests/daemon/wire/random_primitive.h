@@ -1,4 +1,4 @@
-// Primitives of every kind but Text, with every type of array, at random; good ones all.
+// Random valid primitives of every kind but Text, with every type of array.
 #pragma once
 
 #include <random>
@@ -16,7 +16,8 @@ class RandomPrimitives {
  public:
   explicit RandomPrimitives(std::mt19937& random) : random_(random) {}
 
-  // Up to `most` corners; kInstance refers to one of "o0" to "o4", where instances are wanted.
+  // Returns a primitive of up to `most` corners; kInstance refers to one of "o0" to "o4", if
+  // instances are wanted.
   v1::Primitive Next(uint32_t most, bool instances) {
     v1::Primitive primitive;
     const uint32_t kind = random_() % (instances ? 8 : 7);
@@ -97,7 +98,7 @@ class RandomPrimitives {
   v1::SurfaceRule Rule() {
     return Pick({v1::SURFACE_RULE_UNSPECIFIED, v1::SURFACE_RULE_THIN, v1::SURFACE_RULE_COVER});
   }
-  // Doubles that are no floats, and zeros of both signs.
+  // Returns doubles that are not floats, and zeros of both signs.
   double Coordinate() {
     return random_() % 8 == 0 ? -0.0 : std::uniform_real_distribution<>(-1e5, 1e5)(random_);
   }
@@ -149,7 +150,7 @@ class RandomPrimitives {
   }
   void SetPoint(v1::Vec3* out) { SetVec3(out, Coordinate(), Coordinate(), Coordinate()); }
 
-  // What is drawn by the general method.
+  // Makes a shape that is drawn by the general method.
   void SetMeasured(v1::Primitive* out) {
     switch (random_() % 16) {
       case 15:

@@ -1,4 +1,4 @@
-// Good requests of each kind, and the parts of them that are spoilt.
+// Valid requests of each kind, and the parts of them that tests make wrong.
 #pragma once
 
 #include <vector>
@@ -38,7 +38,7 @@ inline v1::StreamRequest LayerRequest() {
   return request;
 }
 
-// Two planes, of which the second has only a b.
+// Two planes, the second of which has only a b.
 inline v1::StreamRequest ClipRequest() {
   v1::StreamRequest request = LayerRequest();
   request.mutable_layer_state()->mutable_clip()->add_planes()->set_a(1);
@@ -49,7 +49,7 @@ inline v1::Clip::Plane* PlaneOf(v1::StreamRequest& request) {
   return request.mutable_layer_state()->mutable_clip()->mutable_planes(1);
 }
 
-// From (0, 0, 0) to (1, 1, 1).
+// A region from (0, 0, 0) to (1, 1, 1).
 inline v1::StreamRequest RegionRequest() {
   v1::StreamRequest request = LayerRequest();
   v1::Box3* region = request.mutable_layer_state()->mutable_region();

@@ -1,4 +1,5 @@
-// Every field that can be wrong, one by one: the path, the reason, the value in the message.
+// Tests every field that can be wrong, one by one: the path, the reason, and the value in the
+// message.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -23,10 +24,10 @@ struct Case {
   std::function<v1::StreamRequest()> make;
   const char* field;
   Reason reason;
-  const char* value;  // somewhere in the message
+  const char* value;  // occurs in the message
 };
 
-// A good request, spoilt by `spoil`.
+// A valid request, made wrong by `spoil`.
 template <typename Spoil>
 std::function<v1::StreamRequest()> With(v1::StreamRequest (*good)(), Spoil spoil) {
   return [good, spoil] {

@@ -1,4 +1,4 @@
-// Good requests to spoil, and how to send them through the decoder.
+// Valid requests for tests to change, and functions that pass them through the decoder.
 #pragma once
 
 #include <cstring>

@@ -1,4 +1,4 @@
-// Colours by numbers: of vertices, and along a direction of whatever has a place.
+// Tests colours by numbers: of vertices, and along a direction for everything that has a place.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -26,7 +26,7 @@ v1::ColorScale BlackToRed() {
 }
 
 TEST_F(ScalesTest, ScalesColorWhateverHasAPlace) {
-  // From the least to the greatest x: the ends of spans have the colours of where they are.
+  // From the least to the greatest x: the ends of spans have the colours of their places.
   for (P (*const make)() : {Arc, Ellipse, Helix, BezierSurface}) {
     P p = make();
     *p.mutable_color_scale() = BlackToRed();
@@ -53,7 +53,7 @@ TEST_F(ScalesTest, ScalesColorLettersOverTheWholeText) {
   const GroupData colored = Group(p);
   ASSERT_EQ(colored.parts.size(), 2u);
   EXPECT_NE(colored.parts[0].geometry, colored.parts[1].geometry) << "each has its own place";
-  // Where nothing rises within a letter, it still has the number of its place.
+  // If nothing changes within a letter, it still has the number of its place.
   Set(p.mutable_color_scale()->mutable_along(), 0, 0, 1);
   EXPECT_EQ(Group(p).parts.size(), 2u);
   for (const v1::Text::Style style : {v1::Text::OUTLINE, v1::Text::STROKES}) {
@@ -78,7 +78,7 @@ TEST_F(ScalesTest, LettersInTheirOwnColoursAreCountedBeforeTheyAreMade) {
   const uint64_t colored = decoded - plain;
   EXPECT_GT(colored, 1000 * sizeof(ScaleTable));
   EXPECT_LT(plain, colored / 10) << "plain ones share one letter";
-  // About as much as that they were reckoned to take.
+  // About as much as was estimated for them.
   decoded = 0;
   limits_.max_uncommitted_bytes = colored * 19 / 20;
   const MaybeFault fault = fault_of(p);

@@ -1,4 +1,5 @@
-// What is wrong with shapes that are drawn by the general method, and what becomes of good ones.
+// Tests shapes that are drawn by the general method: the errors for wrong ones, and the results for
+// valid ones.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// Shells of surfaces made of triangles: meshes, height maps, Bézier patches.
+// Tests shells of surfaces made of triangles: meshes, height maps, Bézier patches.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

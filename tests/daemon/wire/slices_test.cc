@@ -1,4 +1,4 @@
-// Bytes in any number of pieces, and bytes gone wrong.
+// Tests bytes in any number of pieces, and corrupted bytes.
 #include <gmock/gmock.h>
 
 #include <random>
@@ -14,7 +14,7 @@ namespace {
 using ::testing::ElementsAreArray;
 using ::testing::SizeIs;
 
-// One of everything that a stream can carry.
+// Returns one of everything that a stream can carry.
 std::vector<std::string> Corpus() {
   std::vector<v1::StreamRequest> requests = {MeshRequest(), PointsRequest(), SegmentsRequest()};
   v1::StreamRequest* r = &requests.emplace_back(MeshRequest());
@@ -137,7 +137,8 @@ void Mutate(std::string& bytes, std::mt19937& random) {
   }
 }
 
-// Whatever comes in: a status, issues that can be sent, operations that hold what they state.
+// Checks, for any input: a status, issues that can be sent, and operations that hold as much as
+// they state.
 void CheckSound(const Decoded& decoded) {
   if (!decoded.status.ok()) {
     ASSERT_TRUE(decoded.operations.empty() && decoded.refused.issues.empty() && !decoded.open);
@@ -173,7 +174,7 @@ TEST(Mutations, NeverBreakTheDecoder) {
     messages += decoded.status.ok();
     ASSERT_NO_FATAL_FAILURE(CheckSound(decoded)) << "mutation " << i;
   }
-  // Enough of them got past the parser for the checks to have been tried.
+  // Enough of them passed the parser for the checks to have been exercised.
   EXPECT_GT(messages, 5'000);
 }
 

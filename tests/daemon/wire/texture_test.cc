@@ -1,4 +1,5 @@
-// Pictures on meshes and height maps: what is wrong with them, and what becomes of good ones.
+// Tests pictures on meshes and height maps: the errors for wrong ones, and the results for valid
+// ones.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -94,7 +95,7 @@ TEST(TextureFaults, AreTheLimitsToo) {
   EXPECT_THAT(fault->message, HasSubstr("is a picture of 8193 × 1; "));
 }
 
-// What a decoder makes of it, which is sound.
+// Returns the result of decoding it, which must be sound.
 GeometryPtr Decoded(const P& p) {
   Content content;
   const MaybeFault fault = FaultOf(p, &content);

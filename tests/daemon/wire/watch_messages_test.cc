@@ -1,4 +1,4 @@
-// What a watch's messages tell makes the snapshot, whole, whatever states were passed over.
+// Tests that a watch's messages add up to the whole snapshot, whichever states were skipped.
 #include "daemon/wire/watch_messages.h"
 
 #include <gmock/gmock.h>
@@ -20,13 +20,13 @@ using testing::MakeAuthor;
 using testing::Put;
 using testing::StoreFixture;
 
-// A watch and the client at its other end.
+// A watch and the client that receives its messages.
 struct Watch {
   explicit Watch(v1::WatchSceneRequest wanted = {},
                  size_t message_bytes = WatchMessages::kMessageBytes)
       : request(std::move(wanted)), messages(request, message_bytes) {}
 
-  // Messages go over the wire. Answers the greatest.
+  // Sends messages over the wire. Returns the size of the greatest.
   size_t Bring(const SnapshotPtr& target) {
     size_t greatest = 0;
     count = 0;
@@ -67,7 +67,7 @@ class RandomWatches {
     watches_.reserve(6);
     watches_.emplace_back();
     watches_.emplace_back(Request(0, "", true));
-    // Messages that end after one change or a few, so that they end everywhere.
+    // Messages that end after one change or a few, so that they end at every place.
     for (int n = 0; n < 4; ++n) {
       watches_.emplace_back(
           Request(random_() % 3, random_() % 2 == 0 ? absl::StrCat("l", random_() % 4) : "",
@@ -106,8 +106,8 @@ class RandomWatches {
     }
   }
 
-  size_t greatest = 0;  // message
-  int most = 0;         // messages of a change set
+  size_t greatest = 0;  // size of the greatest message
+  int most = 0;         // greatest number of messages of a change set
 
  private:
   Content SomeContent() {
@@ -163,8 +163,8 @@ TEST(WatchMessages, RandomScenesAreKnownWhole) {
     most = std::max(most, watches.most);
   }
   EXPECT_GT(most, 15);  // there were change sets of many messages
-  // The greatest primitive here has 9000 vertices of 15 bytes and as many indices of 4; an object's
-  // parts are three at most.
+  // The greatest primitive here has 9000 vertices of 15 bytes and as many indices of 4; an object
+  // has at most three parts.
   EXPECT_LE(greatest, WatchMessages::kMessageBytes + 3 * 9000 * 19 + 4096);
 }
 
@@ -180,7 +180,7 @@ TEST(WatchMessages, ManyEntitiesComeInManyMessages) {
   EXPECT_LT(watch.Bring(f.store.snapshot()), WatchMessages::kMessageBytes + 512);
   EXPECT_EQ(watch.client.words().entities.size(), 20'000u);
   EXPECT_GT(watch.count, 20);
-  // What differs later is as much as it is.
+  // Later differences take only as many bytes as they need.
   f.Commit(Put("layer", "entity7", Entity1(Dots(2))));
   EXPECT_LT(watch.Bring(f.store.snapshot()), 512u);
   EXPECT_EQ(watch.count, 1);
@@ -225,7 +225,8 @@ TEST(WatchMessages, HoldsTwoSnapshotsAtMost) {
   EXPECT_THAT(alive(), ::testing::ElementsAre(6, 9));
 }
 
-// 45 parts of 48 MiB, one geometry in truth: what no message holds ends a watch of contents.
+// 45 parts of 48 MiB that are in fact one geometry: contents that fit into no message end a watch
+// of contents.
 TEST(WatchMessages, ContentsBeyondAMessageAreRefused) {
   auto part = std::make_shared<GeometryData>(*std::get<GeometryPtr>(Content(Dots(0))));
   part->record.vertex_count = 4 << 20;

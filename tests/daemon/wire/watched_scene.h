@@ -1,5 +1,5 @@
-// What a client that watches the scene knows, from messages alone; and the same from a snapshot, in
-// words, to be compared.
+// The knowledge of a client that watches the scene, from messages alone; and the same from a
+// snapshot, as text, for comparison.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ inline std::string InWords(const GeometryData& g) {
   for (const float param : r.params) absl::StrAppendFormat(&text, "%a ", param);
   for (int axis = 0; axis < 3; ++axis)
     absl::StrAppendFormat(&text, "%a-%a ", g.min[axis], g.max[axis]);
-  // Bit for bit, as zero has two signs.
+  // Bit for bit, since zero has two signs.
   const auto bytes = [&](const auto& array) {
     text += ") (";
     text.append(reinterpret_cast<const char*>(array.data()), array.size() * 4);
@@ -47,7 +47,7 @@ inline std::string InWords(const gpu::Affine& map) {
       map.m, ",", [](std::string* out, double value) { absl::StrAppendFormat(out, "%a", value); });
 }
 
-// Everything that decoding an entity's primitive gives.
+// Returns everything that decoding an entity's primitive gives.
 inline std::string InWords(const Content& content) {
   if (const auto* instance = std::get_if<InstanceRef>(&content)) {
     return absl::StrCat("of ", instance->object, " #", absl::Hex(instance->tint));
@@ -75,7 +75,7 @@ inline std::string InWords(const v1::Primitive& primitive) {
   return fault.has_value() ? "" : InWords(content);
 }
 
-// Key → what is told of it.
+// Maps keys to what is reported about them.
 struct SceneInWords {
   std::map<std::pair<uint64_t, std::string>, std::string> layers, objects;
   std::map<std::tuple<uint64_t, std::string, std::string>, std::string> entities;
@@ -120,8 +120,8 @@ inline SceneInWords InWords(const Snapshot& scene, const v1::WatchSceneRequest& 
   return words;
 }
 
-// What messages have told, in the order that the contract gives: removals first, then layers and
-// objects, then entities.
+// The contents of messages, which arrive in the order that the contract gives: removals first, then
+// layers and objects, then entities.
 class WatchedScene {
  public:
   void Apply(const v1::WatchSceneResponse& message) {
@@ -167,7 +167,7 @@ class WatchedScene {
   }
 
   const SceneInWords& words() const { return words_; }
-  uint64_t in_sync() const { return in_sync_; }  // the last number told; 0: none yet
+  uint64_t in_sync() const { return in_sync_; }  // the last number reported; 0: none yet
 
  private:
   SceneInWords words_;

@@ -9,7 +9,7 @@
 namespace voxeld::daemon::model {
 namespace {
 
-constexpr double kFar = 1e12;  // outside on every display
+constexpr double kFar = 1e12;  // outside of every display
 
 std::string LayerName(Chance& chance) {
   static const char* const kNames[] = {"a", "b", "c"};
@@ -229,7 +229,7 @@ Script MakeScript(uint32_t seed) {
       {ActionKind::kClearLayer, 2}, {ActionKind::kControl, 3},    {ActionKind::kEvict, 1}};
   uint32_t sum = 0;
   for (const auto& [kind, weight] : kWeights) sum += weight;
-  // Somebody is there from the beginning.
+  // Some clients are there from the beginning.
   for (uint32_t i = 0; i < 3; ++i) script.actions.push_back({ActionKind::kOpen, i, chance.Next()});
   const uint32_t length = 80 + chance.Pick(320);
   while (script.actions.size() < length) {

@@ -1,5 +1,5 @@
-// What may happen to a core: plain data, so that a run can be repeated, cut down and printed. An
-// action means something whatever went before it; where it has nothing to act on it does nothing.
+// The actions on a core as plain data, so that a run can be repeated, shrunk and printed. An action
+// is valid whatever came before it; without anything to act on it does nothing.
 #pragma once
 
 #include <cstdint>
@@ -37,12 +37,12 @@ struct Action {
   uint32_t chance = 0;  // decides the details
 };
 
-// What a seed stands for.
+// The script of a seed.
 struct Script {
   uint32_t seed = 0;
   Limits limits;
   int displays = 1;
-  bool settles = true;  // ends when all is shown and everybody has left; else in the middle
+  bool settles = true;  // ends once all is shown and all clients have left; else midway
   std::vector<Action> actions;
 };
 
@@ -50,7 +50,7 @@ inline constexpr uint32_t kPlaces = 6;
 
 Script MakeScript(uint32_t seed);
 
-// A small fast source of chance; the same on every machine.
+// A small, fast source of random numbers; the same on every machine.
 class Chance {
  public:
   explicit Chance(uint32_t seed) : state_(seed * 0x9E3779B97F4A7C15ull + 0x632BE59BD9B4E019ull) {}
@@ -69,15 +69,15 @@ class Chance {
 
 OpenOptions RandomOpen(Chance& chance);
 
-// One message: some operations, sequences after `last`, perhaps a commit or two; and what decoding
-// refused of it.
+// One message: some operations with sequences after `last`, perhaps one or two commits, and the
+// refusals of its decoding.
 struct RandomMessage {
   std::vector<Operation> operations;
   std::vector<Issue> malformed;
   uint64_t bytes = 0;
-  std::string text;  // for people
+  std::string text;  // a readable description
 };
-// What messages draw with.
+// The geometries with which messages draw.
 struct Palette {
   GeometryPtr (*geometry)(Chance&);
   gpu::Affine (*map)(Chance&);

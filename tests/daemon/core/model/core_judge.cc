@@ -15,7 +15,7 @@ void CoreJudge::Begin() {
 }
 
 void CoreJudge::Over() {
-  // What the core still does at its end is nobody's any more.
+  // The core's actions during its shutdown are not judged.
   stopping_ = true;
   if (wrong_.empty()) wrong_ = "over";
 }
@@ -43,7 +43,7 @@ bool CoreJudge::Certain(const PlainSession& session) {
   return !session.options.no_outcomes && session.owed == session.owed_most;
 }
 
-// --------------------------------------------------------------------------- without a receipt
+// ----------------------------------------------------------------- effects without a receipt
 
 uint64_t CoreJudge::AddEffect(std::function<bool(uint64_t)> run) {
   effects_.push_back({next_effect_, std::move(run)});
@@ -78,7 +78,7 @@ void CoreJudge::RunEffects(uint64_t id) {
 
 void CoreJudge::Explain(uint64_t before) {
   while (wrong_.empty() && !published_.empty() && published_.front() < before) {
-    // What is over at once, time brings about in the same step.
+    // A change that is over at once is made by time in the same step.
     if (effects_.empty()) {
       AddEffect(Changing([this] { plain_.PassTime(clock().Now()); }));
       if (!RunEffect()) {
@@ -120,7 +120,7 @@ void CoreJudge::OnPublished() {
   published_.push_back(number);
 }
 
-// --------------------------------------------------------------------------------- what is told
+// ------------------------------------------------------------------------- reports to clients
 
 void CoreJudge::OnIssue(Stream& stream, const Issue& issue) {
   if (!wrong_.empty()) return;
@@ -161,12 +161,13 @@ void CoreJudge::CheckIssues(Stream& stream, const PlainTurn& turn) {
   ExpectIssues(stream, expected);
 }
 
-// Whose turn it is, is for the core to say; that it may be, and that nobody is passed over, is not.
+// The core may choose whose turn it is; but the session must be allowed to go, and none may be
+// passed over.
 void CoreJudge::CheckTurn(PlainSession& session, uint64_t sequence) {
   if (!session.waits() && !plain_.MayBeDue(session, sequence, clock().Now())) {
     return Fail("a receipt of no commit that waits");
   }
-  if (session.options.no_outcomes) session.hold.reset();  // its end is not told
+  if (session.options.no_outcomes) session.hold.reset();  // no receipt reports its end
   if (!plain_.MayGo(session, session.options.no_outcomes ? 0 : session.owed)) {
     return Fail(session.hold.has_value() ? "a commit passed one that must be shown first"
                                          : "a commit was taken up though its session has to wait");

@@ -1,7 +1,8 @@
-// A core and the plain one, side by side: what clients and operators do is done to both, and what the core tells and
-// publishes is followed as it happens and must be what the model says. Order between sessions is the core's to
-// choose, within the rules; everything else is not. Who derives says what displays there are and what becomes of
-// commits on them.
+// A core and the plain model, side by side: the actions of clients and operators are applied to
+// both, and what the core reports and publishes is followed as it happens and must be what the
+// model says. The core may choose the order between sessions, within the rules; everything else is
+// determined. The derived class says which displays there are and what the outcomes of commits on
+// them are.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +30,7 @@ class CoreJudge {
   virtual ~CoreJudge() = default;
 
   const PlainCore::Figures& figures() const { return plain_.figures; }
-  // Of all that happened: the same seed gives the same.
+  // A hash of every event: the same seed gives the same hash.
   uint64_t trace_hash() const { return trace_hash_; }
 
  protected:
@@ -47,49 +48,51 @@ class CoreJudge {
     Stream* const stream;
     bool crowded = false;
   };
-  // One Open and what came of it.
+  // One Open and its results.
   struct Stream {
     std::shared_ptr<Sink> sink;
     OpenOptions options;
     SessionInfo info;
     bool opening = false;
     bool open = false;
-    bool gone = false;     // its client hears nothing any more
-    bool may_end = false;  // somebody ends it
+    bool gone = false;     // its client receives nothing any longer
+    bool may_end = false;  // an action may end it
     bool ended = false;
     uint64_t last_sequence = 0, next_frame_id = 0;
     uint64_t told_credit = 0;
     bool waits_for_room = false;
     int rooms = 0;
     std::vector<Issue> issues;      // not accounted for yet
-    std::vector<Receipt> outcomes;  // told
+    std::vector<Receipt> outcomes;  // reported outcomes
   };
 
-  // With `trace` every action and what it brings about is written there.
+  // With `trace`, every action and its effects are written to it.
   CoreJudge(const Limits& limits, std::vector<std::string> displays, std::ostream* trace);
 
-  // ---- what derives says
+  // ---- defined by the derived class
   virtual Core& core() = 0;
   virtual sync::FakeClock& clock() = 0;
-  // Does all that is due at this time.
+  // Does everything that is due at this time.
   virtual void RunToRest() = 0;
   virtual RandomMessage Compose(Chance& chance, uint64_t last_sequence,
                                 uint64_t* next_frame_id) = 0;
   virtual void OnApplied(const OutcomeLedger::Commit& commit) = 0;
   // The scene of that snapshot is now plain_.scene.
   virtual void OnPictured(uint64_t snapshot) = 0;
-  // What is wrong with an outcome that a session was told; empty: nothing.
+  // Returns what is wrong with an outcome that was reported to a session; empty: nothing.
   virtual std::string OnTold(uint64_t session, const Receipt& receipt,
                              const CommitOutcome& outcome) = 0;
   virtual void OnTakenBack(uint64_t session, const Receipt& receipt) = 0;
-  // Outcomes of this incarnation of the session that were not told; the first is described.
+  // Returns the number of outcomes of this incarnation of the session that were not reported;
+  // describes the first in `which`.
   virtual uint64_t Missing(uint64_t session, uint64_t incarnation, std::string* which) const = 0;
-  // Whether what is kept of that snapshot, or of a newer one, has been written.
+  // Returns whether the persistent part of that snapshot, or of a newer one, has been written.
   virtual bool IsOnDisk(uint64_t /*snapshot*/) const { return false; }
-  // Whether a display shows and has nothing to do: then nobody is owed an outcome on it.
+  // Returns whether a display is showing and has nothing to do: then no outcome on it is
+  // outstanding.
   virtual bool Idle(size_t display) = 0;
 
-  // ---- core_judge.cc: what the core does
+  // ---- core_judge.cc: the core's actions
   void OnIssue(Stream& stream, const Issue& issue);
   void OnReceipt(Stream& stream, const Receipt& receipt);
   void OnOutcome(Stream& stream, const Receipt& receipt, const CommitOutcome& outcome);
@@ -99,13 +102,14 @@ class CoreJudge {
   void OnPublished();
 
   void Begin();  // the core has been started
-  // From the end of a derived destructor on, nothing is judged any more.
+  // Must be called first in a derived destructor: from then on, nothing is judged.
   void Over();
   void Fail(std::string what);
   void Trace(const std::string& line);
   PlainSession* SessionOf(const Stream& stream);
   bool IsLive(const Stream* stream);
-  // Outcomes of a session that asks for none are not seen, nor those that came while it was dormant.
+  // Returns false if not all outcomes of the session are seen: it asks for none, or some came while
+  // it was dormant.
   static bool Certain(const PlainSession& session);
   void CheckTurn(PlainSession& session, uint64_t sequence);
   void CheckIssues(Stream& stream, const PlainTurn& turn);
@@ -113,7 +117,8 @@ class CoreJudge {
   void Note(const PlainSession& session, const PlainTurn& turn, uint64_t snapshot);
   void ExpectIssues(Stream& stream, const std::vector<Refusal>& expected);
 
-  // What the core does without a receipt, in its order: true if that makes a new snapshot.
+  // An effect of the core without a receipt, in the core's order. Its function returns true if it
+  // makes a new snapshot.
   struct Effect {
     uint64_t id = 0;
     std::function<bool(uint64_t snapshot)> run;
@@ -126,7 +131,7 @@ class CoreJudge {
   void AddTurns(uint64_t session);
   void AddFinish(uint64_t session, bool turns);
 
-  // ---- judge_checks.cc: what must hold when the core has come to rest
+  // ---- judge_checks.cc: the checks when the core is at rest
   void Step();
   void CheckAtRest();
   void CheckScene();
@@ -135,8 +140,8 @@ class CoreJudge {
   void CheckStats();
   Stats AskStats();
 
-  // ---- judge_actions.cc, judge_ends.cc: what is done to the core
-  // True: the action was one of clients or operators.
+  // ---- judge_actions.cc, judge_ends.cc: the actions on the core
+  // Returns true if the action was one of clients or operators.
   bool Act(const Action& action, Chance& chance);
   void Open(uint32_t place, OpenOptions options);
   void Resume(uint32_t place, Chance& chance);
@@ -149,12 +154,12 @@ class CoreJudge {
 
   void EverybodyReads();
   void EverybodyLeaves();  // all sessions end
-  void EvictEverybody();   // and what they kept goes
-  // Nothing is charged for clients any more, and every outcome is accounted for.
+  void EvictEverybody();   // and their persistent layers are removed
+  // Checks that nothing is charged for clients any longer, and that every outcome is accounted for.
   void CheckNothingIsHeld(uint64_t owed, uint64_t told);
-  // Everything is shown: nobody waits, and nobody is owed anything.
+  // Checks that everything is shown: no client waits, and no outcome is outstanding.
   void CheckNobodyWaits();
-  // The core is stopped while sessions are open.
+  // Stops the core while sessions are open.
   void StopInTheMiddle();
 
   const Limits limits_;
@@ -173,9 +178,9 @@ class CoreJudge {
   uint64_t checked_ = 0;            // whose scene was compared
   int replies_due_ = 0;
   bool stopping_ = false;
-  uint64_t owed_unit_ = 0;  // bytes that an outcome weighs
+  uint64_t owed_unit_ = 0;  // bytes that a pending outcome takes
   std::set<std::tuple<uint64_t, uint64_t, uint64_t, std::string>> given_back_;
-  // Session, incarnation and sequence of commits that are to be told DURABLE: their snapshots.
+  // Session, incarnation and sequence of commits that must be reported DURABLE: their snapshots.
   std::map<std::tuple<uint64_t, uint64_t, uint64_t>, uint64_t> undurable_;
   uint64_t durables_owed_ = 0, durables_told_ = 0;
 };

@@ -1,4 +1,4 @@
-// What an engine was told to draw, in the words of the plain scene.
+// The drawing that was requested of an engine, in the terms of the plain scene.
 #pragma once
 
 #include "tests/daemon/core/model/plain_scene.h"

@@ -1,4 +1,4 @@
-// What is done to the core by clients and operators, and what the model is told of it.
+// The actions of clients and operators on the core, and how the model is informed of them.
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
@@ -28,7 +28,7 @@ bool CoreJudge::Act(const Action& action, Chance& chance) {
       Resume(place, chance);
       return true;
     case ActionKind::kSend:
-      // Now and then several before the core gets round to it.
+      // Now and then several messages before the core runs.
       for (uint32_t i = live ? 1 + chance.Pick(12) / 10 * chance.Pick(4) : 0; i > 0; --i) {
         Send(place, chance, /*step=*/i == 1 && !chance.OneIn(3));
       }
@@ -84,7 +84,7 @@ void CoreJudge::Open(uint32_t place, OpenOptions options) {
                      options.no_outcomes ? " no_outcomes" : "",
                      options.owner_token.empty() ? "" : " joining",
                      options.resume_token.empty() ? "" : " resuming"));
-  // A session that is taken up while it is open ends first.
+  // A session that is resumed while it is open ends first.
   uint64_t ends = 0;
   if (const uint64_t id = plain_.SessionOf(options.resume_token);
       !options.resume_token.empty() && plain_.MayOpen(options) == absl::StatusCode::kOk &&
@@ -92,7 +92,8 @@ void CoreJudge::Open(uint32_t place, OpenOptions options) {
     for (const std::unique_ptr<Stream>& other : streams_) {
       if (other->open && SessionOf(*other) == &plain_.sessions.at(id)) other->may_end = true;
     }
-    plain_.sessions.at(id).options.on_disconnect = DisconnectPolicy::kKeep;  // its layers go over
+    // its layers pass to the new one
+    plain_.sessions.at(id).options.on_disconnect = DisconnectPolicy::kKeep;
     AddFinish(id, /*turns=*/true);
     ends = next_effect_ - 1;
   }
@@ -108,7 +109,8 @@ void CoreJudge::Open(uint32_t place, OpenOptions options) {
                                    static_cast<int>(expected)));
         }
         if (!info.ok()) return;
-        // What is over before: a session that it takes up, or closes that were asked for earlier.
+        // Effects that come before: the end of the resumed session, or closes that were requested
+        // earlier.
         RunEffects(ends != 0 || !options.resume_token.empty() ? next_effect_ : 0);
         stream->info = *info;
         stream->open = true;
@@ -138,7 +140,7 @@ void CoreJudge::Open(uint32_t place, OpenOptions options) {
 void CoreJudge::Resume(uint32_t place, Chance& chance) {
   if (tokens_.empty()) return;
   OpenOptions options = RandomOpen(chance);
-  // Rather one of the newest, which may still be good.
+  // Preferably one of the newest, which may still be valid.
   const size_t back = std::min<size_t>(tokens_.size(), 6);
   options.resume_token = tokens_[tokens_.size() - 1 - chance.Pick(static_cast<uint32_t>(back))];
   Step();
@@ -198,7 +200,7 @@ void CoreJudge::Close(uint32_t place, bool gone, uint32_t given_back) {
     receipts.insert(receipts.begin(), receipt);
   }
   if (!receipts.empty()) core().GiveBack(id, std::move(receipts));
-  Step();  // one at a time: what it does without receipts could not be told from another's
+  Step();  // one at a time: its effects without receipts could not be distinguished from another's
 }
 
 void CoreJudge::Crowd(Stream& stream, bool crowded) {

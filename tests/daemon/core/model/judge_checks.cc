@@ -1,4 +1,4 @@
-// What must hold whenever the core has come to rest.
+// The invariants whenever the core is at rest.
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
@@ -58,7 +58,7 @@ void CoreJudge::CheckStreams() {
       return Fail(
           absl::StrCat("a commit of session ", session->id, " waits, and nothing holds it"));
     }
-    // Credit: exactly what was sent and is over comes back, in steps of a quarter.
+    // Credit: exactly the bytes that were sent and handled are given back, in steps of a quarter.
     const uint64_t credit = limits_.credit_bytes;
     const uint64_t due = session->received - session->outstanding() + credit;
     if (stream->told_credit > due) {
@@ -77,7 +77,7 @@ void CoreJudge::CheckStreams() {
   }
 }
 
-// As a client sees it.
+// Compares the scene as a client sees it.
 void CoreJudge::CheckScene() {
   if (!wrong_.empty()) return;
   checked_ = seen_;
@@ -220,7 +220,7 @@ void CoreJudge::CheckStats() {
     pending += f.commits_pending;
     if (Idle(d)) same("commits_pending of a display with nothing to do", f.commits_pending, 0);
   }
-  // Where none is kept for a resume, every outcome that is to come weighs the same.
+  // If none is kept for a resume, every outstanding outcome takes the same memory.
   if (plain_.dormant.empty() && plain_.figures.resumed == 0) {
     if (owed_unit_ == 0 && pending > 0) owed_unit_ = stats.memory.owed / pending;
     same("memory.owed", stats.memory.owed, pending * owed_unit_);

@@ -1,4 +1,4 @@
-// How clients end.
+// How clients leave.
 #include "absl/strings/str_cat.h"
 #include "tests/daemon/core/model/core_judge.h"
 
@@ -62,7 +62,7 @@ void CoreJudge::CheckNothingIsHeld(uint64_t owed, uint64_t told) {
     Fail(absl::StrCat(owed, " outcomes were owed, and ", told, " told or counted as undelivered"));
   }
   for (size_t use = 0; use < Budget::kUses; ++use) {
-    // An engine holds memory while there is one.
+    // An engine holds memory as long as it exists.
     if (static_cast<Budget::Use>(use) == Budget::Use::kEngines) continue;
     const uint64_t held = core().budget()->used_bytes(static_cast<Budget::Use>(use));
     if (held != 0) {
@@ -71,7 +71,7 @@ void CoreJudge::CheckNothingIsHeld(uint64_t owed, uint64_t told) {
   }
 }
 
-// Who is there when the daemon ends is told what became of each commit that was accepted.
+// Clients that are connected at shutdown receive the outcome of each accepted commit.
 void CoreJudge::StopInTheMiddle() {
   if (!wrong_.empty()) return;
   Trace("the core stops");

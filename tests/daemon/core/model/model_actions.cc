@@ -1,4 +1,4 @@
-// What is done to the core's displays, and what the model is told of it.
+// The actions on the core's displays, and how the model is informed of them.
 #include <algorithm>
 #include <exception>
 

@@ -1,4 +1,4 @@
-// How a run ends, and how one that went wrong is cut down.
+// How a run ends, and how a run with an error is shrunk.
 #include <algorithm>
 #include <sstream>
 
@@ -7,7 +7,7 @@
 
 namespace voxeld::daemon::model {
 
-// Everything comes back and is shown: then nobody is owed anything any more.
+// Every display returns and shows everything: then no outcome is outstanding.
 void ModelRun::Settle() {
   Trace("everything settles");
   for (size_t d = 0; d < now_.size() && wrong_.empty(); ++d) {

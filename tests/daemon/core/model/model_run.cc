@@ -39,7 +39,7 @@ ModelRun::ModelRun(const Script& script, std::ostream* trace)
 }
 
 ModelRun::~ModelRun() {
-  // What the core still does at its end is nobody's any more.
+  // The core's actions during its shutdown are not judged.
   for (size_t d = 0; d < now_.size(); ++d) {
     sim_.engine(static_cast<int>(d)).on_submit = nullptr;
     sim_.engine(static_cast<int>(d)).on_frame = nullptr;
@@ -75,7 +75,7 @@ bool ModelRun::Idle(size_t d) {
          sim_.engine(static_cast<int>(d)).calls.empty();
 }
 
-// ------------------------------------------------------------------------------ what is drawn
+// ------------------------------------------------------------------------------ drawing
 
 void ModelRun::OnSubmit(size_t display, uint64_t volume) {
   if (!wrong_.empty()) return;

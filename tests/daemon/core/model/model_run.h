@@ -1,4 +1,5 @@
-// One script on the real core and on the plain one (core_judge.h), with scripted displays and recording engines.
+// Runs one script on the real core and on the plain one (core_judge.h), with scripted displays and
+// recording engines.
 #pragma once
 
 #include <map>
@@ -13,11 +14,11 @@ namespace voxeld::daemon::model {
 
 class ModelRun final : public CoreJudge {
  public:
-  // With `trace` every action and what it brings about is written there.
+  // With `trace`, every action and its effects are written to it.
   explicit ModelRun(const Script& script, std::ostream* trace = nullptr);
   ~ModelRun() override;
 
-  // The first thing that was wrong; empty: nothing.
+  // Returns the first error; empty: none.
   std::string Run();
 
   const OutcomeLedger& ledger() const { return ledger_; }
@@ -46,7 +47,7 @@ class ModelRun final : public CoreJudge {
   void OnFrame(size_t display, uint64_t volume, const testing::SceneModel& scene);
   static size_t HashOf(const std::string& text);
 
-  // ---- model_actions.cc: what is done to the displays
+  // ---- model_actions.cc: the actions on displays
   void RunScript();
   void Do(const Action& action);
   void Advance(sync::TimeNs delta);
@@ -69,12 +70,12 @@ class ModelRun final : public CoreJudge {
     std::string armed;  // the engine's next failure
   };
   std::vector<DisplayNow> now_;
-  uint64_t happenings_ = 0;  // numbers reasons, so that each is its own
-  testing::Simulation sim_;  // last: it goes first
+  uint64_t happenings_ = 0;  // numbers reasons, so that each is unique
+  testing::Simulation sim_;  // declared last, so that it is destroyed first
 };
 
-// Runs a script; where something is wrong, cuts it down to few actions with which something still
-// is, and answers that with its trace.
+// Runs a script. If there is an error, shrinks the script to few actions that still have one, and
+// returns that error with its trace.
 std::string RunAndShrink(const Script& script);
 
 }  // namespace voxeld::daemon::model

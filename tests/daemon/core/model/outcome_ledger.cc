@@ -52,7 +52,7 @@ void OutcomeLedger::Drawn(size_t display, uint64_t volume, size_t picture) {
 }
 
 void OutcomeLedger::Sent(size_t display, uint64_t volume) {
-  // A black one of the display's own has no number.
+  // A black volume of the display's own has no number.
   if (Volume* sent = FindVolume(displays_[display], volume)) sent->sent = true;
 }
 
@@ -186,7 +186,7 @@ std::string OutcomeLedger::JudgePresented(Entry& entry, size_t d, const CommitOu
     return absl::StrCat("PRESENTED in volume ", outcome.volume,
                         ", though an earlier one with it was sent");
   }
-  // Of one session's commits that ride in one volume only the newest is.
+  // If several commits of one session are shown by one volume, only the newest is presented.
   entry.on[d].presented = outcome.volume;
   if (presented_[{d, entry.commit.session, outcome.volume}]++ > 0) {
     return absl::StrCat("a second PRESENTED of one session in volume ", outcome.volume);
@@ -203,9 +203,9 @@ std::string OutcomeLedger::JudgeUnchanged(const Entry& entry, size_t d,
   for (const Volume& volume : displays_[d].volumes) {
     if (volume.snapshot < entry.commit.snapshot || !volume.picture.has_value()) continue;
     if (*volume.picture == *same->picture) return "";
-    break;  // the first drawn with it decides
+    break;  // the first one drawn with it decides
   }
-  // None was drawn: nothing that an engine sees had changed.
+  // No volume was drawn for it: nothing had changed that an engine sees.
   for (auto it = pictures_.lower_bound(entry.commit.snapshot); it != pictures_.end(); ++it) {
     if (it->second == *same->picture) return "";
   }

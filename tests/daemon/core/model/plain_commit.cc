@@ -1,4 +1,4 @@
-// One commit on the plain scene: operation by operation, on a copy of what its owner has.
+// Applies one commit to the plain scene: operation by operation, on a copy of its owner's part.
 #include <algorithm>
 
 #include "daemon/scene/snapshot.h"
@@ -32,7 +32,7 @@ class PlainScene::Commit {
     verdict_.hidden = OnlyHidden();
     return verdict_;
   }
-  // Undoes it.
+  // Reverts the commit.
   void Forget() { owner_ = before_; }
 
  private:
@@ -79,7 +79,7 @@ class PlainScene::Commit {
     return it->second;
   }
 
-  // Quotas say what may be added, not what may be there.
+  // Quotas limit additions, not what already exists.
   bool OverQuota(const PlainCount& was, const PlainCount& all_was, uint64_t drawables,
                  uint64_t bytes) const {
     const Limits& limits = scene_.limits_;
@@ -154,7 +154,7 @@ class PlainScene::Commit {
     }
     const auto layer = owner_.layers.find(op.layer);
     if (layer == owner_.layers.end()) {
-      ++verdict_.applied_operations;  // nothing matching is no error
+      ++verdict_.applied_operations;  // it is not an error if nothing matches
       return;
     }
     auto& entities = layer->second.entities;
@@ -230,7 +230,7 @@ class PlainScene::Commit {
     for (const Operation* inside : frame.inside) {
       std::visit([&](const auto& inner) { Do(inside->sequence, inner); }, inside->op);
     }
-    ++verdict_.applied_operations;  // its beginning
+    ++verdict_.applied_operations;  // its FrameBegin
     Applied(op.layer);
   }
 

@@ -19,7 +19,7 @@ uint64_t Sum(const std::vector<uint64_t>& values) {
   return std::accumulate(values.begin(), values.end(), uint64_t{0});
 }
 
-// What an operation holds while it waits.
+// Returns the bytes that an operation holds while it waits.
 uint64_t WeightOf(const Operation& operation) {
   uint64_t bytes = sizeof(Operation) + sizeof(WaitingCommit::Cost);
   if (const auto* op = std::get_if<Upsert>(&operation.op)) {
@@ -43,7 +43,7 @@ uint64_t WeightOf(const Operation& operation) {
   return bytes;
 }
 
-// A whole frame in a commit: its first operation and its last.
+// A whole draw batch in a commit: its first operation and its last.
 struct FrameSpan {
   std::string layer;
   size_t first = 0, last = 0;
@@ -206,12 +206,12 @@ void PlainCore::Seal(PlainSession& session, const Operation& operation) {
   if (session.options.flow != FlowPolicy::kReliable) GiveUpFrames(session);
 }
 
-// Of the frames that wait for their turn only the newest of each layer stay. What is to be shown in
-// any case, or at its time, is no such frame.
+// Keeps only the newest waiting draw batch of each layer. Batches that must be shown, or that have
+// a time, are not affected.
 void PlainCore::GiveUpFrames(PlainSession& session) {
   const size_t kept =
       session.options.flow == FlowPolicy::kLatest ? 1 : session.options.drop_oldest_frames;
-  std::map<std::string, size_t> newer;  // of the layer, seen so far
+  std::map<std::string, size_t> newer;  // of each layer, seen so far
   for (auto commit = session.queue.rbegin(); commit != session.queue.rend(); ++commit) {
     if (commit->commit.must_show || commit->commit.present_at_ns != 0) continue;
     const std::vector<FrameSpan> frames = FramesOf(*commit);
@@ -280,7 +280,7 @@ PlainTurn PlainCore::TakeTurn(PlainSession& session, sync::TimeNs now, const Hea
     session.due.front().late_known = false;
     session.timed.erase(it);
   } else if (heard != nullptr && early > 0 && !session.due.empty()) {
-    // Those that are for the same sweep go in the order in which they came.
+    // Commits for the same sweep are applied in the order in which they arrived.
     const auto it = std::find_if(
         session.due.begin(), session.due.end(),
         [&](const PlainCommit& waiting) { return waiting.sequence == heard->sequence; });
@@ -301,7 +301,7 @@ PlainTurn PlainCore::TakeTurn(PlainSession& session, sync::TimeNs now, const Hea
     const sync::TimeNs at = commit.commit.present_at_ns;
     commit.late = at != 0 && at < now;
     const bool soon = heard != nullptr && !heard->scheduled && at - now <= early;
-    // Its sweep may be told to begin a little after its time.
+    // Its sweep may be reported to begin a little after its time.
     const bool put_off = heard != nullptr && heard->scheduled && at != 0 && at + slack > now;
     if ((at > now && !soon) || put_off) {
       const bool beyond = at - now > limits_.max_present_at_horizon_ns;

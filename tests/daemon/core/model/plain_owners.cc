@@ -1,4 +1,4 @@
-// What operators do, and what becomes of owners.
+// The actions of operators, and their effects on owners.
 #include <algorithm>
 
 #include "tests/daemon/core/model/plain_core.h"

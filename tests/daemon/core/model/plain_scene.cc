@@ -15,7 +15,7 @@ void Append(std::string& text, const T& value) {
   text.append(reinterpret_cast<const char*>(&value), sizeof(value));
 }
 
-// Zero has one sign here.
+// Both zeros are written alike.
 void AppendMap(std::string& text, const gpu::Affine& map) {
   for (const double value : map.m) Append(text, value + 0.0);
 }
@@ -164,7 +164,8 @@ uint64_t PlainScene::LayerBytes(const PlainLayer& layer, const std::string& name
 uint64_t PlainScene::Drawables(const PlainOwner& owner, const Content& content) const {
   const std::string* object = Child(content);
   if (object == nullptr) return 1;
-  // Inside an object an empty one draws nothing; an instance in a layer counts as one at least.
+  // Inside an object, an empty one draws nothing; an instance in a layer counts as at least one
+  // drawable.
   const auto inside = [&](const auto& self, const std::string& name) -> uint64_t {
     uint64_t sum = 0;
     for (const ObjectPart& part : owner.objects.at(name)) {
@@ -250,12 +251,12 @@ bool PlainScene::Reaches(const PlainOwner& owner, const Content& content, const 
 
 bool PlainScene::TooFar(const PlainOwner& owner, const Content& content,
                         const gpu::Affine& in_layer, const gpu::Affine& layer) const {
-  // Views multiply by 4; what tests draw is either well inside or far out.
+  // Views multiply by 4; what tests draw is either well inside or far outside.
   return displays_ &&
          Reaches(owner, content, Product(layer, in_layer), limits_.max_coordinate_voxels / 4);
 }
 
-// Whether `object` holds `child`, directly or through others.
+// Returns whether `object` contains `child`, directly or through others.
 bool PlainScene::Uses(const PlainOwner& owner, const std::string& object,
                       const std::string& child) {
   const auto it = owner.objects.find(object);
@@ -266,7 +267,8 @@ bool PlainScene::Uses(const PlainOwner& owner, const std::string& object,
   });
 }
 
-// ------------------------------------------------------------------------------ without a commit
+// ------------------------------------------------------------------------- effects without a
+// commit
 
 void PlainScene::Expire(sync::TimeNs now) {
   for (auto& [number, owner] : owners) {

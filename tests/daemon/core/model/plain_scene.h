@@ -1,6 +1,6 @@
-// The scene as its rules say, written down a second time: maps that are searched from end to end,
-// nothing kept that can be counted. For judging the store; shares its words only (operations,
-// sizes of records), none of its code.
+// A second implementation of the scene's rules: maps that are searched from end to end, without
+// stored counts. It judges the store, and shares only its types (operations, sizes of records),
+// none of its code.
 #pragma once
 
 #include <cstdint>
@@ -40,10 +40,10 @@ struct PlainOwner {
   std::map<std::string, PlainLayer> layers;
   std::map<std::string, std::vector<ObjectPart>> objects;
   bool hidden = false;
-  uint64_t max_bytes = UINT64_MAX, max_entities = UINT64_MAX;  // as an operator set them
+  uint64_t max_bytes = UINT64_MAX, max_entities = UINT64_MAX;  // as set by an operator
 };
 
-// An Issue that is to come. Where two reasons hold at once either may be told.
+// An expected Issue. If two reasons apply at once, either may be reported.
 struct Refusal {
   uint64_t sequence = 0;
   Reason reason = Reason::kUnspecified;
@@ -60,32 +60,32 @@ struct PlainAuthor {
 };
 
 struct PlainVerdict {
-  bool applied = false;  // false: strict, and something was refused
+  bool applied = false;  // false: strict, and an operation was refused
   uint64_t applied_operations = 0, refused_operations = 0;
-  std::vector<Refusal> refusals;  // told one by one
-  bool hidden = false;  // it acted on layers that were and are hidden, and on nothing else
+  std::vector<Refusal> refusals;  // reported one by one
+  bool hidden = false;            // it changed only layers that were and are hidden
 };
 
-// What counts against quotas.
+// The amounts that count against quotas.
 struct PlainCount {
   uint64_t entities = 0, layers = 0, objects = 0, bytes = 0;
-  uint64_t drawables = 0;  // an instance counts as what it draws
+  uint64_t drawables = 0;  // an instance counts as its drawables
 };
 
 class PlainScene {
  public:
-  // Without a display nothing is too far out.
+  // Without a display, nothing is out of range.
   PlainScene(const Limits& limits, bool displays) : limits_(limits), displays_(displays) {}
 
   std::map<uint64_t, PlainOwner> owners;
 
-  // What is wrong with an operation whatever the scene is.
+  // Returns the reason for which an operation is refused whatever the scene is.
   static std::optional<Reason> WrongAlone(const Operation& operation, const Limits& limits);
 
   PlainVerdict Apply(const PlainAuthor& author, const std::vector<Operation>& operations,
                      sync::TimeNs now, uint64_t refused_before);
   void Expire(sync::TimeNs now);
-  // The layers that `session` last wrote go, or change hands.
+  // Removes the layers that `session` last wrote, or hands them over.
   void RemoveLayersOf(uint64_t session);
   void HandOver(uint64_t session, const std::string& client_name, bool orphaned);
   bool HasLayers(uint64_t session) const;
@@ -98,10 +98,10 @@ class PlainScene {
                               const EntityData& data);
   uint64_t LayerBytes(const PlainLayer& layer, const std::string& name) const;  // its entities'
 
-  // All that the rules speak of, as text: equal scenes, equal texts.
+  // Returns everything that the rules determine, as text: equal scenes give equal texts.
   std::string Fingerprint() const;
-  // What an engine is to draw: the layers in order of creation with their drawables; those that
-  // show, and those that do not. `seen` leaves out layers in which nothing is.
+  // The drawing that is required of an engine: the layers in order of creation with their
+  // drawables; those that show, and those that do not. `seen` leaves out empty layers.
   struct Picture {
     std::string shown, hidden, seen;
     void Add(bool shows, const std::string& layer, std::vector<std::string> drawables);
@@ -112,7 +112,8 @@ class PlainScene {
  private:
   class Commit;
 
-  // Positions that something draws, in the coordinates that `outer` leads to.
+  // Returns whether the content has drawn positions outside the range, in the coordinates to which
+  // `outer` maps.
   bool Reaches(const PlainOwner& owner, const Content& content, const gpu::Affine& outer,
                double limit) const;
   bool TooFar(const PlainOwner& owner, const Content& content, const gpu::Affine& in_layer,
@@ -129,7 +130,8 @@ class PlainScene {
   uint64_t layers_made_ = 0;
 };
 
-// One layer and one drawable of a Picture, from what an engine was told or the model knows.
+// Returns one layer or one drawable of a Picture as text, from what an engine was told or what the
+// model knows.
 std::string LayerText(int32_t order, uint32_t opacity, gpu::BlendMode blend,
                       const gpu::Affine& transform, const gpu::ClipPlane* planes, uint32_t count,
                       const gpu::Region* region);
