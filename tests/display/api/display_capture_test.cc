@@ -1,4 +1,4 @@
-// Captures: the next volume shown, rebuilt from what goes out.
+// Tests captures: the next volume shown, rebuilt from the bytes that are sent.
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,7 +15,7 @@ TEST_F(DisplayTest, CaptureTakesTheNextVolumeWhole) {
   display_.Done();
   display_.Submit(Frame(2));
   Captured captured;
-  Capture(captured);  // volume 2 is on its way already, untapped
+  Capture(captured);  // volume 2 is already on its way, untapped
   EXPECT_FALSE(display_.tapped());
   display_.Submit(Frame(3));
   display_.Done();
@@ -23,7 +23,7 @@ TEST_F(DisplayTest, CaptureTakesTheNextVolumeWhole) {
   EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{3, true}));
   EXPECT_TRUE(display_.tapped());
   Captured second;
-  Capture(second);  // the tap is there: the same volume serves
+  Capture(second);  // the tap exists: the same volume serves
   display_.Done();
   ASSERT_TRUE(captured.has_value() && captured->ok());
   EXPECT_EQ((*captured)->volume, 3u);
@@ -54,7 +54,7 @@ TEST_F(DisplayTest, CaptureOfADisplayThatNeverHadAVolumeIsBlack) {
   ASSERT_TRUE(captured->ok());
   EXPECT_EQ((*captured)->volume, 0u);
   EXPECT_EQ((*captured)->Rgb(), std::vector<uint8_t>(12, 0));
-  display_.Submit(Frame(1));  // black is no base
+  display_.Submit(Frame(1));  // a black volume cannot be a base
   EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{1, true}));
 }
 
@@ -159,7 +159,7 @@ TEST_F(DisplayTest, AWatchBeginsWholeAndGoesOnWithWhatChanges) {
   EXPECT_EQ(display_.sent.size(), 3u) << "nothing is sent for a watcher while nothing is new";
   EXPECT_TRUE(display_.tapped());
 
-  // What is lost is told again whole.
+  // The lost volume is sent again whole.
   display_.Submit(Frame(3));
   display_.FrameLost("script", 3);
   clock_.Advance(kSecond);

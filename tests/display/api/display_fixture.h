@@ -1,4 +1,4 @@
-// A display whose driver does what the test says.
+// A display whose driver is controlled by the test.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ using Kind = VolumeOutcome::Kind;
 
 inline constexpr FrameLayout kLayout{.slices = 2, .width = 2, .height = 1};
 
-// The whole of a volume is its bytes.
+// The bytes of a volume are the whole of it.
 class PlainDecoder final : public WireDecoder {
  public:
   absl::Status OnBytes(uint8_t, std::span<const std::byte> bytes, size_t) override {

@@ -1,4 +1,4 @@
-// The base class, with a driver that does what the test tells it.
+// Tests the base class, with a driver that is controlled by the test.
 #include "display/api/display.h"
 
 #include <string>
@@ -56,7 +56,7 @@ TEST_F(DisplayTest, PresentsWithTimesAndBytes) {
   EXPECT_EQ(log_.outcomes[0].last_byte_ns, 400);
   EXPECT_EQ(log_.outcomes[0].bytes_sent, 77u);
   EXPECT_EQ(display_.stats().volumes_presented, 1u);
-  display_.Done();  // nothing is in flight: a driver's late word changes nothing
+  display_.Done();  // nothing is in flight: a driver's late report changes nothing
   display_.FrameLost("late", 0);
   EXPECT_EQ(log_.outcomes.size(), 1u);
 }
@@ -151,7 +151,7 @@ TEST_F(DisplayTest, ALostVolumeIsSentAgainLaterAndLater) {
   EXPECT_EQ(display_.sent, (std::vector<ScriptedDisplay::Sent>{{1, true}, {1, true}}));
   display_.FrameLost("again", 5);
   EXPECT_EQ(display_.Tick(), clock_.Now() + 200 * kMillisecond);
-  display_.Submit(Frame(2));  // a newer one waits for nothing
+  display_.Submit(Frame(2));  // a newer one does not have to wait
   EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{2, true}));
   display_.Done();
   clock_.Advance(kSecond);
@@ -182,7 +182,7 @@ TEST_F(DisplayTest, BlankLosesAllAndRefusesMore) {
   ExpectOutcome(1, 2, Kind::kLost, "blanked");
   display_.Submit(Frame(3));
   ExpectOutcome(2, 3, Kind::kLost, "blanked");
-  display_.Done();  // the driver finishes volume 1, which was told already
+  display_.Done();  // the driver finishes volume 1, whose outcome was already reported
   EXPECT_EQ(log_.outcomes.size(), 3u);
   ASSERT_TRUE(display_.SetBlank(false).ok());
   EXPECT_EQ(display_.calls, (std::vector<std::string>{"blank", "unblank"}));
@@ -230,7 +230,8 @@ TEST_F(DisplayTest, BlankedWhileAwayItComesBackDarkAndThenWithTheCurrentFrame) {
   EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{1, true}));
 }
 
-// Back while it was dark, and lit while a newer volume is being drawn: it waits for that, and has nothing to do meanwhile.
+// The device returned while it was dark, and is lit while a newer volume is being drawn: the
+// display waits for that, and has nothing to do in the meantime.
 TEST_F(DisplayTest, LitAgainItWaitsForTheNewerVolumeWithoutBeingAsked) {
   StartAttached();
   display_.Submit(Frame(1));
@@ -242,12 +243,13 @@ TEST_F(DisplayTest, LitAgainItWaitsForTheNewerVolumeWithoutBeingAsked) {
   ASSERT_TRUE(display_.SetBlank(false).ok());
   EXPECT_EQ(display_.sent.size(), 1u);
   EXPECT_GT(display_.Tick(), clock_.Now());
-  // The newer one comes out the same.
+  // The newer one turns out the same.
   display_.ShowCurrent();
   EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{1, true}));
 }
 
-// What was to be drawn for the device that went comes to nothing; for the one that comes there is something newer again.
+// The volume that was to be drawn for the lost device is not drawn; for the device that returns
+// there is something newer again.
 TEST_F(DisplayTest, WhatWasSaidOfALostDeviceDoesNotKeepTheNextOneBusy) {
   StartAttached();
   display_.Submit(Frame(1));

@@ -61,7 +61,7 @@ TEST(Pixels, Hub75HasTwoRowsInAByte) {
 
 TEST(Pixels, Planes24AreAveragedOverTheirParts) {
   const FrameLayout layout{.slices = 1, .width = 1, .height = 1, .format = PixelFormat::kPlanes24};
-  // Red in all eight parts, green in parts 0 and 2, blue in none: bits 0, 3, 6, …; 1 and 7.
+  // Red in all eight parts, green in parts 0 and 2, blue in no part: bits 0, 3, 6, …; 1 and 7.
   EXPECT_EQ(Light(layout, {0b1100'1011, 0b1001'0010, 0b0010'0100}),
             (std::vector<uint8_t>{255, 64, 0}));
 }
@@ -71,7 +71,7 @@ TEST(Pixels, SubFramesAreAveraged) {
   EXPECT_EQ(Light(layout, {0, 10, 255, 255, 11, 255}), (std::vector<uint8_t>{128, 11, 255}));
 }
 
-// Against the light of every pixel, which another function finds.
+// Compared with the light of every pixel, which another function computes.
 TEST(Pixels, LightIsTheMeanOfAllLevels) {
   std::mt19937 random(5);
   for (const PixelFormat format :
@@ -91,7 +91,7 @@ TEST(Pixels, LightIsTheMeanOfAllLevels) {
                                       : format == PixelFormat::kHub75 ? value & 0x3F
                                                                       : value);
       }
-      if (format == PixelFormat::kBitPlanes) {  // beyond a row's end there is nothing
+      if (format == PixelFormat::kBitPlanes) {  // no pixels lie beyond a row's end
         for (size_t end = 1; end < picture.size(); end += 2) picture[end] &= std::byte{0xF8};
       }
       std::vector<uint8_t> rgb(13 * 6 * 3);

@@ -1,4 +1,5 @@
-// A volume from its packets, asked directly: what the decoder looks at before it is looked at here as well.
+// Tests assembling a volume from packets directly: what the decoder checks first is checked here as
+// well.
 #include "display/drivers/voxlink/assembler.h"
 
 #include <cstring>

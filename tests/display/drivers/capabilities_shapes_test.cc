@@ -1,5 +1,5 @@
-// Blocks of capabilities that say something wrong of each field of each shape, byte by byte as the document has them: what is
-// said of it.
+// Tests blocks of capabilities that are wrong in each field of each shape, byte by byte as
+// documented, and their errors.
 #include <cmath>
 #include <cstring>
 #include <functional>
@@ -75,7 +75,7 @@ void SetFixed(Block& block, const std::function<void(Capabilities&)>& change) {
   change(fixed);
   std::memcpy(block.data(), &fixed, sizeof(fixed));
 }
-// Another length, which the block says itself.
+// Changes the length, including the one stated in the block.
 void Resize(Block& block, size_t size) {
   block.resize(size);
   SetFixed(block, [&](Capabilities& c) { c.total_length = static_cast<uint32_t>(size); });
@@ -214,7 +214,7 @@ TEST(CapabilitiesShapes, EitherWayRoundGoesThereAndBack) {
   }
 }
 
-// What is there and back is what was given, not what was read before.
+// Decoding an encoded block gives what was encoded, not what was read before.
 TEST(CapabilitiesShapes, EveryFieldGoesThereAndBack) {
   const auto back = [](const Geometry& geometry) {
     const auto parsed = ParseCapabilities(EncodeCapabilities(Device(geometry)));
@@ -288,7 +288,7 @@ TEST(CapabilitiesShapes, OfACalibratedHelixOrLatticeWhatItIsMadeOfCounts) {
 }
 
 TEST(CapabilitiesShapes, ABitmapFitsAPayload) {
-  // With two sub-frames it has two bits a slice, and 16 bytes stand before it.
+  // With two sub-frames it has two bits a slice, after 16 bytes.
   const auto check = [](int rows) {
     DeviceCapabilities device = Device(LatticeOf(rows));
     device.fixed.max_payload = 1024;

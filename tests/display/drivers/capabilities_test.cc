@@ -197,7 +197,8 @@ TEST(Capabilities, TheDeviceMustBeAsConfigured) {
   EXPECT_FALSE(CheckCapabilities(device, geometry, layout).ok());
 }
 
-// What was measured is how it was put together; what it is made of must still be the device's.
+// A calibration replaces how the device is assembled; the parts of which it is made must still be
+// the device's.
 TEST(Capabilities, OfACalibratedDisplayWhatItWasPutTogetherLikeDoesNotCount) {
   const DeviceCapabilities device = RotorDevice();
   const FrameLayout layout = LayoutOf(device);
@@ -285,7 +286,7 @@ TEST(Capabilities, WhatIsWrongWithAShapeIsSaid) {
   const absl::Status status =
       ParseCapabilities(EncodeCapabilities(With({.shape = helix, .grid = {}}))).status();
   EXPECT_NE(status.message().find("span_turns is 0.5"), std::string::npos) << status;
-  // Nor is one shape taken for another.
+  // Nor is one shape mistaken for another.
   EXPECT_FALSE(
       CheckCapabilities(With(LatticeGeometry()), Planar().geometry, LayoutOf(Planar())).ok());
 }

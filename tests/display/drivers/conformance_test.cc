@@ -1,4 +1,4 @@
-// What every display driver keeps to, whatever its device: to hold a driver to it, add a line at
+// Tests the contract of every display driver, whatever its device: to test a driver, add a line at
 // the end. Runs on the real clock, with the driver's own threads.
 
 #include <algorithm>
@@ -37,7 +37,7 @@ struct DriverCase {
 };
 std::ostream& operator<<(std::ostream& out, const DriverCase& c) { return out << c.name; }
 
-// The owner's thread: ticks when woken or when it is time.
+// The owner's thread: ticks when it is woken or when the time has come.
 class DriverConformance : public testing::TestWithParam<DriverCase> {
  protected:
   static constexpr sync::TimeNs kLimit = 20 * sync::kSecond;
@@ -184,7 +184,7 @@ TEST_P(DriverConformance, WatchersSeeEveryVolumeThatIsShown) {
     ASSERT_TRUE(RunUntil([&] { return seen.back().volume == volume; }));
     EXPECT_EQ(seen.back().Rgb(), FrameToRgb(*frame)) << volume;
     if (volume != 4) continue;
-    std::optional<absl::StatusOr<DecodedVolume>> captured;  // beside it
+    std::optional<absl::StatusOr<DecodedVolume>> captured;  // beside the volume
     display_->Capture(kLimit, [&](absl::StatusOr<DecodedVolume> v) { captured = std::move(v); });
     ASSERT_TRUE(RunUntil([&] { return captured.has_value(); }));
     EXPECT_EQ((*captured)->Rgb(), FrameToRgb(*frame));
@@ -207,7 +207,7 @@ TEST_P(DriverConformance, BlankAndBrightness) {
   EXPECT_EQ(recorder_.Of(1)->kind, Kind::kLost);
   EXPECT_EQ(recorder_.Of(1)->reason, "blanked");
   ASSERT_TRUE(display_->SetBlank(false).ok());
-  // One that meets a device which is still dark is lost.
+  // A volume that meets a device which is still dark is lost.
   uint64_t volume = 1;
   do {
     display_->Submit(source.Next(1));
@@ -243,7 +243,7 @@ TEST_P(DriverConformance, SweepsArePredicted) {
   if (!GetParam().predicts_sweeps) return;
   const double period = 1e9 / display_->info().volumes_per_second;
   EXPECT_NEAR(static_cast<double>(sweeps[1] - sweeps[0]), period, period / 100);
-  // A busy machine may be late with some: most must be where they were predicted.
+  // A busy machine may be late with some: most must be at their predicted times.
   constexpr uint64_t kVolumes = 9;
   std::vector<double> off;
   for (uint64_t volume = 5; volume < 5 + kVolumes; ++volume) {

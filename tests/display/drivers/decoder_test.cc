@@ -17,7 +17,7 @@ using Bytes = std::vector<std::byte>;
 constexpr FrameLayout kLayout{.slices = 3, .width = 4, .height = 2, .sub_frames = 2};
 constexpr uint32_t kMaxPayload = 64;
 
-// Volumes as a driver would write them, into bytes.
+// Writes volumes as a driver would, into bytes.
 class Writer {
  public:
   explicit Writer(uint32_t seed = 1) : random_(seed), frame_{.layout = kLayout} {
@@ -59,7 +59,8 @@ class Writer {
   SliceFrame frame_;
 };
 
-// The last packet that was written, as one of another type, with these flags, its header sound.
+// Changes the type and flags of the last packet that was written, and corrects its header's
+// checksum.
 void Retype(Bytes& out, size_t at, PacketType type, uint8_t flags = 0) {
   auto header = Load<PacketHeader>(std::span(out).subspan(at));
   header.type = static_cast<uint8_t>(type);
@@ -67,7 +68,7 @@ void Retype(Bytes& out, size_t at, PacketType type, uint8_t flags = 0) {
   header.header_crc = Crc32c(std::as_bytes(std::span(&header, 1)).first(kHeaderCrcOffset));
   std::memcpy(out.data() + at, &header, sizeof(header));
 }
-// A packet of any type with a payload of so many bytes.
+// Writes a packet of any type with a payload of that many bytes.
 void Any(Writer& writer, PacketType type, size_t payload, uint64_t volume = 0, uint8_t flags = 0) {
   const size_t at = writer.out.size();
   writer.packets.Slice(writer.out, volume, 0, 0, 0, Bytes(payload));
@@ -126,7 +127,7 @@ TEST(Decoder, WhatIsForTheDeviceAloneIsPassedOver) {
   writer.packets.Plain(writer.out, PacketType::kDrop, 3);
   writer.Begin(5, 0);
   writer.Picture(5, 0);
-  writer.packets.Plain(writer.out, PacketType::kAbort, 4);  // another than is being filled
+  writer.packets.Plain(writer.out, PacketType::kAbort, 4);  // not the volume that is being filled
   for (size_t p = 1; p < 6; ++p) writer.Picture(5, p);
   writer.packets.End(writer.out, 5, true);
   ASSERT_TRUE(Decode(decoder, writer.out).ok());
@@ -138,8 +139,8 @@ TEST(Decoder, AVolumeThatWasNotTakenIsNoneOnceTheBytesAreWrong) {
   VoxlinkDecoder decoder(kLayout, kMaxPayload);
   writer.Whole(1);
   Any(writer, PacketType::kKeepalive, 1);
-  Any(writer, PacketType::kDrop, 1);                     // and what comes after it
-  writer.out.insert(writer.out.end(), 50, std::byte{});  // is no matter any more
+  Any(writer, PacketType::kDrop, 1);                     // and the bytes after it
+  writer.out.insert(writer.out.end(), 50, std::byte{});  // no longer matters
   const absl::Status status = Decode(decoder, writer.out);
   EXPECT_TRUE(absl::IsDataLoss(status));
   EXPECT_NE(status.message().find("KEEPALIVE"), std::string::npos) << "the first fault: " << status;

@@ -1,4 +1,5 @@
-// The voxlink driver where it does not simply show: sweeps that are followed, volumes that are held, the power limit.
+// Tests the voxlink driver in other modes than plain showing: following sweeps, holding volumes,
+// the power limit.
 #include <cmath>
 #include <string>
 #include <utility>
@@ -22,7 +23,7 @@ TEST_F(Driver, SaysHowWellItKnowsItsSweeps) {
   EXPECT_EQ(rig_->display().Sweeps()->state, sync::SweepLock::State::kLocked);
   EXPECT_NEAR(rig_->display().Sweeps()->drift_ppm, 0, 1);
   EXPECT_EQ(rig_->display().Sweeps()->losses, 0u);
-  // Its word does not come any more: a loss, once. Then it does.
+  // The report no longer arrives: a loss, once. Then it does again.
   rig_->faults().Add(
       {.endpoint = 0x82, .what = emulator::Fault::What::kNak, .amount = 900 * kMillisecond});
   rig_->RunFor(800 * kMillisecond);
@@ -34,7 +35,8 @@ TEST_F(Driver, SaysHowWellItKnowsItsSweeps) {
   EXPECT_EQ(rig_->display().Sweeps()->losses, 1u);
 }
 
-// A link on which a volume takes a sweep and a half: each misses the sweep before which it was begun.
+// A link on which a volume takes one and a half sweeps: each misses the sweep before which it was
+// begun.
 TEST_F(Driver, CountsVolumesThatMissTheirSweep) {
   // A volume of 1368 bytes in 50 ms.
   Start({{"pacing", "27360"}});
@@ -43,7 +45,7 @@ TEST_F(Driver, CountsVolumesThatMissTheirSweep) {
       << "before the first sweep there was none to miss";
   for (int i = 0; i < 5; ++i) Show();
   EXPECT_EQ(rig_->display().stats().volumes_late, 5u);
-  Show(0);  // one picture alone is in time, begun just after a sweep
+  Show(0);  // a single picture is in time if it is begun just after a sweep
   EXPECT_EQ(rig_->display().stats().volumes_late, 5u);
 }
 
@@ -60,15 +62,15 @@ TEST_F(Driver, HoldsVolumesUntilTheyAreOrderedShown) {
   EXPECT_FALSE(rig_->device().Seen().has_value());
   const std::vector<sync::TimeNs> coming = rig_->display().ComingSweeps(6);
   ASSERT_EQ(coming.size(), 6u);
-  // Not as far ahead as it must come; then as far; then later.
+  // Not as far in advance as required; then far enough; then for a later sweep.
   rig_->display().OrderShown(1, coming[0], 2);
-  rig_->display().OrderShown(7, coming[3], 2);  // that is not held
+  rig_->display().OrderShown(7, coming[3], 2);  // not held
   rig_->display().OrderShown(1, coming[2] + 1000, 2);
   rig_->RunFor(kMillisecond);
   rig_->display().OrderShown(1, coming[4], 2);
   rig_->RunFor(kMillisecond);
   const auto& orders = rig_->recorder().orders;
-  ASSERT_EQ(orders.size(), 2u);  // the first one's answer is to an order that has been replaced
+  ASSERT_EQ(orders.size(), 2u);  // the first answer belongs to an order that has been replaced
   EXPECT_EQ(orders[0].at, coming[2] + 1000);
   EXPECT_TRUE(orders[0].taken);
   EXPECT_EQ(orders[1].at, coming[4]);
@@ -111,7 +113,7 @@ TEST_F(Driver, WhatIsHeldOrOnItsWayCanBeDropped) {
     EXPECT_EQ(rig_->display().state(), DisplayState::kShowing);
     show();
   }
-  // Dark and light again: nothing is shown that was not ordered.
+  // Dark and lit again: nothing is shown that was not ordered.
   const SliceFramePtr waits = source_->Next(1);
   rig_->display().Submit(waits);
   rig_->RunFor(kSecond);
@@ -125,7 +127,7 @@ TEST_F(Driver, WhatIsHeldOrOnItsWayCanBeDropped) {
   show();
 }
 
-// Whatever is captured meanwhile: what was not ordered shown is not shown.
+// Volumes that were not ordered are not shown, even if captures are made in the meantime.
 TEST_F(Driver, CapturesShowNothingThatWasNotOrdered) {
   Make();
   rig_->display().SetHolding();
@@ -140,7 +142,7 @@ TEST_F(Driver, CapturesShowNothingThatWasNotOrdered) {
     });
   };
   frame_ = source_->Next(1);
-  capture();  // rides in the first volume, with its order
+  capture();  // is sent with the first volume, together with its order
   rig_->display().Submit(frame_);
   rig_->RunFor(kSecond);
   rig_->display().OrderShown(1, rig_->display().ComingSweeps(3)[2], 2);
@@ -195,7 +197,7 @@ TEST_F(Driver, TheDeviceKeepsThePowerLimit) {
   ASSERT_TRUE(rig_->display().SetPowerLimit(12.5).ok());
   rig_->RunFor(100 * kMillisecond);
   EXPECT_EQ(rig_->device().power_limit_mw(), 12500u);
-  // One that comes again has it again, one from before the limit was taken away has none.
+  // A device that returns gets the limit again; one from before the limit was removed gets none.
   rig_->SetPlugged(false);
   rig_->RunFor(100 * kMillisecond);
   rig_->SetPlugged(true);
@@ -207,7 +209,7 @@ TEST_F(Driver, TheDeviceKeepsThePowerLimit) {
   for (const double wrong : {-1.0, 2e6, std::nan("")}) {
     EXPECT_EQ(rig_->display().SetPowerLimit(wrong).code(), absl::StatusCode::kInvalidArgument);
   }
-  // A limit that the device has from before is taken off it, though nobody saw it come.
+  // A limit that a device has from before is removed, even if it was not seen to return.
   ASSERT_TRUE(rig_->display().SetPowerLimit(40).ok());
   rig_->RunFor(100 * kMillisecond);
   rig_->faults().Add({.endpoint = 0x82, .what = emulator::Fault::What::kStall});

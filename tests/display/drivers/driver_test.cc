@@ -1,5 +1,5 @@
-// The voxlink driver with its device at the other end of an in-process cable,
-// in one thread, on a fake clock.
+// Tests the voxlink driver with its device at the other end of an in-process cable, in one thread,
+// on a fake clock.
 
 #include <algorithm>
 #include <cmath>
@@ -84,7 +84,7 @@ TEST_F(Driver, OnePictureInAHundredCostsATwentiethAtMost) {
   Show();
   const uint64_t whole = Newest().bytes_sent;
   EXPECT_EQ(whole, 56u + 100 * (40 + 12288) + 40);
-  Show(1e-9);  // one
+  Show(1e-9);  // a single picture
   EXPECT_EQ(Newest().bytes_sent, 56u + 13 + (40 + 12288) + 40);
   EXPECT_GE(whole, 20 * Newest().bytes_sent);
 }
@@ -101,7 +101,7 @@ TEST_F(Driver, SendsOnlyWhatChanged) {
   ASSERT_TRUE(rig_->RunUntilOutcome(2));
   EXPECT_EQ(Newest().bytes_sent, 57u + 1 * (40 + 192) + 40);
   EXPECT_TRUE(SeesFrame());
-  // A volume that was replaced before it was sent: what changed in it goes out with the next.
+  // A volume that was replaced before it was sent: its changes are sent with the next one.
   next.volume = 3;
   next.changed_in[0] = 3;
   next.bytes[0] ^= std::byte{0xFF};
@@ -141,7 +141,7 @@ TEST_F(Driver, KeepsTheLightOnWhileNothingIsSent) {
 TEST_F(Driver, ASilentHostIsDarkAfterAQuarterSecond) {
   Start();
   Show();
-  // The owner's thread hangs: nobody ticks the driver, the device goes on.
+  // The owner's thread hangs: nothing ticks the driver, and the device goes on.
   const sync::TimeNs begin = rig_->clock().Now();
   while (rig_->device().screen().lit() && rig_->clock().Now() < begin + kSecond) {
     rig_->clock().Advance(kMillisecond);
@@ -150,7 +150,7 @@ TEST_F(Driver, ASilentHostIsDarkAfterAQuarterSecond) {
   EXPECT_GE(rig_->clock().Now() - begin, 250 * kMillisecond - 100 * kMillisecond);
   EXPECT_LE(rig_->clock().Now() - begin, 250 * kMillisecond);
   rig_->Settle();
-  EXPECT_TRUE(SeesFrame());  // and light again as soon as it comes back
+  EXPECT_TRUE(SeesFrame());  // and lit again as soon as it returns
 }
 
 TEST_F(Driver, ComesBackAfterUnplugWithTheCurrentFrame) {
@@ -220,7 +220,7 @@ TEST_F(Driver, ResendsMissingSlices) {
 }
 
 TEST_F(Driver, AbortsAfterSoManyRoundsAndTriesAgainLater) {
-  // The first volume is transfer 1; of the second, the only slice is hit each time that it comes.
+  // The first volume is transfer 1; of the second, the only slice is hit each time that it is sent.
   Start({{"size", "8x8x1"},
          {"faults", "corrupt:110@t2;corrupt:60@t3;corrupt:60@t4;corrupt:60@t5;corrupt:60@t6"}});
   Show();
@@ -255,7 +255,7 @@ TEST_F(Driver, SurvivesStallsErrorsAndPartialTransfers) {
   }
   EXPECT_EQ(rig_->display().stats().attaches, 1u);
   EXPECT_EQ(rig_->display().stats().volumes_lost, 0u);
-  // A stall, three errors and a partial transfer of each endpoint; what is only slow has not failed.
+  // A stall, three errors and a partial transfer of each endpoint; slow transfers are not failures.
   EXPECT_GE(rig_->display().stats().transfers_failed, 2u * (1 + 1 + 1));
 }
 
@@ -353,7 +353,7 @@ TEST_F(Driver, PredictsSweeps) {
   const sync::TimeNs period = 1'000 * kSecond / 30'000;
   EXPECT_EQ(rig_->display().ComingSweeps(2),
             (std::vector<sync::TimeNs>{shown + period, shown + 2 * period}));
-  rig_->clock().Advance(period);  // the sweep that begins now is not a coming one
+  rig_->clock().Advance(period);  // the sweep that begins now does not count as a coming one
   EXPECT_EQ(rig_->display().ComingSweeps(1), (std::vector<sync::TimeNs>{shown + 2 * period}));
   EXPECT_TRUE(rig_->display().ComingSweeps(0).empty());
 }

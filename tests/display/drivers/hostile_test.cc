@@ -1,5 +1,5 @@
-// Devices that lie about everything, over and over: nothing may crash, no lie may keep a display from
-// coming back once its device tells the truth.
+// Tests devices that lie about everything, repeatedly: nothing may crash, and no lie may prevent a
+// display from recovering once its device tells the truth.
 
 #include <algorithm>
 #include <cstdint>
@@ -27,8 +27,8 @@ InProcessTransport::Options Pumped() {
   return options;
 }
 
-// Lives of a device, each with other lies and `length` long; ten times in between it tells the truth.
-// `least` lies must have been told.
+// Lives of a device, each with different lies and `length` long; ten times in between it tells the
+// truth. At least `least` lies must have been told.
 struct Lives {
   uint64_t count, least;
   sync::TimeNs length;
@@ -95,7 +95,7 @@ TEST(Hostile, FadecandyBoards) {
   const SliceFramePtr frame = source.Next(1);
   rig.display().Submit(frame);
   Live(
-      // What a board says is little: a counter, when it has been idle for a while.
+      // A board reports little: a counter, after it has been idle for a while.
       {.count = 500, .least = 50, .length = 800 * kMillisecond}, rig.hostile(1),
       [&](sync::TimeNs time) { rig.RunFor(time); },
       [&](bool plugged) { rig.SetPlugged(1, plugged); },

@@ -1,11 +1,11 @@
-// A voxlink device that is nobody's, for tests of what devices say of themselves.
+// A fictitious voxlink device, for tests of what devices report about themselves.
 #pragma once
 
 #include "display/drivers/voxlink/capabilities.h"
 
 namespace voxeld::display::voxlink {
 
-// With a geometry still to be set, from which slices and pixels are counted when it is encoded.
+// Its geometry must still be set; slices and pixels are counted from that when it is encoded.
 inline DeviceCapabilities MadeUpDevice(uint16_t version) {
   DeviceCapabilities device;
   device.fixed.version = version;

@@ -238,7 +238,7 @@ TEST(Options, ToneOfEachChannel) {
   EXPECT_EQ(info->tone.lut[0][51], 13107);
   EXPECT_EQ(info->tone.lut[1][51], std::lround(65535 * 0.5 * 0.04));
   EXPECT_EQ(info->tone.lut[1][255], 32768);
-  EXPECT_EQ(info->tone.lut[2][51], 1);  // lit is never quite dark
+  EXPECT_EQ(info->tone.lut[2][51], 1);  // a lit pixel is never completely dark
   EXPECT_EQ(info->tone.lut[2][204], std::lround(65535 * 0.25 * 0.6));
   EXPECT_NE(Refusal({{"white", "1;1"}}).find("white is \"1;1\"; it must be a number"),
             std::string::npos);

@@ -1,4 +1,4 @@
-// Packets, sums and capabilities of voxlink, against bytes written by hand.
+// Tests packets, checksums and capabilities of voxlink with bytes written by hand.
 
 #include "display/drivers/voxlink/packet.h"
 
@@ -87,7 +87,7 @@ TEST(Packets, AreTheBytesOfTheDocument) {
                         "00000000 B2DB0E99"));
 }
 
-// What a parser found, as text.
+// Records what a parser found, as text.
 struct Log final : PacketParser::Sink {
   void OnPacket(const PacketHeader& header, std::span<const std::byte> payload) override {
     lines.push_back(std::string(PacketTypeName(header.type)) + " " +

@@ -20,7 +20,7 @@
 
 namespace voxeld::display {
 
-// What a display told, in order.
+// Records the display's reports, in order.
 struct Recorder final : Display::Listener {
   void OnOutcome(const VolumeOutcome& outcome) override { outcomes.push_back(outcome); }
   void OnState(DisplayState state, const std::string& reason) override {
@@ -31,7 +31,7 @@ struct Recorder final : Display::Listener {
   void OnOrdered(uint64_t volume, sync::TimeNs at, bool taken) override {
     orders.push_back({volume, at, taken});
   }
-  // Outcomes of one volume.
+  // Returns the number of outcomes of one volume.
   int Count(uint64_t volume) const;
   const VolumeOutcome* Of(uint64_t volume) const;
 
@@ -47,12 +47,12 @@ struct Recorder final : Display::Listener {
   std::vector<std::pair<DisplayState, std::string>> states;
 };
 
-// Frames whose pictures change at random, as an engine would number them.
+// Frames whose pictures change at random, numbered as an engine would number them.
 class FrameSource {
  public:
   FrameSource(const FrameLayout& layout, uint32_t seed);
-  // The next volume, in which each picture changes with probability `share`,
-  // at least one if it is above 0.
+  // Returns the next volume, in which each picture changes with probability `share`, and at least
+  // one if that is above 0.
   SliceFramePtr Next(double share);
   std::mt19937& random() { return random_; }
 
@@ -75,16 +75,17 @@ class Rig {
   InProcessTransport& transport() { return *parts_.transport; }
 
   void Start();
-  // Lets device and driver do what is due now, until nothing is left.
+  // Runs everything of device and driver that is due now, until nothing is left.
   void Settle();
-  // Moves time to what is due next, step by step, until `done` or for `limit`.
-  // False: it was not done.
+  // Advances the time to what is due next, step by step, until `done` or for `limit`. Returns false
+  // if it was not done.
   bool RunUntil(const std::function<bool()>& done, sync::TimeNs limit = 10 * sync::kSecond);
   void RunFor(sync::TimeNs duration);
-  // Until the volume has its outcome.
+  // Runs until the volume has its outcome.
   bool RunUntilOutcome(uint64_t volume, sync::TimeNs limit = 10 * sync::kSecond);
   void SetPlugged(bool plugged);
-  // Called whenever the device may have done something, before the driver hears of it.
+  // Sets a function that is called whenever the device may have done something, before the driver
+  // is notified.
   void SetObserver(std::function<void()> observer) { observer_ = std::move(observer); }
 
  private:

@@ -1,6 +1,6 @@
-// Random frames over a cable with random faults: what is seen is always one submitted volume,
-// whole; every volume has exactly one outcome, and it is true; when the faults are over,
-// the newest volume is seen.
+// Random frames over a cable with random faults: the visible volume is always one that was
+// submitted, whole; every volume has exactly one outcome, which is true; when the faults are over,
+// the newest volume is visible.
 
 #include <map>
 #include <ostream>
@@ -58,7 +58,7 @@ Fault RandomFault(std::mt19937& random) {
 
 class Torture : public testing::TestWithParam<Case> {
  protected:
-  // What the device shows is a volume submitted.
+  // Checks that the device shows a submitted volume.
   void Look(Rig& rig) {
     const auto& shown = rig.device().screen().shown();
     if (shown != nullptr && shown != last_shown_) {
@@ -71,7 +71,7 @@ class Torture : public testing::TestWithParam<Case> {
     }
   }
 
-  // Outcomes since the last call are true.
+  // Checks that the outcomes since the last call are true.
   void Check(Rig& rig) {
     ASSERT_EQ(rig.device().credit_excess(), 0u);
     const auto& outcomes = rig.recorder().outcomes;
@@ -144,7 +144,7 @@ TEST_P(Torture, NothingTornNothingStaleNothingForgotten) {
         });
       }
     }
-    // Quiet: the newest volume comes to be seen, whatever happened before.
+    // Without faults, the newest volume becomes visible, whatever happened before.
     const std::vector<uint8_t> light = FrameToRgb(*newest);
     EXPECT_TRUE(rig.RunUntil(
         [&] {

@@ -1,5 +1,5 @@
-// A device model on a test's desk: requests and packets by hand,
-// events and completions written down.
+// A device model driven by hand: the test sends requests and packets, and events and completions
+// are recorded.
 #pragma once
 
 #include <cstdint>
@@ -45,28 +45,28 @@ class Bench {
   VoxlinkDevice& device() { return *device_; }
   voxlink::PacketWriter& writer() { return writer_; }
 
-  // Submits and, if it completed, says how.
+  // Submits a transfer. If it completed, returns how.
   std::optional<Completed> Control(const UsbSetup& setup, std::span<const std::byte> out = {});
   std::optional<Completed> In(voxlink::Request request, uint16_t value, uint16_t length);
   std::optional<Completed> Out(voxlink::Request request, uint16_t value = 0,
                                std::span<const std::byte> data = {});
-  // Bulk OUT; the id, to ask Result for.
+  // Submits a bulk OUT transfer. Returns its id, for Result.
   uint64_t Bulk(std::vector<std::byte> bytes);
   std::optional<Completed> Result(uint64_t id) const;
 
-  // START, with reads for events waiting.
+  // Sends START, with reads waiting for events.
   void StartSession();
-  // Time passes, as often ticked as the model wants.
+  // Advances the time; ticks the model as often as it wants.
   void Pass(sync::TimeNs duration);
-  // Events since the last call; sweeps, health and credit only if `all`.
+  // Returns the events since the last call; sweeps, health and credit only if `all`.
   std::vector<SeenEvent> Events(bool all = false);
 
-  // Packets of volumes whose pictures have all bytes `value`.
+  // Returns packets of volumes whose pictures have all bytes `value`.
   std::vector<std::byte> Begin(uint64_t volume, uint64_t base, std::optional<uint8_t> bits = {});
   std::vector<std::byte> Slice(uint64_t volume, uint32_t slice, uint8_t value);
   std::vector<std::byte> End(uint64_t volume, bool show = true);
   void SendWhole(uint64_t volume, uint8_t value, bool show = true);
-  // The value of a slice's bytes as seen; −1: dark.
+  // Returns the visible value of a slice's bytes; −1: dark.
   int Seen(size_t slice) const;
 
  private:
@@ -78,7 +78,7 @@ class Bench {
   std::unique_ptr<FaultInjector> injector_;
   voxlink::PacketWriter writer_;
   uint64_t next_id_ = 1;
-  std::map<uint64_t, std::vector<std::byte>> out_;  // what URBs point to
+  std::map<uint64_t, std::vector<std::byte>> out_;  // the buffers of URBs
   std::map<uint64_t, Completed> done_;
   std::vector<uint64_t> reads_;
   bool listening_ = false;

@@ -162,7 +162,7 @@ TEST_F(FadecandyBoard, LightsAFrameAtTheRefreshAfterItsOwn) {
   for (const uint8_t value : device_.Output()) ASSERT_EQ(value, 99);
 }
 
-// One endpoint: behind a frame that has to wait everything waits.
+// There is one endpoint: if a frame has to wait, everything after it waits.
 TEST_F(FadecandyBoard, WhatComesBehindAWaitingFrameWaits) {
   Bulk(SetUpBytes());
   const uint64_t first = Bulk(Frame(1)), second = Bulk(Frame(2));

@@ -17,8 +17,8 @@ using fadecandy::kLutEntries;
 using Table = std::array<uint16_t, kLutEntries>;
 using Rgb = std::array<std::byte, kFrameBytes>;
 
-// §8 of the protocol in real numbers. All that occurs is a multiple of 2⁻²⁴ below 2¹⁷, so that
-// doubles hold it exactly.
+// §8 of the protocol in real numbers. Every value that occurs is a multiple of 2⁻²⁴ below 2¹⁷, so
+// doubles represent it exactly.
 struct Lit {
   int out;
   int residual;
@@ -41,7 +41,7 @@ TEST(FadecandyLight, EqualsRealNumbersInTenMillionCases) {
   Table entries{}, halved{};
   for (int i = 0; i < 10'000'000; ++i) {
     if (i % 1000 == 0) {
-      // Any table, and every third time one that ascends, as hosts have it.
+      // Any table; every third time an ascending one, as hosts have it.
       for (uint16_t& entry : entries) entry = static_cast<uint16_t>(random());
       if (i % 3000 == 0) std::sort(entries.begin(), entries.end());
       for (size_t k = 0; k < kLutEntries; ++k) halved[k] = entries[k] >> 1;
@@ -80,7 +80,7 @@ TEST(FadecandyLight, ByHand) {
   residual = 127;
   EXPECT_EQ(FadecandyDither(65534, residual), 255);
   EXPECT_EQ(residual, 126);
-  // At full light the byte is too much by more than a step: the dark after it is not below 0.
+  // At full light, the byte is too large by more than a step: the dark after it is not below 0.
   residual = 0;
   EXPECT_EQ(FadecandyDither(65152, residual), 255);
   EXPECT_EQ(residual, -383);
@@ -88,7 +88,7 @@ TEST(FadecandyLight, ByHand) {
   EXPECT_EQ(residual, -383);
 }
 
-// Bytes into the light, packet by packet; how many it took.
+// Feeds bytes into the light, packet by packet. Returns how many packets it accepted.
 size_t Feed(FadecandyLight& light, const TransferBytes& bytes) {
   size_t packets = 0;
   for (size_t at = 0; at < bytes.size(); at += 64, ++packets) {
@@ -106,7 +106,7 @@ void FeedConfig(FadecandyLight& light, uint8_t flags) {
   fadecandy::AppendConfig(bytes, flags);
   ASSERT_EQ(Feed(light, bytes), 1u);
 }
-// Channels straight: entry i is 256·i.
+// Linear channels: entry i is 256·i.
 void FeedStraightLut(FadecandyLight& light) {
   fadecandy::Lut lut;
   for (size_t i = 0; i < lut.size(); ++i) {
@@ -147,7 +147,7 @@ TEST(FadecandyLight, FadesFromFrameToFrame) {
   EXPECT_EQ(light.Output()[1535], 201);  // (200·257 + 128) / 256
   light.Refresh(100'000);
   EXPECT_EQ(light.Output()[0], 201);
-  // A pause of a minute makes a fade of a minute: sent twice it is there at once.
+  // A pause of a minute makes a fade of a minute: a frame that is sent twice is shown at once.
   FeedFrame(light, Plain(10));
   light.Refresh(160'000);
   light.Refresh(165'000);

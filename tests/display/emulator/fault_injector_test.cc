@@ -1,4 +1,4 @@
-// Each fault on its own, against a device whose protocol it knows nothing of.
+// Tests each fault on its own, with a device whose protocol the injector does not know.
 
 #include "display/emulator/fault_injector.h"
 
@@ -16,7 +16,7 @@ using sync::kMillisecond;
 using What = Fault::What;
 using When = Fault::When;
 
-// Takes every OUT at once and remembers the bytes; its IN endpoint never has anything.
+// Accepts every OUT transfer at once and records the bytes; its IN endpoint never has data.
 class Sink final : public UsbDeviceModel {
  public:
   explicit Sink(std::vector<std::byte>* bytes) : bytes_(bytes) {}

@@ -1,4 +1,4 @@
-// The device model, packet by packet.
+// Tests the device model, packet by packet.
 
 #include "display/emulator/voxlink_device.h"
 
@@ -102,7 +102,7 @@ TEST_F(Device, TheBaseIsTheLastCompleteVolumeAndNoOther) {
   auto events = bench_.Events();
   ASSERT_EQ(events.size(), 1u);
   ExpectVolumeEvent(events[0], EventType::kAborted, 3, Reason::kBadBase);
-  bench_.Bulk(bench_.Slice(3, 0, 9));  // passed over
+  bench_.Bulk(bench_.Slice(3, 0, 9));  // ignored
   EXPECT_TRUE(bench_.Events().empty());
   bench_.Bulk(bench_.End(3));
   events = bench_.Events();
@@ -114,7 +114,7 @@ TEST_F(Device, TheBaseIsTheLastCompleteVolumeAndNoOther) {
 
 TEST_F(Device, ListsWhatIsMissingAndTakesItAgain) {
   bench_.Bulk(bench_.Begin(1, 0));
-  bench_.Slice(1, 0, 7);  // lost on the way
+  bench_.Slice(1, 0, 7);  // lost in transit
   bench_.Bulk(bench_.Slice(1, 1, 7));
   std::vector<std::byte> bad = bench_.Slice(1, 2, 7);
   bad.back() ^= std::byte{1};
@@ -135,7 +135,7 @@ TEST_F(Device, ListsWhatIsMissingAndTakesItAgain) {
   EXPECT_EQ(missing.run[0], (voxlink::PictureRun{0, 1}));
   EXPECT_EQ(missing.run[1], (voxlink::PictureRun{2, 2}));
   PassAlive(200 * kMillisecond);
-  EXPECT_EQ(bench_.Seen(0), -1);  // never shown while incomplete
+  EXPECT_EQ(bench_.Seen(0), -1);  // an incomplete volume is never shown
   bench_.Events();
   for (const uint32_t slice : {0u, 2u, 3u}) bench_.Bulk(bench_.Slice(1, slice, 7));
   bench_.Bulk(bench_.End(1));
@@ -213,7 +213,7 @@ TEST_F(Device, HoldsShowsAndDrops) {
   EXPECT_EQ(bench_.Seen(0), 7);
 }
 
-// §5.5: an order that must come ahead changes nothing if it does not.
+// §5.5: an order that must come in advance has no effect if it is late.
 TEST_F(Device, AnOrderAheadIsTakenInTimeOnly) {
   const auto order = [&](uint64_t sweep, uint32_t ahead) {
     std::vector<std::byte> show;
@@ -265,8 +265,8 @@ TEST_F(Device, RefusesWhatDoesNotFit) {
   std::vector<std::byte> out;
   const std::vector<std::byte> pixels(18);
   bench_.writer().Begin(out, 1, 0, 5, {});         // pictures
-  bench_.writer().Slice(out, 9, 0, 0, 0, pixels);  // nobody began it
-  bench_.writer().Slice(out, 9, 1, 0, 0, pixels);  // told once
+  bench_.writer().Slice(out, 9, 0, 0, 0, pixels);  // it was never begun
+  bench_.writer().Slice(out, 9, 1, 0, 0, pixels);  // reported once
   bench_.writer().Plain(out, static_cast<voxlink::PacketType>(42), 1);
   bench_.Bulk(out);
   auto events = bench_.Events();
@@ -430,7 +430,7 @@ TEST(DevicePaced, ConsumesAtItsPaceAndGivesCredit) {
       EXPECT_LE(credit - 65'536, static_cast<uint64_t>((ms + 50) * 100));
     }
   }
-  EXPECT_FALSE(bench.device().screen().watchdog_dark());  // a busy device does not doubt its host
+  EXPECT_FALSE(bench.device().screen().watchdog_dark());  // busy, so its host is not lost
   EXPECT_TRUE(bench.Result(second).has_value());
   EXPECT_EQ(bench.device().credit_excess(), 60'000u + 20'000 - 65'536);
   EXPECT_GE(credit, 65'536u + 49'152);

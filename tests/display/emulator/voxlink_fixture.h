@@ -1,4 +1,4 @@
-// A voxlink device in a session, whose events up to then have been read.
+// A voxlink device in a session, whose events so far have been read.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ class Device : public testing::Test {
     bench_.writer().Plain(out, voxlink::PacketType::kKeepalive, 0);
     bench_.Bulk(out);
   }
-  // Time passes with a host that keeps alive.
+  // Advances the time with a host that sends keepalives.
   void PassAlive(sync::TimeNs duration) {
     for (sync::TimeNs left = duration; left > 0; left -= 50 * sync::kMillisecond) {
       bench_.Pass(std::min(left, 50 * sync::kMillisecond));

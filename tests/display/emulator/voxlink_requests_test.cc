@@ -1,5 +1,5 @@
-// The device model's requests: what the protocol's table does not have is stalled and changes
-// nothing.
+// Tests the device model's requests: those that are not in the protocol's table are stalled and
+// change nothing.
 
 #include <cstdint>
 #include <vector>

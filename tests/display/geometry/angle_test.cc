@@ -25,7 +25,7 @@ TEST(AngleTest, DirectionsAgreeWithTheMathsLibrary) {
     worst = std::max(worst, std::abs(d.sin - std::sin(angle) * kUnit));
   }
   EXPECT_LT(worst, 0.51L);
-  EXPECT_GT(worst, 0.45L);  // nothing is rounded better than to nearest
+  EXPECT_GT(worst, 0.45L);  // the best possible rounding is to the nearest
 }
 
 TEST(AngleTest, QuarterTurnsAreExact) {
@@ -66,7 +66,7 @@ TEST(AngleTest, TurnsAgreeWithTheMathsLibrary) {
   std::mt19937_64 random(3);
   long double worst = 0;
   for (int n = 0; n < 200000; ++n) {
-    // Of all magnitudes, up to 2⁶² − 1.
+    // Numbers of all magnitudes, up to 2⁶² − 1.
     const int64_t x = static_cast<int64_t>(random()) >> (1 + random() % 60);
     const int64_t y = static_cast<int64_t>(random()) >> (1 + random() % 60);
     if (x == 0 && y == 0) continue;
@@ -101,7 +101,7 @@ TEST(AngleTest, TurnsFromFractionsAndRatios) {
   EXPECT_EQ(TurnFromFraction(0), 0u);
   EXPECT_EQ(TurnFromFraction(0.25), kQuarter);
   EXPECT_EQ(TurnFromFraction(0x1.8p-32), 2u);    // half up
-  EXPECT_EQ(TurnFromFraction(1 - 0x1p-40), 0u);  // comes round
+  EXPECT_EQ(TurnFromFraction(1 - 0x1p-40), 0u);  // wraps around
   EXPECT_EQ(TurnFromRatio(1, 4), kQuarter);
   EXPECT_EQ(TurnFromRatio(1, 3), 1431655765u);
   EXPECT_EQ(TurnFromRatio(2, 3), 2863311531u);

@@ -125,7 +125,7 @@ TEST(CheckCorrection, SaysWhatIsWrong) {
   EXPECT_THAT(ErrorOf(c, stack), HasSubstr("displacement.nx is 1: it must be from 2 to 64"));
 }
 
-// The line at which the picture's nominal places are infinitely far runs through the grid.
+// The line on which the picture's nominal places are infinitely far away runs through the grid.
 TEST(FlatFootprints, HorizonsAreFarAway) {
   PlanarStack stack;
   stack.width_px = stack.height_px = 32;

@@ -23,7 +23,7 @@ TEST(DefaultGridTest, AnEvenStackHasALayerASlice) {
 
 TEST(DefaultGridTest, NearlyEvenIsEven) {
   EXPECT_EQ(DefaultGrid(Stack({0, 1, 2 + 1e-9, 3})).nz, 4);
-  // A thousandth off: depth 3.9995 over the least spacing 0.999.
+  // Off by a thousandth: depth 3.9995 over the least spacing 0.999.
   EXPECT_EQ(DefaultGrid(Stack({0, 0.999, 2, 3})).nz, 4);
 }
 

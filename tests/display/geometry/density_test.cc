@@ -30,11 +30,11 @@ TEST(Density, OfAnEvenDisplayIsFull) {
   std::vector<double> positions;
   for (int i = 0; i < 16; ++i) positions.push_back(i);
   EXPECT_TRUE(FactorsOf(StackAt(positions), 1).empty());
-  // What has no cube within reach is left as it is.
+  // Voxels without a cube within reach are unchanged.
   EXPECT_TRUE(FactorsOf(StackAt({0, 1}), 1).size() <= size_t{2 * 16});
 }
 
-// Slices a millimetre apart have twice the light of those that are two apart.
+// Slices a millimetre apart have twice the light of those that are two millimetres apart.
 TEST(Density, SlicesThatCrowdAreDimmed) {
   std::vector<double> positions;
   for (int i = 0; i < 16; ++i) positions.push_back(i);
@@ -46,7 +46,7 @@ TEST(Density, SlicesThatCrowdAreDimmed) {
   for (size_t s = 19; s < 25; ++s) EXPECT_NEAR(factors[s * 16 + 7] / 65535.0, 1, 0.03) << s;
 }
 
-// A panel through the axis passes a voxel at a distance for a time that falls with it.
+// A panel through the axis passes a voxel for a time that decreases with its distance.
 TEST(Density, OfARotorRisesWithTheDistance) {
   Rotor rotor;
   rotor.slices_per_turn = 360;
@@ -63,7 +63,7 @@ TEST(Density, OfARotorRisesWithTheDistance) {
     return sum / 360 / 65535;
   };
   for (const size_t distance : {8u, 16u, 24u, 32u, 48u}) {
-    const double want = static_cast<double>(distance) / 60;  // full at the rim, give or take
+    const double want = static_cast<double>(distance) / 60;  // roughly full at the rim
     EXPECT_NEAR(mean(64 + distance) / want, 1, 0.12) << distance;
     EXPECT_NEAR(mean(63 - distance) / mean(64 + distance), 1, 0.1) << distance;
   }
@@ -106,7 +106,7 @@ TEST(Density, EveryVoxelHasAKeeper) {
   }
 }
 
-// Lights in a heap are dimmed, one that stands alone is not.
+// Lights in a cluster are dimmed, an isolated one is not.
 TEST(Density, OfLightsAtPoints) {
   Lattice lattice;
   lattice.cell_mm = {1, 1, 1};

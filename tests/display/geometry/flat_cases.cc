@@ -1,4 +1,4 @@
-// Geometries whose footprints are kept pixel by pixel.
+// Geometries whose footprints are stored pixel by pixel.
 #include <cmath>
 #include <numbers>
 #include <string>
@@ -28,7 +28,7 @@ PlanarStack Stack(PlanarStack::Normal normal) {
   return stack;
 }
 
-// Turned by `angle` about an axis that is none of the three, a little smaller and moved.
+// Turned by `angle` about an oblique axis, a little smaller and shifted.
 Correction Turned(double angle) {
   Correction correction;
   const double c = std::cos(angle), s = std::sin(angle), k = std::cos(0.7 * angle),

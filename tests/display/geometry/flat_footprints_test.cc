@@ -1,5 +1,6 @@
-// Footprints pixel by pixel: nothing left out and nothing foreign taken in, against the solid that pixels sweep in closed form; and of
-// what is a product the same as as a product.
+// Tests footprints pixel by pixel: complete, and without foreign voxels, compared with the solid
+// that pixels sweep in closed form; those of a product geometry are the same as when computed as a
+// product.
 #include "display/geometry/flat_footprints.h"
 
 #include <gtest/gtest.h>
@@ -111,7 +112,7 @@ TEST_P(FlatFootprints, NothingForeignIsTakenIn) {
   EXPECT_EQ(without, 0) << "pixels without the voxel that they lie in";
 }
 
-// What pixels are and where they lie is told by one function: their middles are passed.
+// One function states what pixels are and where they are: their middles are passed.
 TEST_P(FlatFootprints, PixelsLieWhereTheyAreSaidToPass) {
   const SweptFlat solid(geometry_);
   for (int32_t slice = 0; slice < table_.slices; slice += 7) {
@@ -164,7 +165,7 @@ TEST(FlatFootprintsOfProducts, AreTheProducts) {
             const auto holds = [](double mm, double pitch_mm, int32_t cell) {
               return std::abs(mm / pitch_mm - cell - 0.5) < 0.5 + 1e-4;
             };
-            // Along how many axes a voxel holds the pixel's middle.
+            // Returns along how many axes a voxel contains the pixel's middle.
             const auto own = [&](const std::array<int32_t, 3>& voxel) {
               return holds(p.x - grid.origin_mm.x, grid.pitch_mm.x, voxel[0]) +
                      holds(p.y - grid.origin_mm.y, grid.pitch_mm.y, voxel[1]) +
@@ -174,11 +175,12 @@ TEST(FlatFootprintsOfProducts, AreTheProducts) {
             for (const FootprintEntry& e : flat.Outer(slice, v * flat.flat_row + u)) {
               const auto found = a.find({e.x, e.y, e.z});
               ++all;
-              // Between two voxels either may be the pixel's own.
+              // Between two voxels, either may be the pixel's own.
               if (found == a.end() || found->second < e.weight) foreign += own({e.x, e.y, e.z}) < 3;
               if (found != a.end() && found->second == e.weight) a.erase(found);
             }
-            // What a product has more is of the cell that holds the pixel's middle along one axis or another.
+            // The additional voxels of a product are in the cell that contains the pixel's middle
+            // along one axis or another.
             for (const auto& [voxel, weight] : a) missing += own(voxel) == 0;
           }
         }

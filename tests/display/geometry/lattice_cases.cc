@@ -12,7 +12,7 @@ namespace {
 
 using Points = std::vector<std::optional<Vec3>>;
 
-// Numbers that are the same with every library.
+// Random numbers that are the same with every library.
 class Random {
  public:
   double In(double low, double high) { return low + (high - low) * engine_() / 0x1p32; }
@@ -37,7 +37,7 @@ GeometryCase With(std::string name, Lattice lattice, std::optional<VoxelGrid> gr
   return c;
 }
 
-// About one in `of` goes.
+// Removes about one light in `of`.
 Lattice Thinned(Lattice lattice, int of, Random& random) {
   for (std::optional<Vec3>& point : lattice.points_mm) {
     if (random.In(0, of) < 1) point.reset();
@@ -100,7 +100,7 @@ std::vector<GeometryCase> LatticeCases() {
                        CentredGrid(12, 12, 12, {1, 1, 1})));
   cases.push_back(With("ScatteredFlatCells", Lights(40, cloud, {0.11, 3, 3}),
                        CentredGrid(12, 20, 20, {1, 0.6, 0.6})));
-  // Lights beside the grid on every side; some whose boxes reach into it.
+  // Lights beside the grid on every side, some of whose boxes reach into it.
   cases.push_back(With("GridWithinScattered", Lights(20, cloud, {1.7, 1.7, 1.7}),
                        VoxelGrid{8, 7, 6, {0.9, 0.8, 0.7}, {-3.1, -2.2, -2.4}}));
 

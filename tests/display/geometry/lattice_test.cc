@@ -1,4 +1,4 @@
-// Lattices by hand.
+// Tests lattices with values computed by hand.
 #include <cmath>
 #include <optional>
 
@@ -58,7 +58,7 @@ TEST(LatticeTest, ATableOfRows) {
 
 TEST(LatticeTest, TheCentresInTheHalfOpenBoxAndTheVoxelThatHoldsTheLight) {
   // Along x [2, 4): 2.5 and 3.5. Along y [1.5, 4.5): 1.5 to 3.5. Along z [4.5, 5.5): 4.5. The light
-  // is in (3, 3, 5), whose centre at height 5.5 is none of these.
+  // is in (3, 3, 5), whose centre at height 5.5 is not one of these.
   EXPECT_THAT(FootprintOf(OneLight({3, 3, 5}, {2, 3, 1})),
               ElementsAre(Voxel(2, 1, 4), Voxel(2, 2, 4), Voxel(2, 3, 4), Voxel(3, 1, 4),
                           Voxel(3, 2, 4), Voxel(3, 3, 4), Voxel(3, 3, 5)));

@@ -1,4 +1,4 @@
-// Each limit from both sides, and the bounds on tables, counted by hand.
+// Tests each limit from both sides, and the bounds on tables, computed by hand.
 #include "display/geometry/limits.h"
 
 #include <gmock/gmock.h>
@@ -33,7 +33,7 @@ PlanarStack OnePixelStack(std::vector<double> positions, int strokes = 1) {
   return stack;
 }
 
-// As wide and high in pixels, as high as it is far from its axis.
+// As wide and high in pixels, and as high as its distance from the axis.
 Helix HelixOf(int slices, int pixels, int blades, double span_turns, double mm) {
   Helix helix;
   helix.slices_per_turn = slices;
@@ -82,7 +82,7 @@ TEST(Limits, PositionsOfAStroke) {
               StartsWith("positions_mm[3] is 2: it must be below positions_mm[2], 1:"));
   EXPECT_THAT(refusal({std::numeric_limits<double>::quiet_NaN(), 1}),
               StartsWith("positions_mm[0] is nan: "));
-  // Not as the limit itself.
+  // It must not be taken for the limit itself.
   EXPECT_THAT(refusal({-1000000.5, 1}),
               StartsWith("positions_mm[0] is -1000000.5: it must be from -1000000 to 1000000 mm"));
   EXPECT_THAT(refusal({-1.1e6, 1}), StartsWith("positions_mm[0] is -1100000: "));
@@ -99,7 +99,7 @@ TEST(Limits, SpacingOfSlices) {
     std::get<PlanarStack>(geometry.shape).positions_mm = {0, 0.5, 0.5 + 0.499 / 1024};
     EXPECT_THAT(GridRefusal(geometry),
                 StartsWith("positions_mm[2] − positions_mm[1] is 0.0004873"));
-    // The turning point is no spacing.
+    // The turning point is not a spacing.
     PlanarStack twice = OnePixelStack({0, 1, 1, 0}, 2);
     twice.normal = normal;
     EXPECT_EQ(GridRefusal({twice, geometry.grid}), "");
@@ -159,7 +159,8 @@ TEST(Limits, TableOfALattice) {
   lattice.width_px = 1;
   lattice.points_mm = {Vec3{0, 0, 0}, std::nullopt, Vec3{1, 1, 1}};
   lattice.cell_mm = {10000, 50, 150};
-  // Of the box 20000 by 100 by 300 voxels: 16384 · 101 · 256 centres and one voxel, of each of two lights
+  // For the box of 20000 by 100 by 300 voxels: 16384 · 101 · 256 centres and one voxel, for each of
+  // two lights
   Geometry geometry{lattice, CentredGrid(16384, 16384, 256, {0.5, 0.5, 0.5})};
   EXPECT_THAT(GridRefusal(geometry), HasSubstr("table is 847249410:"));
   geometry.grid.pitch_mm = {1, 1, 2};  // 10001 · 51 · 76 and one, of each

@@ -1,4 +1,4 @@
-// Planar stacks by hand.
+// Tests planar stacks with values computed by hand.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -99,8 +99,8 @@ TEST(PlanarStackTest, ListedPositionsStandForTheirSlabs) {
   geometry.grid = {1, 1, 12, {1, 1, 1}, {-0.5, -0.5, -1}};  // voxel k is [k − 1, k)
   const FootprintTable table = BuildFootprints(geometry, Sampling::kMax);
   EXPECT_THAT(ReadFootprint(table, 0, 0, 0), ElementsAre(Voxel(0, 0, 1), Voxel(0, 0, 2)));
-  // The middle of voxel 3 is 2.5; that of voxel 4, 3.5, is the next slice's,
-  // but the slice lies in it.
+  // The middle of voxel 3 is 2.5; that of voxel 4, 3.5, belongs to the next slice, but the slice
+  // lies in it.
   EXPECT_THAT(ReadFootprint(table, 1, 0, 0), ElementsAre(Voxel(0, 0, 3), Voxel(0, 0, 4)));
   EXPECT_THAT(ReadFootprint(table, 2, 0, 0),
               ElementsAre(Voxel(0, 0, 4), Voxel(0, 0, 5), Voxel(0, 0, 6)));
@@ -113,8 +113,8 @@ TEST(PlanarStackTest, WeightsAreFullInTheNearerSliceAndPlaceTheVoxelBetweenBoth)
   Geometry geometry = Stack(1, 1, {0, 4});
   geometry.grid = {1, 1, 10, {1, 1, 1}, {-0.5, -0.5, -2.5}};
   const FootprintTable table = BuildFootprints(geometry, Sampling::kWeighted);
-  // The slab begins at −2, in the middle of voxel 0. Voxel 3 is 1 from it and 3 from the other:
-  // ratio 3 to 1; voxel 4 is half-way.
+  // The slab begins at −2, in the middle of voxel 0. Voxel 3 is 1 away from this slice and 3 from
+  // the other: ratio 3 to 1; voxel 4 is half-way.
   EXPECT_THAT(ReadFootprint(table, 0, 0, 0),
               ElementsAre(Voxel(0, 0, 0), Voxel(0, 0, 1), Voxel(0, 0, 2), Voxel(0, 0, 3),
                           Voxel(0, 0, 4), Voxel(0, 0, 5, 85)));
@@ -125,8 +125,8 @@ TEST(PlanarStackTest, WeightsAreFullInTheNearerSliceAndPlaceTheVoxelBetweenBoth)
 }
 
 TEST(PlanarStackTest, AVoxelOnAPixelsCentreHasHalfTheWeightAtLeast) {
-  // Four slices in each voxel: the two next to its middle have it in full, of the
-  // others it is beyond a neighbour.
+  // Four slices in each voxel: the two next to its middle have it in full; for the others it is
+  // beyond a neighbour.
   Geometry geometry = Stack(1, 1, {0.125, 0.375, 0.625, 0.875});
   geometry.grid = {1, 1, 1, {1, 1, 1}, {-0.5, -0.5, 0}};
   const FootprintTable weighted = BuildFootprints(geometry, Sampling::kWeighted);

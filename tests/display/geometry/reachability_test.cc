@@ -1,5 +1,5 @@
-// That footprints leave nothing out and take in nothing foreign, for every kind of geometry,
-// against the solid that the pixels sweep in closed form.
+// Tests that footprints are complete and without foreign voxels, for every kind of geometry,
+// compared with the solid that the pixels sweep in closed form.
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -103,7 +103,7 @@ TEST_P(ReachabilityTest, EveryReachableVoxelLightsAPixel) {
 }
 
 TEST_P(ReachabilityTest, PixelsThatPassAVoxelShowIt) {
-  // A plane of voxels at a time tells all there is to tell: lists are products.
+  // Checking one plane of voxels at a time suffices, since lists are products.
   const int32_t stride = std::max(1, grid_.nz / 4);
   int64_t checked = 0, missing = 0;
   ForEachVoxel([&](int32_t i, int32_t j, int32_t k) {

@@ -1,4 +1,4 @@
-// Rotors by hand.
+// Tests rotors with values computed by hand.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -40,7 +40,8 @@ void ExpectAt(const Geometry& geometry, int32_t slice, int32_t u, int32_t v, Vec
   EXPECT_NEAR(p.z, expected.z, 1e-7) << slice;
 }
 
-// Eight pixels along u, three up; plane 1.5 behind the axis: ahead of it along +y at turn angle 0.
+// Eight pixels along u, three upwards; the plane is 1.5 behind the axis, which is ahead of it along
+// +y at turn angle 0.
 TEST(RotorTest, QuarterTurnsCounterClockwise) {
   Geometry geometry = OnePanel(4, 8, 3, {.eccentricity_mm = 1.5});
   geometry.grid = CentredGrid(10, 10, 3, {1, 1, 1});
@@ -92,7 +93,7 @@ TEST(RotorTest, PanelsTakeTurnsInTheNumbersOfSlices) {
   geometry.grid = DefaultGrid(geometry);
   EXPECT_EQ(SliceCount(geometry), 720);
   ExpectAt(geometry, 0, 0, 0, {-63.5, 13.5, -31.5});
-  ExpectAt(geometry, 1, 0, 0, {63.5, -0.375, -31.5});    // half a turn on
+  ExpectAt(geometry, 1, 0, 0, {63.5, -0.375, -31.5});    // half a turn later
   ExpectAt(geometry, 180, 0, 0, {-13.5, -63.5, -31.5});  // step 90
 }
 
@@ -100,7 +101,7 @@ TEST(RotorTest, EachPassBelongsToOneSlice) {
   // A full diameter passes each column twice, half a turn apart, at u and its mirror image.
   Geometry geometry = OnePanel(360, 32, 1);
   const FootprintTable table = BuildFootprints(geometry, Sampling::kMax);
-  // (3.5, 4.5): under atan(9/7) = 52.1°, 5.7 from the axis.
+  // (3.5, 4.5): at atan(9/7) = 52.1°, 5.7 from the axis.
   const int32_t i = 16 + 3, j = 16 + 4;
   EXPECT_THAT(ReadFootprint(table, 52, 16 + 5, 0), Contains(Voxel(i, j, 0)));
   EXPECT_THAT(ReadFootprint(table, 232, 16 - 6, 0), Contains(Voxel(i, j, 0)));
@@ -108,7 +109,7 @@ TEST(RotorTest, EachPassBelongsToOneSlice) {
   for (int32_t s = 0; s < table.slices; ++s) {
     for (int32_t u = 0; u < table.width; ++u) {
       const Vec3 p = PixelPosition(geometry, s, u, 0);
-      if (p.x >= 3 && p.x < 4 && p.y >= 4 && p.y < 5) continue;  // for holding the centre
+      if (p.x >= 3 && p.x < 4 && p.y >= 4 && p.y < 5) continue;  // because it contains the centre
       if (ReadFootprint(table, s, u, 0).contains({i, j, 0})) passes.push_back(s);
     }
   }
@@ -165,8 +166,8 @@ TEST(RotorTest, WhatLiesNearerToTheAxisThanThePlaneIsNotReached) {
 }
 
 TEST(RotorTest, APanelThatComesAndGoesWithinASliceIsSeen) {
-  // Barely beyond the plane's distance both passes fall into one slice: at its two edges the plane
-  // lies on the same side of the voxel.
+  // Barely beyond the plane's distance, both passes are in one slice: at its two edges the plane is
+  // on the same side of the voxel.
   Geometry geometry = OnePanel(8, 16, 1, {.eccentricity_mm = 4.45});
   geometry.grid = CentredGrid(20, 21, 1, {1, 1, 1});
   const FootprintTable table = BuildFootprints(geometry, Sampling::kMax);
@@ -174,14 +175,14 @@ TEST(RotorTest, APanelThatComesAndGoesWithinASliceIsSeen) {
   EXPECT_THAT(ReadFootprint(table, 6, 8, 0), Contains(Voxel(14, 10, 0)));
   EXPECT_THAT(ReadFootprint(table, 6, 7, 0), Contains(Voxel(14, 10, 0)));
 
-  // At just the plane's distance there is one pass, of the place along u that is 0.
+  // At exactly the plane's distance there is one pass, at place 0 along u.
   std::get<Rotor>(geometry.shape).panels[0].eccentricity_mm = 4.5;
   const FootprintTable touched = BuildFootprints(geometry, Sampling::kMax);
   EXPECT_THAT(ReadFootprint(touched, 6, 8, 0), Contains(Voxel(14, 10, 0)));
 }
 
 TEST(RotorTest, WeightsAreFullInTheNearerSliceAndPlaceTheVoxelBetweenBoth) {
-  // Column (10.5, ½) lies 2.726° on: 0.2726 of a slice of 36.
+  // Column (10.5, ½) is 2.726° further: 0.2726 of a slice of 36.
   Geometry geometry = OnePanel(36, 32, 1);
   geometry.grid = CentredGrid(32, 32, 1, {1, 1, 1});
   const FootprintTable table = BuildFootprints(geometry, Sampling::kWeighted);
@@ -190,7 +191,7 @@ TEST(RotorTest, WeightsAreFullInTheNearerSliceAndPlaceTheVoxelBetweenBoth) {
   };
   EXPECT_EQ(weight_in(0, 16 + 10), 255);
   EXPECT_EQ(weight_in(1, 16 + 10), 96);    // 255·0.2726/0.7274 = 95.6
-  EXPECT_EQ(weight_in(18, 16 - 11), 255);  // half a turn on
+  EXPECT_EQ(weight_in(18, 16 - 11), 255);  // half a turn later
   EXPECT_EQ(weight_in(19, 16 - 11), 96);
 }
 
@@ -219,7 +220,7 @@ TEST(RotorTest, PanelsAlikeAlongVShareTheirLists) {
   EXPECT_THAT(table.inner.entries, Each(testing::Field(&FootprintEntry::weight, 255)));
 }
 
-// FNV-1a. Engines of one display on several machines build their tables apart.
+// FNV-1a. Engines of one display on several machines build their tables separately.
 uint64_t Digest(const FootprintLists& lists) {
   uint64_t hash = 0xCBF29CE484222325;
   const auto add = [&](uint64_t value) { hash = (hash ^ value) * 0x100000001B3; };
@@ -237,7 +238,7 @@ TEST(RotorTest, TablesAreTheSameOnEveryMachine) {
 TEST(RotorTest, ALargeRotorsTableIsBuilt) {
   Geometry geometry = OnePanel(1024, 512, 64, {.eccentricity_mm = 0.5});
   const FootprintTable table = BuildFootprints(geometry, Sampling::kMax);
-  // At the least one column a pixel, at the most that and two passes a column.
+  // At least one column for each pixel, and at most that and two passes for each column.
   EXPECT_GE(table.outer.entries.size(), 1024u * 512u);
   EXPECT_LE(table.outer.entries.size(), 1024u * 512u + 2u * 514u * 514u);
 }

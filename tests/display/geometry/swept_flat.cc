@@ -15,7 +15,7 @@ constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kSlack = 2e-3;  // pixels, slices
 constexpr double kFar = std::numeric_limits<double>::infinity();
 
-// x of a·x = b, three equations, by elimination.
+// Returns x of a·x = b, three equations, by elimination.
 std::array<double, 3> Solved(std::array<std::array<double, 4>, 3> m) {
   for (size_t i = 0; i < 3; ++i) {
     size_t most = i;
@@ -32,7 +32,7 @@ std::array<double, 3> Solved(std::array<std::array<double, 4>, 3> m) {
   return {m[0][3] / m[0][0], m[1][3] / m[1][1], m[2][3] / m[2][2]};
 }
 
-// Straight between eight places, by their weights.
+// Interpolates linearly between eight places, by their weights.
 Vec3 DisplacedBy(const DisplacementGrid& grid, const Vec3& p) {
   const int32_t n[3] = {grid.nx, grid.ny, grid.nz};
   const double at[3] = {p.x, p.y, p.z}, low[3] = {grid.low_mm.x, grid.low_mm.y, grid.low_mm.z},
@@ -87,7 +87,7 @@ Vec3 SweptFlat::NominalOf(const Vec3& place) const {
   return nominal;
 }
 
-// (u, v) with M·(u, v, 1) ~ (x, y, 1): two equations.
+// Solves M·(u, v, 1) ~ (x, y, 1) for (u, v): two equations.
 PicturePlace SweptFlat::NominalPicture(int32_t slice, double x, double y) const {
   if (!geometry_.correction || geometry_.correction->homographies.empty()) return {x, y};
   const auto& all = geometry_.correction->homographies;

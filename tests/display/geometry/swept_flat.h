@@ -1,5 +1,6 @@
-// The oracle of geometries that are no products: where a place lies in the solid that all pixels sweep, in double precision and closed
-// form, by other means than the footprints' (polar angles, equations solved, no tables, no fixed point).
+// The oracle for geometries that are not products: where a place is in the solid that all pixels
+// sweep, in double precision and closed form, by other means than the footprints' (polar angles,
+// equations solved, no tables, no fixed point).
 #pragma once
 
 #include <cstdint>
@@ -16,14 +17,16 @@ class SweptFlat {
   explicit SweptFlat(const Geometry& geometry);
 
   SweptSolid::Where Locate(const Vec3& place) const;
-  // Whether a pixel's rectangle passes a place, give or take the margin; with `reach` 2 it sweeps to the neighbouring slices' middles.
+  // Returns whether a pixel's rectangle passes a place, within the margin; with `reach` 2 it sweeps
+  // to the middles of the neighbouring slices.
   bool MayPass(int32_t slice, int32_t u, int32_t v, const Vec3& place, int reach) const;
-  // So near to where it cannot be told that nothing is asserted.
+  // Returns whether the place is too near to a boundary to assert anything.
   bool Doubtful(const Vec3& place) const;
 
  private:
-  // A place is passed: at (u, v), pixels from the picture's corner, by slice `slice`, at so many slices from its middle, where
-  // a half is its end; and so many voxels within the ends of the way (below 0: beyond).
+  // The pass of a place: at (u, v), in pixels from the picture's corner, by slice `slice`, at that
+  // many slices from its middle, where a half is its end; and that many voxels within the ends of
+  // the way (below 0: beyond).
   struct Pass {
     int32_t slice;
     double u, v, offset, inside;

@@ -57,7 +57,7 @@ class SweptLattice : public SweptSolid {
     return lattice_.points_mm[static_cast<size_t>(slice * lattice_.width_px + u)];
   }
 
-  // `slack` in voxels.
+  // `slack` is in voxels.
   bool InBox(const Vec3& light, const Vec3& point, double slack) const {
     const auto within = [&](double distance, double size, double pitch) {
       return std::abs(distance) < size / 2 + slack * pitch;

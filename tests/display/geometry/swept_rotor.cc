@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kFullTurn = 2 * std::numbers::pi;
 
-// A stretch on the panel's u axis, or of turn angle in steps.
+// An interval on the panel's u axis, or of turn angles in steps.
 struct Interval {
   double low, high;
   bool Overlaps(const Interval& other) const { return low <= other.high && other.low <= high; }
@@ -17,8 +17,8 @@ struct Interval {
   Interval Wider(double slack) const { return {low - slack, high + slack}; }
 };
 
-// Where a panel's plane passes a point: place along u, and turn in steps, over all points within
-// the margin of it.
+// Where a panel's plane passes a point: the place along u, and the turn in steps, over all points
+// within the margin of it.
 struct Pass {
   Interval a, steps;
 };
@@ -48,7 +48,7 @@ class SweptRotor : public SweptSolid {
       if (std::hypot(point.x, point.y) < std::abs(panel.eccentricity_mm) + slack_) continue;
       for (const double sign : {1.0, -1.0}) {
         const Pass pass = PassAt(panel, point, sign);
-        // Both ends of the turn in one step, both ends along u in one pixel.
+        // Both ends of the turn must be in one step, and both ends along u in one pixel.
         const double step = std::floor(pass.steps.low + 0.5);
         if (!Interval{step - 0.5, step + 0.5}.Contains(pass.steps)) continue;
         const int32_t slice = SliceAt(static_cast<int32_t>(step), p);
@@ -109,7 +109,7 @@ class SweptRotor : public SweptSolid {
   const Rotor::Panel& PanelOf(int32_t slice) const {
     return rotor_.panels[static_cast<size_t>(slice) % rotor_.panels.size()];
   }
-  // Turns past a whole one come round.
+  // Turns beyond a whole one wrap around.
   int32_t SliceAt(int32_t step, size_t panel) const {
     const int32_t n = rotor_.slices_per_turn;
     const int32_t within = (step % n + n) % n;
@@ -141,8 +141,8 @@ class SweptRotor : public SweptSolid {
     bool near = std::abs(rho - std::hypot(u.low, e)) < slack_ ||
                 std::abs(rho - std::hypot(u.high, e)) < slack_ ||
                 std::abs(point.z - v.low) < slack_z_ || std::abs(point.z - v.high) < slack_z_;
-    // The cylinder that the plane touches bounds the solid,
-    // unless it is the axis, within the panel.
+    // The cylinder that the plane touches bounds the solid, unless it is the axis, within the
+    // panel.
     if (e > 0 || u.low >= 0 || u.high <= 0) near = near || std::abs(rho - e) < slack_;
     if (near) return Where::kNearBoundary;
     if (rho < e || point.z < v.low || point.z > v.high) return Where::kOutside;
@@ -157,7 +157,7 @@ class SweptRotor : public SweptSolid {
       return sign * std::sqrt(std::max(0.0, distance * distance - e * e));
     };
     const auto steps_at = [&](double a) {
-      // The panel's point at a is seen from the axis under the angle atan2(e, a) to its u axis.
+      // The panel's point at a is seen from the axis at the angle atan2(e, a) to its u axis.
       const double theta = std::atan2(point.y, point.x) - std::atan2(e, a);
       double turn = theta / kFullTurn - panel.phase_turns;
       if (rotor_.clockwise) turn = -turn;
@@ -166,7 +166,7 @@ class SweptRotor : public SweptSolid {
     const double inner = along(std::max(0.0, rho - slack_)), outer = along(rho + slack_);
     const double slack = rotor_.slices_per_turn * slack_ / rho / kFullTurn;
     const double middle = steps_at(along(rho));
-    // All three on the same turn as the middle.
+    // All three in the same turn as the middle.
     const auto nearest = [&](double steps) {
       const double n = rotor_.slices_per_turn;
       return steps - n * std::round((steps - middle) / n);
@@ -178,7 +178,7 @@ class SweptRotor : public SweptSolid {
 
   const Rotor rotor_;
   const VoxelGrid grid_;
-  const double slack_, slack_z_;  // mm
+  const double slack_, slack_z_;  // in mm
 };
 
 }  // namespace

@@ -11,7 +11,7 @@
 
 namespace voxeld::display {
 
-// Nearer than this many voxels to a boundary the oracle does not decide.
+// Within this many voxels of a boundary, the oracle does not decide.
 inline constexpr double kMargin = 1e-4;
 
 struct PixelId {
@@ -24,21 +24,21 @@ class SweptSolid {
 
   virtual ~SweptSolid() = default;
 
-  // Does `point` lie in the solid that all pixels' rectangles sweep together (a lattice's lights'
-  // boxes)?
+  // Returns where `point` is relative to the solid that all pixels' rectangles (for a lattice, the
+  // lights' boxes) sweep together.
   virtual Where Locate(const Vec3& point) const = 0;
 
-  // The pixels whose rectangle passes `point`,
-  // but for those for which it is nearer than the margin to a boundary.
+  // Returns the pixels whose rectangle passes `point`, except those for which it is within the
+  // margin of a boundary.
   virtual std::vector<PixelId> Passing(const Vec3& point) const = 0;
 
-  // The middle of a pixel; NaN: a lattice has no light there.
+  // Returns the middle of a pixel; NaN: a lattice has no light there.
   virtual Vec3 Centre(const PixelId& pixel) const = 0;
 
-  // Could an entry of the outer list of (slice, u), or of the inner list of (slice, v),
-  // stand there: does the pixel's rectangle pass its voxel's centre, or the voxel hold
-  // the pixel's centre, give or take the margin? With `reach` 2 the rectangle sweeps
-  // to the neighbouring slices' middles.
+  // Returns whether an entry may be in the outer list of (slice, u), or in the inner list of
+  // (slice, v): the pixel's rectangle passes its voxel's centre, or the voxel contains the pixel's
+  // centre, within the margin. With `reach` 2 the rectangle sweeps to the middles of the
+  // neighbouring slices.
   virtual bool MayShowOuter(int32_t slice, int32_t u, const FootprintEntry& entry,
                             int reach) const = 0;
   virtual bool MayShowInner(int32_t slice, int32_t v, const FootprintEntry& entry) const = 0;

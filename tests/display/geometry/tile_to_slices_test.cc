@@ -14,7 +14,7 @@ struct Tiles {
   int32_t x, y, z;
 };
 
-// The slices with a voxel of the tile in some footprint, by looking at all of them.
+// Returns the slices that have a voxel of the tile in some footprint, by examining all of them.
 std::vector<int32_t> SlicesByLooking(const FootprintTable& table, const Tiles& size, int32_t i,
                                      int32_t j, int32_t k) {
   const auto in_tile = [&](const FootprintEntry& o, const FootprintEntry& n) {
@@ -39,7 +39,7 @@ std::vector<int32_t> SlicesByLooking(const FootprintTable& table, const Tiles& s
   return slices;
 }
 
-// The same from the flat tables, as a machine reads them.
+// The same from the flat tables, as a device reads them.
 std::vector<int32_t> SlicesFromTables(const TileToSlices& map, int32_t i, int32_t j, int32_t k) {
   const TileToSlices::Tables tables = map.tables();
   const auto place =
@@ -104,7 +104,7 @@ TEST(TileToSlicesByHandTest, AStackWhosePixelsAreVoxels) {
   EXPECT_FALSE(map.Visible(0, 0, 1, 5, 5));
 }
 
-// Every tile, both ways: none too many, none too few.
+// Every tile, in both directions: no slice too many, and none too few.
 TEST(TileToSlicesByHandTest, EveryTileOfEveryLattice) {
   for (const GeometryCase& c : LatticeCases()) {
     const VoxelGrid& grid = c.geometry.grid;
@@ -124,7 +124,7 @@ TEST(TileToSlicesByHandTest, EveryTileOfEveryLattice) {
   }
 }
 
-// Slices that see tiles at one height in one place and at another in another.
+// Slices that see tiles at one height in one place, and at another height in another.
 TEST(TileToSlicesByHandTest, ALatticesSlicesGoWhereTheyLike) {
   Lattice lattice;
   lattice.width_px = 2;
@@ -149,7 +149,7 @@ TEST(TileToSlicesByHandTest, TilesThatNoPixelSees) {
   rotor.panels = {{.eccentricity_mm = 6}};
   Geometry geometry{rotor, CentredGrid(24, 24, 12, {1, 1, 1})};
   const TileToSlices map(BuildFootprints(geometry, Sampling::kMax), geometry.grid, 4, 4, 4);
-  EXPECT_TRUE(map.Slices(2, 2, 1).empty());  // within the plane's distance from the axis
+  EXPECT_TRUE(map.Slices(2, 2, 1).empty());  // nearer to the axis than the plane
   EXPECT_TRUE(map.Slices(0, 0, 1).empty());  // beyond the circle
   EXPECT_TRUE(map.Slices(1, 2, 0).empty());  // below the panel
   EXPECT_FALSE(map.Slices(1, 2, 1).empty());

@@ -207,7 +207,7 @@ TEST(ValidateTest, TheFirstFaultIsTold) {
               testing::StartsWith("height_px is 0: it must be from 1 to 16384"));
 }
 
-// At the limits all sums must stay within 64 bits; UBSan watches.
+// At the limits, all sums must fit in 64 bits; UBSan checks that.
 TEST(ValidateTest, WhatIsAtTheLimitsIsBuilt) {
   Geometry stack = GoodStack();
   auto& s = std::get<PlanarStack>(stack.shape);

@@ -37,7 +37,8 @@ TEST(SweepClock, KnowsAtOnceAndLocksAfterEightGoodReports) {
   EXPECT_EQ(clock.StartOf(100), 100 * kPeriod);
 }
 
-// A screen that is 200 ppm fast, whose reports come late by up to a hundredth of a period, and of which a third is lost.
+// A screen that is 200 ppm fast, whose reports are late by up to a hundredth of a period, and of
+// which a third is lost.
 TEST(SweepClock, FollowsADriftThroughJitterAndLoss) {
   SweepClock clock(kPeriod);
   std::mt19937 random(1);
@@ -54,7 +55,7 @@ TEST(SweepClock, FollowsADriftThroughJitterAndLoss) {
     clock.Note(n, std::llround(begin + late), kPeriod);
   }
   EXPECT_LT(worst, kPeriod / 100.0);
-  EXPECT_NEAR(clock.lock().drift_ppm, 200, 800);  // of one moment
+  EXPECT_NEAR(clock.lock().drift_ppm, 200, 800);  // the drift at one moment
   EXPECT_NEAR(clock.lock().period_ns, period, kPeriod * 1e-3);
   EXPECT_LT(clock.lock().jitter_ns, kPeriod / 100.0);
   EXPECT_GT(clock.lock().jitter_ns, 0);
@@ -72,7 +73,7 @@ TEST(SweepClock, AJumpIsALossAndTheNextLockFollows) {
   Follow(clock, 22, 40, kPeriod / 2);
   EXPECT_EQ(clock.lock().state, State::kLocked);
   EXPECT_EQ(clock.lock().losses, 1u);
-  // A jump while locking is none.
+  // A jump while locking does not count as a jump.
   Follow(clock, 41, 41, 0);
   Follow(clock, 42, 42, kPeriod / 2);
   EXPECT_EQ(clock.lock().losses, 2u);
@@ -89,7 +90,7 @@ TEST(SweepClock, SilenceIsALossOnce) {
   EXPECT_TRUE(clock.Coming(last, 1).empty());
   clock.Advance(last + 20 * kPeriod);
   EXPECT_EQ(clock.lock().losses, 1u);
-  // A new session begins its numbers anew.
+  // A new session restarts its numbers.
   Follow(clock, 1, 9, 100 * kPeriod);
   EXPECT_EQ(clock.lock().state, State::kLocked);
   clock.Restart();
@@ -110,7 +111,7 @@ TEST(SweepClock, NonsenseIsPassedOver) {
   Follow(clock, 5, 20);  // numbers that do not ascend
   EXPECT_EQ(clock.lock().state, State::kLocked);
   EXPECT_EQ(clock.StartOf(21), 21 * kPeriod);
-  // However a device lies, the period stays near the nominal one, and answers come.
+  // The period stays near the nominal one, and predictions are made, whatever a device reports.
   std::mt19937_64 random(3);
   uint64_t number = 20;
   for (int i = 0; i < 100000; ++i) {

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # Usage: dissector_test.sh TSHARK LUA RECORD_SESSION
-# Records a voxlink session with something of everything, and looks at what the dissector makes of it: fields by
-# name with their values, the line of each frame, the same in one pass and in two.
+# Records a voxlink session in which everything occurs, and checks the output of the dissector: fields by name with their values, the line
+# of each frame, and the same output in one pass and in two.
 set -euo pipefail
 tshark=$1 lua=$2 record=$3
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 file=$folder/session.pcapng
-# Nothing of the user's own settings and plugins.
+# Ignores the user's own settings and plugins.
 export HOME=$folder WIRESHARK_CONFIG_DIR=$folder
 "$record" "$file"
 
@@ -35,7 +35,7 @@ line() {
   [ "$have" = "$2" ] || fail "line of $1: '$have' instead of '$2'"
 }
 
-# Sessions of the driver (device 1) and by hand (device 2); times are of day.
+# Sessions of the driver (device 1) and by hand (device 2); times are times of day.
 driver='usb.device_address==1' hand='usb.device_address==2'
 expect 'frame.number==1' frame.time_epoch=1750000001.000000000
 expect "$driver && voxlink.request && usb.urb_type=='S'" voxlink.request=1,6,3,7,8,9,5,6
@@ -79,7 +79,7 @@ expect "$driver && voxlink.begin.base>0" voxlink.begin.base=1,2 \
   voxlink.begin.announced=3,3
 expect "$driver && voxlink.type==7" voxlink.volume=0,0,0
 
-# Damage, noise, and packets that are cut by transfers.
+# Damage, noise, and packets that are split by transfers.
 damaged="$hand && voxlink.payload_crc.status==0"
 expect "$damaged" voxlink.payload_crc.status=1,0,1,1,1,1,1,1 \
   '_ws.expert.message=The CRC is wrong'
@@ -117,7 +117,7 @@ as_voxlink=$(shark -d 'usb.device==65537,voxlink' -Y 'voxlink.type==1' -T fields
 [ "$as_voxlink" = 1,1,1,1,1,1,1,1,2,2,2,2,2,3,3,3,3,3 ] || fail "decoded as voxlink: volumes '$as_voxlink'"
 file=$whole
 
-# Wireshark looks at frames more than once. (USB's own dissector knows more the second time.)
+# Wireshark examines frames more than once. (USB's own dissector knows more the second time.)
 if ! diff <(shark -V -Y voxlink) <(shark -2 -V -Y voxlink | sed '/^ *\[Response in:/d') >"$folder/diff"; then
   fail "two passes see something else: $(head -n 4 "$folder/diff")"
 fi

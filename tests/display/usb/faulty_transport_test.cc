@@ -1,5 +1,5 @@
-// A transport that fails where it was told to, and the driver over it: it always comes back, shows
-// the newest volume, and tells of each volume once.
+// Tests a transport that fails at a chosen place, and the driver over it: it always recovers, shows
+// the newest volume, and reports each volume once.
 
 #include "display/usb/faulty_transport.h"
 
@@ -177,7 +177,8 @@ std::ostream& operator<<(std::ostream& out, const SweepCase& c) { return out << 
 
 class DriverOverFaults : public testing::TestWithParam<SweepCase> {
  protected:
-  // An attach and five volumes with the fault at its n-th place; false: it was not met.
+  // Runs an attach and five volumes with the fault at its n-th place; returns false if that place
+  // was not reached.
   static bool RunWith(TransportFault fault) {
     sync::FakeClock clock;
     EmulatedCable cable(clock);

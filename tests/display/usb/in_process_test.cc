@@ -1,4 +1,4 @@
-// The carriers that lie inside this process, bare and with what may stand before them.
+// Tests the transports within this process, bare and wrapped.
 
 #include <functional>
 #include <memory>
@@ -34,7 +34,7 @@ emulator::VoxlinkDeviceConfig SmallDevice() {
 
 constexpr size_t kInFlight = size_t{1} << 20;
 
-// What stands between the test and the in-process transport.
+// Wraps the in-process transport.
 using Wrap =
     std::function<std::unique_ptr<UsbTransport>(std::unique_ptr<UsbTransport>, sync::Clock&)>;
 

@@ -1,4 +1,5 @@
-// Recordings as they grow: nobody waits for a disk; what it does not take is told.
+// Tests recordings while they grow: no caller waits for a disk, and packets that it does not accept
+// are reported.
 
 #include "display/usb/packet_recorder.h"
 
@@ -34,7 +35,7 @@ class Disk {
     sync::MutexLock lock(mutex_);
     capacity_ = bytes;
   }
-  // While stopped a write does not return.
+  // While it is stopped, a write does not return.
   void SetStopped(bool stopped) {
     sync::MutexLock lock(mutex_);
     stopped_ = stopped;
@@ -97,7 +98,7 @@ std::vector<Read> ReadAll(const Bytes& file) {
   }
 }
 
-// The interface statistics at the end of a file: received and left out.
+// Returns the interface statistics at the end of a file: received and left out.
 std::pair<uint64_t, uint64_t> StatisticsOf(const Bytes& file) {
   const auto get = [&](size_t at, auto& value) {
     std::memcpy(&value, file.data() + at, sizeof(value));

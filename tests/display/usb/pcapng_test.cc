@@ -1,5 +1,5 @@
-// The bytes of recordings: written as the specifications say, read from whoever wrote them, and
-// refused with an offset where they are wrong.
+// Tests the bytes of recordings: written according to the specifications, read from other writers,
+// and refused with an offset where they are wrong.
 
 #include "display/usb/pcapng.h"
 

@@ -1,6 +1,6 @@
-// record_session FILE: a voxlink session with something of everything, recorded into FILE, for the
-// test of the dissector: an attach of the driver and three volumes, then packets by hand that are
-// cut by transfers, damaged, held, shown, dropped and given up.
+// record_session FILE: records a voxlink session in which everything occurs into FILE, for the test
+// of the dissector: an attach of the driver and three volumes, then packets by hand that are split
+// by transfers, damaged, held, shown, dropped and given up.
 
 #include <cstdio>
 #include <string>
@@ -23,7 +23,7 @@ constexpr int64_t kWallOffset = 1'750'000'000 * kSecond;
 
 void Say(const char* what) { std::fprintf(stderr, "record_session: %s\n", what); }
 
-// The host's end by hand: every answer is awaited, every event read.
+// The host's end, driven by hand: every answer is awaited, and every event read.
 class Hand {
  public:
   Hand(UsbTransport& usb, InProcessTransport& cable, sync::FakeClock& clock)
@@ -101,7 +101,8 @@ void ByHand(Hand& hand) {
   hand.Request(out(Request::kStart));
   for (int i = 0; i < 4; ++i) hand.Listen();
 
-  // Of 6 pictures of 192 bytes. The second packet is damaged: it comes to be missing.
+  // Volumes of 6 pictures of 192 bytes. The second packet is damaged, so its picture will be
+  // missing.
   constexpr uint32_t kPictures = 6;
   const std::vector<std::byte> picture(192, std::byte{0x55});
   voxlink::PacketWriter writer;
@@ -136,7 +137,7 @@ void ByHand(Hand& hand) {
   writer.Plain(bytes, PacketType::kKeepalive, 0);
   hand.Send(bytes);
   hand.Request(in(Request::kGetStatus, sizeof(voxlink::Status)));
-  hand.RunFor(1200 * kMillisecond);  // silent: dark
+  hand.RunFor(1200 * kMillisecond);  // no messages: it goes dark
   hand.Request(out(Request::kStop));
 }
 

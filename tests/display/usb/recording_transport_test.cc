@@ -1,5 +1,5 @@
-// What a recording holds, read by a parser that shares nothing with the writer. That the wrapped
-// transport is as good as the bare one is for transport_conformance_test.cc.
+// Tests the contents of a recording with a parser that shares no code with the writer.
+// transport_conformance_test.cc tests that the wrapped transport is as good as the bare one.
 
 #include "display/usb/recording_transport.h"
 
@@ -21,7 +21,7 @@ namespace {
 
 using sync::kMillisecond;
 
-// A packet as text, by the offsets of the specifications.
+// Returns packets as text, by the offsets of the specifications.
 std::vector<std::string> Lines(const std::vector<std::byte>& file) {
   const auto* const bytes = reinterpret_cast<const unsigned char*>(file.data());
   const auto number = [&](size_t at, int size) {
@@ -114,7 +114,7 @@ class Recording : public testing::Test {
     return Lines(recording_.bytes());
   }
 
-  sync::FakeClock clock_;  // from 1 s on
+  sync::FakeClock clock_;  // starts at 1 s
   MemoryRecording recording_;
   InProcessTransport* pump_ = nullptr;
   std::unique_ptr<RecordingTransport> usb_;

@@ -1,5 +1,5 @@
-// Recordings of the voxlink driver played to a fresh one, with no device: it does and tells the
-// same. What differs is named; damaged recordings do no harm.
+// Tests recordings of the voxlink driver that are replayed to a fresh one, without a device: it
+// acts and reports the same. Differences are named; damaged recordings do no harm.
 
 #include "display/usb/replay_transport.h"
 
@@ -21,10 +21,10 @@ using sync::kSecond;
 
 using Bytes = std::vector<std::byte>;
 
-// What a test does with a display and its cable.
+// The actions of a test on a display and its cable.
 using Deeds = std::function<void(TransportRig&, const std::function<void(bool)>& set_plugged)>;
 
-// What a display told.
+// The reports of a display.
 struct Told {
   std::vector<std::string> outcomes;
   std::vector<std::pair<DisplayState, std::string>> states;
@@ -183,7 +183,7 @@ TEST(Replay, OnItsOwnThreadToo) {
 
 TEST(Replay, WhatTheDriverDoesOtherwiseIsNamed) {
   const Recorded recorded = Record(ShowFive);
-  // Another first volume: its first slice differs.
+  // Another first volume, whose first slice differs.
   std::string reason;
   const auto replayed =
       Replay(recorded.file, [&](TransportRig& rig, const std::function<void(bool)>&) {
@@ -328,7 +328,7 @@ TEST(Replay, FromAFile) {
   std::remove(path.c_str());
 }
 
-// Whatever the bytes, the driver and the replay live through it.
+// The driver and the replay survive.
 TEST(Replay, DamagedRecordingsDoNoHarm) {
   const Deeds deeds = [](TransportRig& rig, const std::function<void(bool)>&) {
     FrameSource source(rig.display().info().layout, 1);

@@ -89,7 +89,7 @@ TEST_P(TransportConformance, BytesInFlightAreCountedAndCapped) {
     EXPECT_EQ(usb().max_bytes_in_flight(), told);
   }
   EXPECT_EQ(usb().bytes_in_flight(), 0u);
-  const TransferId read = SubmitEvent();  // no session: nothing comes
+  const TransferId read = SubmitEvent();  // without a session no event comes
   EXPECT_EQ(usb().bytes_in_flight(), voxlink::kEventSize);
   Transfer big;
   big.endpoint = voxlink::kBulkOut;
@@ -129,7 +129,7 @@ TEST_P(TransportConformance, AHaltLastsUntilItIsCleared) {
 }
 
 TEST_P(TransportConformance, ErrorsPass) {
-  // More than any host controller tries again.
+  // More than any host controller retries.
   const uint64_t count = carrier_->limits().errors_are_retried ? 40 : 1;
   carrier_->AddFault({.what = Fault::What::kError, .amount = count});
   Open();
@@ -193,7 +193,7 @@ TEST_P(TransportConformance, CloseLetsARequestGoOut) {
 }
 
 TEST_P(TransportConformance, ResetCancelsWhatIsInFlightAndTheDeviceStartsAnew) {
-  // No event comes between.
+  // No event arrives in between.
   carrier_->AddFault(
       {.endpoint = voxlink::kInterruptIn, .what = Fault::What::kNak, .amount = 60 * kSecond});
   Open();

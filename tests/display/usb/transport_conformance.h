@@ -1,4 +1,4 @@
-// What every UsbTransport keeps to, whatever carries it. To hold one to it: a Carrier, and a line that
+// Tests the contract of every UsbTransport. To test one, write a Carrier and a line that
 // instantiates the suite. The far end of each is an emulated voxlink device of 4x4x2 pixels at 100
 // volumes a second.
 #pragma once
@@ -20,10 +20,10 @@ namespace voxeld::display {
 // A transport, its device and its time.
 class Carrier {
  public:
-  // What a carrier cannot show as the device does it.
+  // The behaviour of the device that a carrier cannot reproduce.
   struct Limits {
     size_t max_bytes_in_flight = 0;   // 0: the system's
-    bool errors_are_retried = false;  // a few protocol errors in a row may not be seen
+    bool errors_are_retried = false;  // a few protocol errors in a row may be hidden by retries
   };
 
   virtual ~Carrier() = default;
@@ -31,7 +31,7 @@ class Carrier {
   virtual UsbTransport& transport() = 0;
   virtual void AddFault(const emulator::Fault& fault) = 0;
   virtual void SetPlugged(bool plugged) = 0;
-  // Lets things happen until `done`; false: they did not within a generous limit.
+  // Runs everything until `done`; returns false if that did not happen within a generous limit.
   virtual bool RunUntil(const std::function<bool()>& done) = 0;
 };
 
@@ -82,7 +82,7 @@ class TransportConformance : public testing::TestWithParam<CarrierCase> {
     transfer.length = voxlink::kEventSize;
     return Must(usb().Submit(std::move(transfer)));
   }
-  // The completion of one transfer; others' are kept in order.
+  // Returns the completion of one transfer; those of others are kept in order.
   TransferCompletion Wait(TransferId id) {
     const TransferCompletion* found = nullptr;
     carrier_->RunUntil([&] {

@@ -1,5 +1,5 @@
-// The voxlink driver over any transport, in one thread, on a clock that a test moves; and what such
-// transports are made of.
+// The voxlink driver over any transport, in one thread, on a clock that a test moves; and the parts
+// of which such transports are made.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +20,7 @@ namespace voxeld::display {
 class MemoryRecording {
  public:
   std::unique_ptr<PacketRecorder> MakeRecorder();
-  // Once the recorder is gone.
+  // May be called once the recorder is destroyed.
   const std::vector<std::byte>& bytes() const { return *bytes_; }
 
  private:
@@ -35,15 +35,15 @@ struct EmulatedCable {
   explicit EmulatedCable(sync::Clock& clock);
   std::unique_ptr<InProcessTransport> transport;  // may be moved away
   InProcessTransport* pump;
-  emulator::VoxlinkDevice* device;  // within pump->WithDevice
+  emulator::VoxlinkDevice* device;  // use only within pump->WithDevice
 };
 
 class TransportRig {
  public:
-  // Does what is due and returns when it wants to be called again.
+  // Does what is due, and returns when it must be called again.
   using Pump = std::function<sync::TimeNs()>;
 
-  // `pumps` of all that moves between driver and device, the device's end first.
+  // `pumps` are those of everything that runs between driver and device, the device's end first.
   TransportRig(std::unique_ptr<UsbTransport> transport, sync::FakeClock& clock,
                std::vector<Pump> pumps);
   ~TransportRig() { display_.Stop(); }
@@ -53,7 +53,8 @@ class TransportRig {
 
   void Start();
   void Settle();
-  // Moves time to what is due next, step by step. False: it was not done within `limit`.
+  // Advances the time to what is due next, step by step. Returns false if it was not done within
+  // `limit`.
   bool RunUntil(const std::function<bool()>& done, sync::TimeNs limit = 10 * sync::kSecond);
   void RunFor(sync::TimeNs duration);
 

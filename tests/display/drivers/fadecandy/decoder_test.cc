@@ -20,7 +20,7 @@ class FadecandyDecoding : public testing::Test {
   bool Takes(const TransferBytes& bytes, size_t device) {
     return decoder_.OnBytes(kBulkOut, bytes, device).ok();
   }
-  // The first byte of each board's picture; nothing without a volume.
+  // Returns the first byte of each board's picture; empty without a volume.
   std::vector<int> Taken() {
     const std::optional<DecodedVolume> volume = decoder_.TakeVolume();
     std::vector<int> values;

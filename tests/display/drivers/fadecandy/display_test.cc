@@ -1,5 +1,5 @@
-// The Fadecandy driver with its boards at the other ends of in-process cables, in one thread, on a
-// fake clock.
+// Tests the Fadecandy driver with its boards at the other ends of in-process cables, in one thread,
+// on a fake clock.
 
 #include <memory>
 #include <optional>
@@ -59,7 +59,7 @@ TEST_F(Fadecandy, SendsOnlyToBoardsThatChange) {
   EXPECT_TRUE(rig_->Sees(*frame_));
   EXPECT_EQ(rig_->device(0).light().frames(), frames[0]);
   EXPECT_EQ(rig_->device(1).light().frames(), frames[1] + 1);
-  // Nothing at all.
+  // Nothing changes at all.
   next.volume = 3;
   rig_->display().Submit(std::make_shared<SliceFrame>(next));
   ASSERT_TRUE(rig_->RunUntilOutcome(3));
@@ -77,7 +77,7 @@ TEST_F(Fadecandy, NoBoardShowsAVolumeBeforeAllHaveMostOfIt) {
   EXPECT_TRUE(rig_->Sees(*before));
   ASSERT_TRUE(rig_->RunUntilOutcome(2));
   EXPECT_EQ(Newest().kind, Kind::kPresented);
-  // Two refreshes later all show it: the last packets went out together.
+  // Two refreshes later all boards show it: the last packets were sent together.
   rig_->RunFor(2 * kRefresh);
   EXPECT_TRUE(rig_->Sees(*frame_));
 }
@@ -218,7 +218,7 @@ TEST_F(Fadecandy, WhatIsAskedForDuringSetUpHolds) {
     Break(1, Fault::What::kNak, 200 * kMillisecond);
     rig_->SetPlugged(1, true);
     rig_->RunFor(100 * kMillisecond);
-    EXPECT_EQ(state(), DisplayState::kLost);  // being set up
+    EXPECT_EQ(state(), DisplayState::kLost);  // it is being set up
     ASSERT_TRUE(rig_->display().SetBlank(blank).ok());
     rig_->RunFor(2 * kSecond);
     EXPECT_EQ(rig_->transport(0).is_open(), true);
@@ -241,7 +241,7 @@ TEST_F(Fadecandy, WhatIsAskedForDuringSetUpHolds) {
   EXPECT_TRUE(rig_->IsDark(0) && rig_->IsDark(1));
 }
 
-// A board that stayed lights what it had: it stays dark until all have the volume again.
+// A board that stayed still has its picture: it stays dark until all have the volume again.
 TEST_F(Fadecandy, LightAfterALossInTheDarkIsWhole) {
   Start(2);
   Show();
@@ -272,7 +272,7 @@ TEST_F(Fadecandy, StopDarkens) {
     rig_->transport(b).Pump();
     EXPECT_TRUE(rig_->IsDark(b));
   }
-  // What was shown before does not come back.
+  // The picture that was shown before does not return.
   bool lit = false;
   rig_->SetObserver([&] { lit |= !rig_->IsDark(0) || !rig_->IsDark(1); });
   rig_->recorder().outcomes.clear();
@@ -296,7 +296,7 @@ TEST_F(Fadecandy, AFadeDoesNotLastAsLongAsThePauseBeforeIt) {
   EXPECT_EQ(Newest().bytes_sent, 2 * 3200u);
   rig_->RunFor(5 * kRefresh);
   EXPECT_TRUE(rig_->Sees(*frame_));
-  // Frame by frame: 25 ms from one to the other.
+  // Frame by frame, with 25 ms in between.
   rig_->RunFor(10 * kMillisecond);
   Submit();
   ASSERT_TRUE(rig_->RunUntilOutcome(3));

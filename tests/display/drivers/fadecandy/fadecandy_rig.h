@@ -1,4 +1,4 @@
-// A display of Fadecandy boards with the boards in one thread, on a clock that a test moves.
+// A display of Fadecandy boards, with the boards in the same thread, on a clock that a test moves.
 #pragma once
 
 #include <functional>
@@ -20,10 +20,11 @@ inline constexpr sync::TimeNs kRefresh = 2'500'000;
 
 class FadecandyRig {
  public:
-  // Light as straight as it can be: no gamma, no dither, no interpolation.
+  // Returns settings for linear light: no gamma, no dither, no interpolation.
   static FadecandyDisplay::Settings Straight();
 
-  // Boards with serials "A", "B", … in a display of 60 volumes/s; or, if it takes any, "Z", "Y", ….
+  // Boards with serials "A", "B", … in a display of 60 volumes/s; if it accepts any serial, "Z",
+  // "Y", ….
   explicit FadecandyRig(size_t boards = 1, FadecandyDisplay::Settings settings = Straight(),
                         bool any_serial = false);
   ~FadecandyRig();
@@ -39,7 +40,7 @@ class FadecandyRig {
 
   void Start();
   void SetPlugged(size_t board, bool plugged);
-  // As Rig's.
+  // The same as in Rig.
   void Settle();
   bool RunUntil(const std::function<bool()>& done, sync::TimeNs limit = 10 * sync::kSecond);
   void RunFor(sync::TimeNs duration);
@@ -47,7 +48,7 @@ class FadecandyRig {
   // Called whenever a board may have lit something.
   void SetObserver(std::function<void()> observer) { observer_ = std::move(observer); }
 
-  // Boards light the picture of `frame`, as straight light makes it.
+  // Returns whether the board lights the picture of `frame` as linear light.
   bool Sees(size_t board, const SliceFrame& frame) const;
   bool Sees(const SliceFrame& frame) const;
   bool IsDark(size_t board) const;
@@ -70,7 +71,7 @@ class FadecandyRig {
   sync::TimeNs next_pump_ = 0;
 };
 
-// A display from options, and its boards, with threads of their own.
+// Creates a display from options, and its boards, with threads of their own.
 absl::StatusOr<std::unique_ptr<Display>> CreateEmulated(const DisplayOptions& options,
                                                         sync::Clock& clock);
 

@@ -1,4 +1,4 @@
-// Boards that come and go, and transfers that fail.
+// Tests boards that are unplugged and plugged in, and transfers that fail.
 
 #include <memory>
 #include <optional>
@@ -10,7 +10,7 @@
 namespace voxeld::display::fadecandy {
 namespace {
 
-// ---- boards that come and go
+// ---- boards that are unplugged and plugged in
 
 TEST_F(Fadecandy, AMissingBoardIsNamed) {
   Make(3);
@@ -45,8 +45,8 @@ TEST_F(Fadecandy, OneOfThreeUnpluggedInMidFrame) {
   EXPECT_TRUE(rig_->Sees(0, *before));
   EXPECT_TRUE(rig_->Sees(1, *before));
   EXPECT_TRUE(rig_->IsDark(2));
-  // The board that comes back shows nothing but black and the newest volume; the others nothing but
-  // what they had and that.
+  // The board that returns shows only black and the newest volume; the others only what they had
+  // and that volume.
   bool stale = false;
   rig_->SetObserver([&] {
     stale |= !rig_->IsDark(2) && !rig_->Sees(2, *frame_);
@@ -87,7 +87,7 @@ TEST_F(Fadecandy, SurvivesReplugsInQuickSuccession) {
   }
 }
 
-// Whichever the bus hands out first: slices are in ascending order of serial.
+// Whichever the bus lists first, slices are in ascending order of serial.
 TEST_F(Fadecandy, BoardsWithoutAnOrderOfTheirOwnAreSorted) {
   rig_ = std::make_unique<FadecandyRig>(3, FadecandyRig::Straight(), true);
   source_ = std::make_unique<FrameSource>(rig_->display().info().layout, 1);
@@ -119,7 +119,7 @@ TEST_F(Fadecandy, AStallIsClearedAndTheFrameGoesAgain) {
   Show();
   EXPECT_EQ(Newest().bytes_sent, 2 * 1600u + 24 * 64);
   EXPECT_EQ(stats().slices_resent, 1u);
-  // The last packet of a board that has all others.
+  // The last packet of a board that has received all others.
   Break(0, Fault::What::kNak, 20 * kMillisecond);
   Submit();
   rig_->RunFor(5 * kMillisecond);

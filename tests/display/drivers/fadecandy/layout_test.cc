@@ -37,7 +37,7 @@ std::string Wrong(std::string_view json, int32_t boards = 1) {
   return lattice.ok() ? "accepted" : std::string(lattice.status().message());
 }
 
-// "x,y,z" of the lights of consecutive pixels, '-' where there is none.
+// Returns "x,y,z" of the lights of consecutive pixels, '-' for pixels without a light.
 std::string Points(const Lattice& lattice, size_t first, size_t count) {
   std::string text;
   for (size_t i = first; i < first + count; ++i) {
@@ -125,7 +125,7 @@ TEST(FadecandyLayout, OrderFlipRotateReverse) {
   EXPECT_EQ(with({{"order", "zyx"}}), "-1,-0.5,-0.5 -1,-0.5,0.5 -1,0.5,-0.5");
   EXPECT_EQ(with({{"flip", "x"}}), "1,-0.5,-0.5 0,-0.5,-0.5 -1,-0.5,-0.5");
   EXPECT_EQ(with({{"flip", "y;z"}}), "-1,0.5,0.5 0,0.5,0.5 1,0.5,0.5");
-  // Counter-clockwise seen from above: +x becomes +y.
+  // Counter-clockwise as seen from above: +x becomes +y.
   EXPECT_EQ(with({{"rotate", "90"}}), "0.5,-1,-0.5 0.5,0,-0.5 0.5,1,-0.5");
   EXPECT_EQ(with({{"rotate", "180"}}), "1,0.5,-0.5 0,0.5,-0.5 -1,0.5,-0.5");
   EXPECT_EQ(with({{"rotate", "270"}}), "-0.5,1,-0.5 -0.5,0,-0.5 -0.5,-1,-0.5");

@@ -7,7 +7,7 @@ namespace {
 
 constexpr size_t kGreen = kLutEntries, kBlue = 2 * kLutEntries;
 
-// Entry 64 is a quarter and a little: (1/4)^2.5 = 1/32, of 65535. Entry 128: (1/2)^2.5.
+// Entry 64 is a little more than a quarter: (1/4)^2.5 = 1/32, of 65535. Entry 128: (1/2)^2.5.
 TEST(FadecandyLut, Defaults) {
   const Lut lut = MakeLut({}, 1);
   for (const size_t channel : {size_t{0}, kGreen, kBlue}) {
@@ -28,7 +28,7 @@ TEST(FadecandyLut, WhitePointScalesWhatComesIn) {
   for (size_t i = 0; i < kLutEntries; ++i) EXPECT_EQ(lut[kBlue + i], 0);
 }
 
-// Half of what comes in up to a quarter of the light, that is up to 32767.5 of 65535.
+// Half of the input up to a quarter of the light, that is up to 32767.5 of 65535.
 TEST(FadecandyLut, LinearBelowTheCutoff) {
   const Lut lut = MakeLut({.slope = 0.5, .cutoff = 0.25}, 1);
   EXPECT_EQ(lut[1], 128);

@@ -1,4 +1,4 @@
-// Random frames over cables with random faults: no board ever lights what nobody submitted, every
+// Random frames over cables with random faults: no board ever lights what was not submitted, every
 // volume has exactly one outcome, and when the faults are over the newest volume is lit.
 
 #include <map>
@@ -18,8 +18,8 @@ using emulator::Fault;
 using sync::kMillisecond;
 using sync::kSecond;
 
-// What bytes lost or changed on the wire would do, which USB does not let happen, is left out: the
-// protocol has nothing against it.
+// Bytes lost or changed on the wire are left out: USB prevents them, and the protocol does not
+// detect them.
 Fault RandomFault(std::mt19937& random) {
   const auto below = [&](uint64_t n) { return random() % n; };
   constexpr Fault::What kWhats[] = {
@@ -62,7 +62,7 @@ TEST(FadecandyTorture, NothingTornNothingStaleNothingForgotten) {
     for (size_t i = 0; i < 2 + seed % 8; ++i) {
       rig.faults(random() % boards).Add(RandomFault(random));
     }
-    // Of each board, what it may light.
+    // The pictures that each board may light.
     std::vector<std::set<std::string>> pictures(boards);
     std::map<std::string, uint64_t> volumes;
     bool strange = false;

@@ -1,4 +1,4 @@
-// From a voxel to the LED that hangs there, through everything that lies between.
+// Tests the way from a voxel to its LED, through everything in between.
 
 #include <memory>
 #include <string>
@@ -21,8 +21,8 @@ struct Led {
 
 class FadecandyWiring : public Fadecandy {
  protected:
-  // Lights the voxels of a cube one by one, as its geometry says, and looks for each at the LED that
-  // `led_of` says, and for darkness everywhere else.
+  // Lights the voxels of a cube one by one, according to its geometry, and checks that the LED
+  // returned by `led_of` is lit, and no other.
   template <typename LedOf>
   void Check(CubeWiring wiring, size_t boards, LedOf led_of) {
     Start(boards);
@@ -104,7 +104,7 @@ TEST_F(FadecandyWiring, ColumnsFromTheTop) {
         });
 }
 
-// Turned by 90 degrees, what ran along x runs along y, from the far end of x on.
+// Turned by 90 degrees, the x direction becomes the y direction, starting at the far end of x.
 TEST_F(FadecandyWiring, Turned) {
   Check({.size = {4, 2, 1}, .quarter_turns = 1}, 1, [](int32_t x, int32_t y, int32_t) {
     return Led{0, 0, static_cast<size_t>(4 * (1 - x) + y)};

@@ -70,7 +70,7 @@ bool FirmwareDevice::Unlink(uint64_t id) {
 
 void FirmwareDevice::Tick() {
   if (!plugged_ || !core_.running) return;
-  // The firmware is called at each of these times; here, all of them that passed, in their order.
+  // The firmware is called at each of these times; here, at all that have passed, in order.
   while (next_sweep_ <= Now()) {
     voxlink_tick(&core_, next_sweep_);
     voxlink_sweep(&core_, next_sweep_);

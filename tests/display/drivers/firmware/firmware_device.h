@@ -1,5 +1,5 @@
-// The C99 device of display/drivers/voxlink/firmware at the end of an in-process cable: what a microcontroller's USB stack, its
-// clock and its motor do around it.
+// The C99 device of display/drivers/voxlink/firmware at the end of an in-process cable, surrounded
+// by what a microcontroller's USB stack, clock and motor do.
 #pragma once
 
 #include <cstdint>
@@ -34,9 +34,9 @@ class FirmwareDevice final : public UsbDeviceModel {
   uint32_t plugs() const override { return plugs_; }
 
   const voxlink_device& core() const { return core_; }
-  // What is lit: the bytes of all pictures, none while it is dark.
+  // Returns the lit light: the bytes of all pictures; empty while it is dark.
   std::span<const std::byte> Light() const;
-  // ERROR events that went out.
+  // Returns the number of ERROR events that were sent.
   int errors() const { return errors_; }
 
  private:
@@ -47,7 +47,7 @@ class FirmwareDevice final : public UsbDeviceModel {
   uint64_t Now() const { return static_cast<uint64_t>(clock_.Now()); }
   uint64_t Period() const { return 1'000'000'000'000 / core_.rate_mhz; }
   void Control(const Urb& urb);
-  bool Standard(const Urb& urb);  // chapter 9 of USB, as a stack does it
+  bool Standard(const Urb& urb);  // handles chapter 9 of USB, as a stack does
   void Answer(const Urb& urb, std::span<const std::byte> bytes);
   void DeliverEvents();
   void Cancel(TransferStatus status);

@@ -1,5 +1,5 @@
-// The C99 device: the protocol page's own bytes, the suite that holds devices to the protocol, and the real driver over a sound
-// and over a bad cable.
+// Tests the C99 device: the bytes on the protocol's page, the suite that checks devices against the
+// protocol, and the real driver over a good and over a bad cable.
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -119,7 +119,8 @@ TEST(Firmware, AnswersThePagesExampleWithThePagesBytes) {
   EXPECT_EQ(std::vector<uint8_t>(light, light + 12), FromHex("FF0000 00FF00 0000FF FFFFFF"));
 }
 
-// The stack around the device does as the emulator: an event that a read has no room for is more than was asked for.
+// The stack around the device behaves like the emulator: if a read has no room for an event, it
+// overflows.
 TEST(Firmware, AnEventThatItsReadHasNoRoomForOverflows) {
   sync::FakeClock clock;
   const auto device = Make(Emulated({{"size", "1x1x1"}}).config, clock);
@@ -156,9 +157,9 @@ TEST(Firmware, AnEventThatItsReadHasNoRoomForOverflows) {
   }
 }
 
-// ---- a host that means harm
+// ---- a malicious host
 
-// A packet whose CRCs are right, whatever it says.
+// Returns a packet whose CRCs are right, whatever its content.
 std::vector<uint8_t> Packet(voxlink::PacketHeader header, std::span<const std::byte> payload) {
   header.magic = voxlink::kMagic;
   header.length = static_cast<uint32_t>(payload.size());
@@ -173,7 +174,8 @@ std::vector<uint8_t> Packet(voxlink::PacketHeader header, std::span<const std::b
 }
 
 TEST(Firmware, NothingThatAHostSendsLeavesItsMemory) {
-  // Of the page's example, two rows high and with 64 sub-frames: 128 pictures of 12 bytes at the most.
+  // The capabilities of the page's example, with two rows and 64 sub-frames: at most 128 pictures
+  // of 12 bytes.
   std::vector<uint8_t> capabilities = FromHex(
       "70 00 00 00 00 01 1F 40 1F 00 00 00 00 00 01 00 00 04 00 00 02 00 00 00 02 00 00 00 02 00 "
       "00 00 03 00 00 00 30 75 00 00 30 75 00 00 30 75 00 00 00 00 00 00 64 00 FA 00 00 00 00 00 "
@@ -221,7 +223,7 @@ TEST(Firmware, NothingThatAHostSendsLeavesItsMemory) {
     }
     std::vector<std::byte> payload;
     voxlink::PacketHeader header{};
-    // Mostly what leads to a volume, so that volumes come about.
+    // Mostly packets that lead to a volume, so that volumes are completed.
     static constexpr uint8_t kRare[] = {0, 1, 3, 4, 5, 6, 7, 8};
     header.type = below(12) != 0 ? 2 : kRare[below(8)];
     if (device->filling == 0 && below(4) != 0) header.type = 1;
@@ -238,7 +240,7 @@ TEST(Firmware, NothingThatAHostSendsLeavesItsMemory) {
       std::memcpy(payload.data() + 8, &pictures, 4);
     } else if (header.type == 2) {
       header.volume = device->filling;
-      uint32_t next = 0;  // the first picture that is not whole
+      uint32_t next = 0;  // the first picture that is not complete
       while (next + 1 < device->pictures &&
              (memory.filled[next] == ~0u || memory.filled[next] == device->picture_bytes)) {
         ++next;
@@ -266,7 +268,7 @@ TEST(Firmware, NothingThatAHostSendsLeavesItsMemory) {
       ++events;
     }
   }
-  // It did get somewhere.
+  // It did get that far.
   EXPECT_GT(events, 50'000u);
   EXPECT_GT(lit, 1000u);
   const auto whole = [](const auto& guard) {
@@ -277,7 +279,7 @@ TEST(Firmware, NothingThatAHostSendsLeavesItsMemory) {
               whole(memory.last));
 }
 
-// ---- held to the protocol
+// ---- checked against the protocol
 
 struct Held {
   std::string name;
@@ -321,7 +323,7 @@ INSTANTIATE_TEST_SUITE_P(
         Held{"OnePixel", {{"size", "1x1x1"}, {"speed", "full"}}, 10},
         Held{"FastSweeps", {{"size", "8x8x8"}, {"rate", "400"}}, 3},
         Held{"NoWatchdog", {{"size", "8x8x8"}, {"watchdog", "false"}}, 3},
-        // A list of what is missing that has to be made shorter, and capabilities of several pages.
+        // A list of missing pictures that has to be shortened, and capabilities of several pages.
         Held{"ManySlices",
              {{"size", "2x2x1500"}, {"max_payload", "16384"}, {"receive_buffer", "131072"}},
              2}),
@@ -409,7 +411,7 @@ TEST_F(FirmwareRig, GoesDarkWithTheHostAndObeysBlankAndBrightness) {
   const SliceFramePtr frame = source_->Next(1);
   display_->Submit(frame);
   ASSERT_TRUE(RunUntil([&] { return Shows(*frame); }));
-  // Nobody ticks the driver: the device is alone.
+  // Nothing ticks the driver: the device is alone.
   const sync::TimeNs begin = clock_.Now();
   while (!device_->Light().empty() && clock_.Now() < begin + kSecond) {
     clock_.Advance(kMillisecond);

@@ -1,4 +1,4 @@
-// What is read of a stream's packets, for captures, and what is none of it.
+// Tests which packets of a stream are read, for captures, and which are ignored.
 #include "display/drivers/network/decoder.h"
 
 #include <algorithm>
@@ -49,7 +49,7 @@ TEST_P(Decoders, GiveBackWhatWasSentInTheLightsOrder) {
   EXPECT_THAT(volume->Rgb(), ElementsAre(11, 12, 10, 14, 15, 13, 21, 22, 20, 24, 25, 23));
   EXPECT_EQ(volume->source, DecodedVolume::Source::kDecodedFromSent);
   EXPECT_FALSE(decoder.TakeVolume().has_value()) << "it has been taken";
-  // What says when, or that it ends, changes nothing.
+  // Packets for synchronisation or for the end change nothing.
   if (const Bytes sync = writer.Sync(); !sync.empty()) {
     EXPECT_TRUE(decoder.OnBytes(0, sync, 0).ok());
   }
@@ -57,11 +57,11 @@ TEST_P(Decoders, GiveBackWhatWasSentInTheLightsOrder) {
     EXPECT_TRUE(decoder.OnBytes(0, end, 0).ok());
   }
   EXPECT_FALSE(decoder.TakeVolume().has_value());
-  // One slice anew: the other is as it was.
+  // One slice is sent again: the other is unchanged.
   ASSERT_TRUE(decoder.OnBytes(0, writer.Pixels(1, Light(30), true), 0).ok());
   EXPECT_THAT(decoder.TakeVolume()->Rgb(),
               ElementsAre(11, 12, 10, 14, 15, 13, 31, 32, 30, 34, 35, 33));
-  // From what is none of it on it gives nothing.
+  // From the first foreign packet on, it returns nothing.
   ASSERT_TRUE(decoder.OnBytes(0, writer.Pixels(1, Light(40), true), 0).ok());
   const absl::Status wrong = decoder.OnBytes(0, Bytes(3), 0);
   EXPECT_TRUE(absl::IsDataLoss(wrong));
@@ -75,7 +75,7 @@ INSTANTIATE_TEST_SUITE_P(Protocols, Decoders,
                          testing::Values(Protocol::kDdp, Protocol::kE131, Protocol::kArtNet,
                                          Protocol::kOpc));
 
-// One field of a good packet made another, each refused by itself.
+// Changes one field of a good packet at a time; each change is refused.
 TEST(Packets, OfDdpEachFieldCounts) {
   const StreamOptions stream = StreamOf(Protocol::kDdp);
   const Bytes good = PacketWriter(stream, 2).Pixels(1, Light(1), true);
@@ -91,7 +91,7 @@ TEST(Packets, OfDdpEachFieldCounts) {
     EXPECT_FALSE(Read(stream, 2, 2, bad).has_value()) << at;
   }
   Bytes between = good;
-  between[7] = std::byte{3};  // a pixel further on
+  between[7] = std::byte{3};  // a pixel later
   EXPECT_FALSE(Read(stream, 2, 2, between).has_value());
 }
 
@@ -123,7 +123,7 @@ TEST(Packets, OfE131EachFieldCounts) {
   Put16(longer, 38, 0x7000 | (longer.size() - 38));
   EXPECT_FALSE(Read(stream, 2, 2, longer).has_value());
   Bytes discovery = sync;
-  discovery[43] = std::byte{2};  // of the extended layer another kind
+  discovery[43] = std::byte{2};  // the extended layer is of another kind
   EXPECT_FALSE(Read(stream, 2, 2, discovery).has_value());
   EXPECT_EQ(Read(stream, 2, 2, writer.End(0, Light(1)))->kind, ReadPacket::Kind::kEnd);
 }

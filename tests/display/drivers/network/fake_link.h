@@ -1,4 +1,4 @@
-// A link that keeps what it is given.
+// A link that records what is sent.
 #pragma once
 
 #include <cstddef>
@@ -13,12 +13,12 @@
 
 namespace voxeld::display::network {
 
-// What a test sees of it, and does to it. Outlives the link.
+// The state of the link that a test reads and sets. Outlives the link.
 struct FakeWire {
   std::vector<std::vector<std::byte>> packets;
-  size_t room = SIZE_MAX;  // bytes that it still takes
-  absl::Status broken;     // from now on
-  absl::Status refuses;    // to open
+  size_t room = SIZE_MAX;  // bytes that it still accepts
+  absl::Status broken;     // the error of every call from now on
+  absl::Status refuses;    // the error on opening
   int opened = 0, closed = 0;
   std::function<void()> wake;
 };

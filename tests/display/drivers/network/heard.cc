@@ -13,7 +13,7 @@
 namespace voxeld::display::network {
 namespace {
 
-// A link, and the socket at its other end. What is not read the kernel drops.
+// A link, and the socket at its other end. The kernel drops packets that are not read.
 class HeardLink final : public Link {
  public:
   HeardLink() : fd_(socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {

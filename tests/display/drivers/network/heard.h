@@ -1,4 +1,4 @@
-// A display whose packets somebody on this machine listens to.
+// A display whose packets are received by a socket on this machine.
 #pragma once
 
 #include <memory>
@@ -10,8 +10,8 @@
 
 namespace voxeld::display::network {
 
-// From options, whatever their port: to a socket of this machine's on one that was free, which takes what comes for as long as the
-// display lives.
+// Creates a display from options, whatever their port: it sends to a socket of this machine on a
+// port that was free, which receives everything as long as the display lives.
 absl::StatusOr<std::unique_ptr<Display>> CreateHeard(const DisplayOptions& options,
                                                      sync::Clock& clock);
 

@@ -19,7 +19,7 @@ namespace {
 
 constexpr sync::TimeNs kLimit = 20 * sync::kSecond;
 
-// A socket of this machine's on a port that was free.
+// A socket of this machine on a port that was free.
 class Peer {
  public:
   explicit Peer(int type) : fd_(socket(AF_INET, type | SOCK_CLOEXEC, 0)) {
@@ -51,7 +51,7 @@ bool Readable(int fd) {
   return poll(&waits, 1, static_cast<int>(kLimit / sync::kMillisecond)) == 1;
 }
 
-// Asked again whenever the link wakes, or a little later.
+// Asks again whenever the link wakes, or a little later.
 bool Await(Link& link, const std::function<bool(const absl::StatusOr<Link::State>&)>& done) {
   sync::SystemClock clock;
   sync::Mutex mutex;
@@ -122,7 +122,7 @@ TEST(TcpLink, SendsWhatFitsAndWakesForTheRest) {
   ASSERT_TRUE(Await(*link, IsOpen));
   const int accepted = accept(peer.fd(), nullptr, nullptr);
   ASSERT_GE(accepted, 0);
-  // Until nothing goes any more.
+  // Until the link accepts nothing more.
   const std::vector<std::byte> bytes(1 << 20, std::byte{3});
   size_t sent = 0;
   while (true) {

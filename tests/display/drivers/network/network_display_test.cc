@@ -91,7 +91,7 @@ TEST_F(Network, SlicesArePackets) {
   EXPECT_EQ(endpoint_, "10.0.0.9:99");
   Make({{"cube", "20x20x20"}, {"protocol", "opc"}});
   EXPECT_EQ(display_->info().layout, (FrameLayout{.slices = 1, .width = 8000, .height = 1}));
-  // Strips that each begin at a universe of their own.
+  // Strips that each begin at their own universe.
   Make({{"cube", "10x10x10"}, {"protocol", "e131"}, {"strip", "170"}, {"per_strip", "100"}});
   EXPECT_EQ(display_->info().layout.slices, 10);
 }
@@ -111,7 +111,7 @@ TEST_F(Network, WhatIsSentIsTheVolume) {
   }
 }
 
-// After each attach the picture comes twice, with numbers half their range apart.
+// After each attach the picture is sent twice, with sequence numbers half their range apart.
 TEST_F(Network, AReceiverThatRemembersE131sNumbersTakesTheFirstPicture) {
   Make({{"cube", "20x20x20"}, {"protocol", "e131"}});
   ASSERT_TRUE(display_->Start(&recorder_, [] {}).ok());
@@ -158,14 +158,15 @@ TEST_F(Network, VolumesKeepTheirPace) {
   EXPECT_EQ(sweeps[1] - sweeps[0], 20 * sync::kMillisecond);
 }
 
-// A controller that missed a packet has it again within a second; DMX controllers want to hear something.
+// A controller that missed a packet gets it again within a second; DMX controllers expect regular
+// packets.
 TEST_F(Network, SilenceIsFilledWithThePicture) {
   Make({{"cube", "20x20x20"}, {"protocol", "e131"}, {"sync_universe", "99"}});
   Start();
   Show(1);
   wire_.packets.clear();
   RunFor(3 * sync::kSecond);
-  EXPECT_EQ(wire_.packets.size(), 3u * 49);  // 48 universes and what shows them
+  EXPECT_EQ(wire_.packets.size(), 3u * 49);  // 48 universes and the packet that shows them
   EXPECT_EQ(display_->stats().slices_sent, 48u);
 }
 
@@ -240,7 +241,7 @@ TEST_F(Network, WhatIsOnItsWayWhenTheControllerGoesIsLostAndComesAgain) {
   wire_.room = 3 * 1450;
   display_->Submit(source_->Next(1));
   RunFor(10 * sync::kMillisecond);
-  EXPECT_EQ(recorder_.Of(2), nullptr);  // held up, not given up
+  EXPECT_EQ(recorder_.Of(2), nullptr);  // delayed, not given up
   wire_.broken = absl::UnavailableError("10.0.0.1:4048: send: Network is unreachable");
   ASSERT_TRUE(RunUntil([&] { return recorder_.Of(2) != nullptr; }));
   EXPECT_EQ(recorder_.Of(2)->kind, Kind::kLost);
@@ -251,7 +252,8 @@ TEST_F(Network, WhatIsOnItsWayWhenTheControllerGoesIsLostAndComesAgain) {
   wire_.room = SIZE_MAX;
   wire_.packets.clear();
   ASSERT_TRUE(RunUntil([&] { return display_->state() == DisplayState::kShowing; }));
-  // Whole, twice: what was there, as a proof, and the newest volume; nobody knows what the controller holds.
+  // Whole, and twice: the previous volume, as a proof, and the newest; what the controller holds is
+  // unknown.
   EXPECT_EQ(wire_.packets.size(), 2u * 17);
   Show(0.1);
 }

@@ -27,7 +27,8 @@ StreamOptions Stream(Protocol protocol, int32_t first = 1, int32_t sync = 0) {
   return stream;
 }
 
-// The header as the specification has it: version 1 and push, sequence, RGB of 8 bits, the default output, offset, length.
+// The header according to the specification: version 1 and push, sequence, RGB of 8 bits, the
+// default output, offset, length.
 TEST(Ddp, IsAsItsSpecificationHasIt) {
   PacketWriter writer(Stream(Protocol::kDdp), 2);
   const std::vector<uint8_t> rgb = {1, 2, 3, 4, 5, 6};
@@ -35,7 +36,7 @@ TEST(Ddp, IsAsItsSpecificationHasIt) {
               ElementsAre(0x40, 1, 0x0B, 1, 0, 0, 0, 0, 0, 6, 1, 2, 3, 4, 5, 6));
   EXPECT_THAT(Ints(writer.Pixels(100, rgb, true)),
               ElementsAre(0x41, 2, 0x0B, 1, 0, 0, 0x02, 0x58, 0, 6, 1, 2, 3, 4, 5, 6));
-  // 1 to 15; 0 would say that packets are not counted.
+  // 1 to 15; 0 would mean that packets are not counted.
   for (int i = 3; i <= 40; ++i) {
     EXPECT_EQ(Ints(writer.Pixels(0, rgb, true))[1], (i - 1) % 15 + 1);
   }
@@ -73,8 +74,8 @@ TEST(E131, IsAsItsStandardHasIt) {
               ElementsAre(0x70, 11, 0, 0, 0, 1, 0, 0, 7, 0, 0));
 }
 
-// 6.7.2: a receiver passes over what is up to 20 behind the last number. Whatever that is, one of a packet before a leap and one
-// after it is taken.
+// 6.7.2: a receiver ignores numbers up to 20 behind the last one. Whatever that is, either a packet
+// before a leap or the one after it is accepted.
 TEST(E131, OneOfTwoIsTakenWhateverTheReceiverRemembers) {
   PacketWriter writer(Stream(Protocol::kE131, 1), 1);
   const std::vector<uint8_t> rgb = {1, 2, 3};
@@ -135,14 +136,15 @@ TEST_P(EveryProtocol, ReadsWhatItWrites) {
   }
 }
 
-// Cut short, made longer, or with any byte changed: never read beyond the end, never a slice that there is not.
+// Truncated, extended, or with any byte changed: it is never read beyond the end, and never gives a
+// slice that does not exist.
 TEST_P(EveryProtocol, WhatIsBrokenIsRefusedOrOfAnotherContent) {
   std::mt19937 random(2);
   const StreamOptions stream = Stream(GetParam(), 1, 1);
   PacketWriter writer(stream, 3);
   const std::vector<std::byte> packet = writer.Pixels(1, std::vector<uint8_t>(9, 200), true);
   for (size_t size = 0; size < packet.size(); ++size) {
-    // In a block of its own, so that reading on would be seen.
+    // In a separate memory block, so that a read past the last byte is detected.
     const std::vector<std::byte> cut(packet.begin(), packet.begin() + static_cast<ptrdiff_t>(size));
     EXPECT_FALSE(Read(stream, 4, 3, cut).has_value()) << size;
   }

@@ -1,4 +1,4 @@
-// A device model with a defect: what goes in and out of a sound one is changed on its way.
+// A device model with a defect: the input and output of a correct one are changed on their way.
 #pragma once
 
 #include <functional>
@@ -16,15 +16,15 @@ namespace voxeld::display::conformance {
 using Bytes = std::vector<std::byte>;
 
 struct Defect {
-  // Of a control transfer: how it ends, and what is read.
+  // For a control transfer: changes its status and the data that is read.
   std::function<void(const UsbSetup& setup, TransferStatus& status, Bytes& data)> answer;
-  // True: the request is answered, and never reaches the device.
+  // Returns true if the request is answered without reaching the device.
   std::function<bool(const UsbSetup& setup)> swallow;
-  // False: the event is never sent.
+  // Returns false if the event is never sent.
   std::function<bool(Bytes& event)> event;
-  // What the device gets instead of the bytes of a transfer.
+  // Changes the bytes of a transfer that the device gets.
   std::function<void(Bytes& bytes)> bulk;
-  // How a bulk transfer ends.
+  // Changes how a bulk transfer ends.
   std::function<void(size_t size, TransferStatus& status)> bulk_end;
   bool reset_does_nothing = false;
 };
@@ -107,7 +107,7 @@ class DefectiveDevice final : public UsbDeviceModel {
     complete_(id, status, actual, data);
   }
 
-  // Reads whose event was held back go on waiting.
+  // Reads whose event was held back continue to wait.
   void SubmitAgain() {
     while (!again_.empty()) {
       const std::vector<Urb> urbs = std::exchange(again_, {});

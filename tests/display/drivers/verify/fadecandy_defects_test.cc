@@ -1,4 +1,4 @@
-// The Fadecandy's suite tested: boards that have one defect each, and the cases that must find it.
+// Tests the Fadecandy suite: boards that have one defect each, and the cases that must find it.
 #include <string>
 
 #include "display/drivers/fadecandy/verify/suite.h"
@@ -89,7 +89,7 @@ std::vector<Planted> FadecandyDefects() {
        {}},
       {"TablesWait",
        {"flow.tables"},
-       // Each table as a frame that waits for a refresh.
+       // Treats each table like a frame that waits for a refresh.
        {.bulk =
             [](Bytes& bytes) {
               for (size_t at = 0; at + 64 <= bytes.size(); at += 64) {

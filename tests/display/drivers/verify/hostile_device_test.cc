@@ -1,5 +1,5 @@
-// The suites over devices that answer anything at all, and over ones that go away: every run ends, in
-// bounded time, with verdicts.
+// Runs the suites on devices that answer with anything at all, and on ones that disappear: every
+// run ends, in bounded time, with verdicts.
 #include <memory>
 #include <random>
 
@@ -27,7 +27,7 @@ emulator::VoxlinkDeviceConfig SmallConfig() {
   return config;
 }
 
-// Some bytes of whatever is read are others, and its length is another.
+// Changes some bytes of the data that is read, and its length.
 Defect Garbage(uint32_t seed, uint32_t one_in) {
   const auto random = std::make_shared<std::minstd_rand>(seed);
   const auto spoil = [random, one_in](Bytes& data) {
@@ -82,7 +82,8 @@ TEST(HostileDevice, EveryRunOfFadecandyEnds) {
   }
 }
 
-// Unplugged for a while in the middle of the run: the case fails, the ones after it find the device.
+// Unplugged for a while in the middle of the run: the case fails, and the ones after it find the
+// device.
 TEST(HostileDevice, ComesBackAfterAnUnplug) {
   sync::FakeClock clock;
   auto faults = std::make_unique<emulator::FaultInjector>(

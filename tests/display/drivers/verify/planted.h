@@ -1,4 +1,4 @@
-// Defects to plant in a device, and the cases that must find them.
+// Defects for a device, and the cases that must find them.
 #pragma once
 
 #include <cstring>
@@ -23,7 +23,7 @@ using voxlink::Request;
 
 struct Planted {
   std::string name;
-  std::set<std::string> found_by;  // and maybe by others
+  std::set<std::string> found_by;  // and possibly by others
   Defect defect;
   std::function<void(VoxlinkDeviceConfig&)> config;
 };
@@ -48,7 +48,7 @@ inline bool Is(const Bytes& event, EventType type) {
 }
 constexpr size_t kBody = sizeof(EventHeader);
 
-// The answers to a request that is read, changed.
+// Changes the answers to a request that reads.
 inline Defect Reading(Request request, std::function<void(Bytes&)> change) {
   return {.answer = [=](const UsbSetup& setup, TransferStatus& status, Bytes& data) {
     if (Is(setup, request) && status != TransferStatus::kStall) change(data);
@@ -80,13 +80,13 @@ inline Defect Events(std::function<bool(Bytes&)> change) { return {.event = std:
 inline Defect Silent(EventType type) {
   return Events([=](Bytes& event) { return !Is(event, type); });
 }
-// Requests that are stalled are answered instead.
+// Requests that should be stalled are answered.
 inline Defect Accepting(std::function<bool(const UsbSetup&)> which) {
   return {.answer = [=](const UsbSetup& setup, TransferStatus& status, Bytes&) {
     if (status == TransferStatus::kStall && which(setup)) status = TransferStatus::kOk;
   }};
 }
-// Whole packets, changed and sealed again.
+// Changes whole packets, and computes their checksums again.
 inline Defect Packets(std::function<void(PacketHeader&, std::span<std::byte>)> change) {
   return {.bulk = [=](Bytes& bytes) {
     for (size_t at = 0; at + sizeof(PacketHeader) <= bytes.size();) {

@@ -1,4 +1,4 @@
-// A conformance run in one thread on a fake clock: waiting is pumping.
+// A conformance run in one thread on a fake clock: waiting means running the device.
 #pragma once
 
 #include <algorithm>
@@ -59,7 +59,7 @@ class Rig {
   Subject subject_;
 };
 
-// "volume.whole (5.4): expected …; seen …" of each that failed, for messages.
+// Returns "volume.whole (5.4): expected …; seen …" for each case that failed, for messages.
 inline std::string Failures(const RunResult& run) {
   std::string text;
   for (const CaseResult& result : run.results) {

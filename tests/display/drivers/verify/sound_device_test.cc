@@ -1,5 +1,5 @@
-// The suites over devices that do everything right: every case passes, whatever the seed, the speed,
-// the geometry and the formats, and leaves the device stopped and dark.
+// Runs the suites on devices that do everything right: every case passes, whatever the seed, the
+// speed, the geometry and the formats, and leaves the device stopped and dark.
 #include <string>
 
 #include "display/drivers/fadecandy/verify/suite.h"

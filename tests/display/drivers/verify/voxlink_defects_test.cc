@@ -1,4 +1,4 @@
-// voxlink's suite tested: devices that have one defect each, and the cases that must find it.
+// Tests voxlink's suite: devices that have one defect each, and the cases that must find it.
 #include <string>
 
 #include "display/drivers/voxlink/verify/suite.h"
@@ -279,7 +279,7 @@ std::vector<Planted> PacketDefects() {
        {"begin.wrong_base", "begin.no_base", "session.start_again"},
        Packets([](PacketHeader& h, std::span<std::byte> payload) {
          if (h.type != 1 || payload.size() <= 16) return;
-         const uint64_t none = 0;  // as if every picture followed, and none did
+         const uint64_t none = 0;  // as if every picture followed, but none does
          std::memcpy(payload.data(), &none, 8);
        }),
        {}},
@@ -391,7 +391,7 @@ std::vector<Planted> LightDefects() {
        {}},
       {"KeepalivesUnheard",
        {"watchdog.keepalive"},
-       // Taken off the stream: neither heard nor missed.
+       // Removed from the stream: neither processed nor reported missing.
        {.bulk =
             [](Bytes& bytes) {
               if (bytes.size() == 40 && At<uint8_t>(bytes, 4) == 7) bytes.assign(40, std::byte{0});

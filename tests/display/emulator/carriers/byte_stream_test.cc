@@ -31,7 +31,7 @@ TEST(ByteStream, WhatDoesNotFitWaitsAndArrivesInOrder) {
   EXPECT_EQ(stream.waiting(), 0u);
 }
 
-// A peer that is always a little behind: what has gone out does not pile up.
+// With a peer that is always a little behind, sent bytes do not pile up.
 TEST(ByteStream, KeepsWhatWaitsAndNoMore) {
   Peer peer;
   ByteStream stream(peer.TakeDeviceEnd());

@@ -49,7 +49,7 @@ TEST(ModelFacts, OfADeviceThatIsNotThereAreNone) {
   EXPECT_EQ(facts.vendor_id, 0);
 }
 
-// A device that answers to nothing for now is not waited for.
+// A device that answers nothing for now is not waited for.
 TEST(ModelFacts, OfADeviceThatKeepsSilentAreNone) {
   Bench bench;
   bench.injector().Add({.endpoint = 0, .what = Fault::What::kNak, .amount = sync::kSecond});

@@ -1,4 +1,4 @@
-// Bytes with a few things wrong.
+// Bytes with a few errors.
 #pragma once
 
 #include <algorithm>
@@ -8,8 +8,8 @@
 
 namespace voxeld::display::emulator {
 
-// 1 to 4 changes: a byte or four of them replaced, by what is often a border case, or a piece left out, doubled or
-// filled with noise.
+// Makes 1 to 4 changes: replaces a byte or four of them, often by border cases, or removes, doubles
+// or garbles a piece.
 inline std::vector<std::byte> Mutated(std::vector<std::byte> bytes, std::mt19937& random) {
   constexpr unsigned kBorders[] = {0x00, 0x01, 0x7F, 0x80, 0xFF};
   for (uint32_t left = 1 + random() % 4; left > 0 && !bytes.empty(); --left) {

@@ -1,4 +1,4 @@
-// The other end of a carrier's socket, in the hands of a test.
+// The peer of a carrier's socket, controlled by a test.
 #pragma once
 
 #include <cstddef>
@@ -10,25 +10,25 @@ namespace voxeld::display::emulator {
 
 using Bytes = std::vector<std::byte>;
 
-// "00 01 ff" and, for longer runs, "00*24": twenty-four zeros. Throws for anything else.
+// Parses "00 01 ff" and, for longer runs, "00*24": twenty-four zeros. Throws for anything else.
 Bytes Hex(std::string_view text);
 
 class Peer {
  public:
   // One end of a socketpair.
   Peer();
-  // A connection; takes it. There is no device end to take.
+  // Takes ownership of a connection. It has no device end.
   explicit Peer(int fd) : fd_(fd) {}
   ~Peer();
   Peer(const Peer&) = delete;
   Peer& operator=(const Peer&) = delete;
 
-  // The device's end; once.
+  // Returns the device's end; may be called once.
   int TakeDeviceEnd();
   int fd() const { return fd_; }
-  // What the socket takes of it; never waits.
+  // Returns how much of it the socket accepts; never blocks.
   size_t Send(std::span<const std::byte> bytes);
-  // All that has come.
+  // Returns everything that has arrived.
   Bytes Take();
   void Close();
 

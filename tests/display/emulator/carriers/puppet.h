@@ -1,5 +1,5 @@
-// A device model that does nothing by itself but tell its descriptors: what is submitted waits until the test
-// says how it ends.
+// A device model that by itself only answers with its descriptors: submitted transfers wait until
+// the test ends them.
 #pragma once
 
 #include <cstdint>
@@ -18,13 +18,14 @@ class Puppet final : public UsbDeviceModel {
     std::vector<std::byte> out;
   };
 
-  // By id. What a carrier asks for itself (GET_DESCRIPTOR) is answered, and not among them, while `answers_descriptors`.
+  // By id. While `answers_descriptors`, the carrier's own requests (GET_DESCRIPTOR) are answered
+  // and are not listed.
   std::map<uint64_t, Seen> pending;
   std::vector<uint64_t> unlinked;
   int resets = 0;
   bool answers_descriptors = true;
 
-  // The only one that is pending on the endpoint; 0: there is none, or more than one.
+  // Returns the only transfer that is pending on the endpoint; 0: none is pending, or several are.
   uint64_t Only(uint8_t endpoint) const;
   void End(uint64_t id, TransferStatus status, uint32_t actual = 0,
            std::span<const std::byte> in = {});

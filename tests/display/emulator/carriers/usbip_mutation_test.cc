@@ -1,5 +1,5 @@
-// A valid USB/IP session with a few of its bytes wrong, many thousand times: whatever comes, the session goes on or
-// ends with a status, and lets no more wait than is allowed.
+// A valid USB/IP session with a few wrong bytes, many thousand times: whatever arrives, the session
+// continues or ends with a status, and no more transfers wait than are allowed.
 #include <algorithm>
 #include <random>
 #include <string>
@@ -60,7 +60,7 @@ TEST(UsbipMutations, NoneHangsCrashesOrPilesUp) {
     }
     EXPECT_LE(session.stream().waiting(), kMostWaiting);
   }
-  // Some mutations break the protocol, and some mean only something else.
+  // Some mutations violate the protocol, and some only have another meaning.
   EXPECT_GT(ended, kMutations / 20);
   EXPECT_LT(ended, kMutations);
 }

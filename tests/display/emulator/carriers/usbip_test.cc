@@ -1,4 +1,5 @@
-// USB/IP as Linux, Documentation/usb/usbip_protocol.rst, lays it down: every byte here is written by hand.
+// Tests USB/IP as specified by Linux, Documentation/usb/usbip_protocol.rst: every byte here is
+// written by hand.
 #include "display/emulator/carriers/usbip.h"
 
 #include <sys/socket.h>
@@ -132,7 +133,7 @@ class Usbip : public testing::Test {
            endpoint + "  " + flags + "  " + length + "  00 00 00 00  ff ff ff ff  00 00 00 00  " +
            setup + " ";
   }
-  // USBIP_RET_SUBMIT of it.
+  // The USBIP_RET_SUBMIT for it.
   static Bytes Returned(const std::string& status, const std::string& actual,
                         const std::string& data = "") {
     return Hex("00 00 00 03  00 00 00 07  00*12  " + status + "  " + actual + "  00*20  " + data);
@@ -220,7 +221,7 @@ TEST_F(Usbip, UnlinkOfWhatIsDoneOrWasNever) {
   EXPECT_EQ(peer_.Take(), Hex("00 00 00 04  00 00 00 08  00*12  00 00 00 00  00*24"));
 }
 
-// As a cable that is pulled: the end of the connection says it.
+// Like a cable that is pulled: the end of the connection reports it.
 TEST_F(Usbip, AnUnplugEndsWhatIsPendingWithoutAWord) {
   ASSERT_TRUE(Receive(Submit("01", "02", "00 00 00 40")).ok());
   puppet_.SetPlugged(false);
@@ -263,7 +264,7 @@ TEST_F(Usbip, IsochronousTransfers) {
   EXPECT_TRUE(absl::IsUnimplemented(Receive(submit)));
 }
 
-// The bytes of the first are still with the device.
+// The device still has the bytes of the first.
 TEST_F(Usbip, ANumberTwice) {
   ASSERT_TRUE(Receive(Submit("00", "01", "00 00 00 01") + "aa").ok());
   const absl::Status status = Receive(Submit("00", "01", "00 00 00 01") + "bb");

@@ -90,7 +90,7 @@ UsbredirHost::UsbredirHost(Peer& peer)
   parser.control_packet_func = &Callbacks::Control;
   parser.bulk_packet_func = &Callbacks::Bulk;
   parser.interrupt_packet_func = &Callbacks::Interrupt;
-  // Those that QEMU has.
+  // The capabilities that QEMU has.
   uint32_t capabilities[USB_REDIR_CAPS_SIZE] = {};
   for (const int capability : {usb_redir_cap_connect_device_version, usb_redir_cap_filter,
                                usb_redir_cap_ep_info_max_packet_size, usb_redir_cap_64bits_ids,

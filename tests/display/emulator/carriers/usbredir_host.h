@@ -1,5 +1,5 @@
-// The host's side of usbredir, as QEMU speaks it: the parser of the usbredir project over a socket, with what it was
-// told written down.
+// The host's side of usbredir, as in QEMU: the parser of the usbredir project over a socket, with a
+// record of what it received.
 #pragma once
 
 #include <usbredirparser.h>
@@ -22,14 +22,15 @@ class UsbredirHost {
     Bytes data;
   };
 
-  // Greets at the next Write.
+  // Sends hello at the next Write.
   explicit UsbredirHost(Peer& peer);
   usbredirparser* parser() { return parser_.get(); }
-  // Sends what was given to the parser; takes in what has come. False: it was not usbredir.
+  // Sends what was given to the parser; reads what has arrived. Returns false if it was not
+  // usbredir.
   bool Write() { return usbredirparser_do_write(parser_.get()) == 0; }
   bool Read() { return usbredirparser_do_read(parser_.get()) == 0; }
 
-  // Requests, sent at once.
+  // These send requests at once.
   void Control(uint64_t id, uint8_t type, uint8_t request, uint16_t value, uint16_t length,
                Bytes data = {}, uint16_t index = 0);
   void BulkOut(uint64_t id, uint8_t endpoint, Bytes data);

@@ -1,5 +1,5 @@
-// A valid usbredir session with a few of its bytes wrong, many thousand times: whatever comes, the session goes on or
-// ends with a status, and lets no more wait than is allowed.
+// A valid usbredir session with a few wrong bytes, many thousand times: whatever arrives, the
+// session continues or ends with a status, and no more transfers wait than are allowed.
 #include <algorithm>
 #include <random>
 
@@ -16,12 +16,12 @@ namespace {
 
 constexpr int kMutations = 12'000;
 
-// What a host sends, as it goes over the wire.
+// Returns what a host sends, as bytes on the wire.
 Bytes ValidSession() {
   Bench bench;
   Peer peer;
   UsbredirHost host(peer);
-  // The device's answers decide the form of what follows: a session, with a tap on the wire.
+  // The device's answers determine the form of what follows, so a session is recorded on the wire.
   Peer tapped;
   UsbredirSession session(tapped.TakeDeviceEnd(), bench.model());
   ByteStream wire(peer.TakeDeviceEnd());

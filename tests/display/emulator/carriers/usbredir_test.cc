@@ -1,4 +1,4 @@
-// usbredir against the parser that QEMU uses, on the host's side.
+// Tests usbredir with the parser that QEMU uses, on the host's side.
 #include "display/emulator/carriers/usbredir.h"
 
 #include <memory>
@@ -124,7 +124,7 @@ TEST_F(Usbredir, Cancel) {
   Greet();
   host_.BulkOut(9, 0x01, Hex("01 02"));
   usbredirparser_send_cancel_data_packet(host_.parser(), 9);
-  usbredirparser_send_cancel_data_packet(host_.parser(), 10);  // never was
+  usbredirparser_send_cancel_data_packet(host_.parser(), 10);  // never existed
   host_.Write();
   ASSERT_TRUE(Receive().ok());
   EXPECT_TRUE(puppet_.pending.empty());
@@ -149,7 +149,7 @@ TEST_F(Usbredir, InterruptsAreReadOnAndOn) {
   EXPECT_EQ(host_.receiving.size(), 3u);
 }
 
-// An endpoint that stalls does so at once, as often as it is read.
+// An endpoint that stalls does so at once, each time that it is read.
 TEST_F(Usbredir, AStallIsToldOnceAndReadingGoesOnWhenItIsCleared) {
   Greet();
   host_.StartInterrupts(3, 0x82);
@@ -190,7 +190,7 @@ TEST_F(Usbredir, ErrorsAndCancelledReadsDoNotEndTheReading) {
   EndOnly(0x82, TransferStatus::kError);
   ASSERT_EQ(host_.interrupts.size(), 1u);
   EXPECT_EQ(host_.interrupts[0].status, usb_redir_ioerror);
-  EndOnly(0x82, TransferStatus::kCancelled);  // the device's doing: nobody asked for it
+  EndOnly(0x82, TransferStatus::kCancelled);  // by the device: it was not requested
   EXPECT_EQ(host_.interrupts.size(), 1u);
   EXPECT_NE(puppet_.Only(0x82), 0u);
 }

@@ -29,7 +29,7 @@ std::vector<std::byte> Composite() {
                 7,  5, 0x01, 2, 0, 2,    0});
 }
 
-// With nothing behind its end that could be read by mistake: ASan sees it.
+// No bytes follow that could be read by mistake: ASan detects a read past the last one.
 std::vector<UsbInterface> Find(const std::vector<std::byte>& bytes) {
   const std::unique_ptr<std::byte[]> exact(new std::byte[bytes.size()]);
   std::copy(bytes.begin(), bytes.end(), exact.get());
@@ -58,11 +58,11 @@ TEST(Descriptors, ChoosesByTriple) {
 TEST(Descriptors, EndWhereTheyMakeNoSense) {
   EXPECT_TRUE(Find({}).empty());
   EXPECT_TRUE(Find(Bytes({9})).empty());
-  EXPECT_TRUE(Find(Bytes({9, 4, 0})).empty());                    // cut
-  EXPECT_TRUE(Find(Bytes({0, 4, 0, 0, 0, 0, 0, 0, 0})).empty());  // for ever
+  EXPECT_TRUE(Find(Bytes({9, 4, 0})).empty());                    // truncated
+  EXPECT_TRUE(Find(Bytes({0, 4, 0, 0, 0, 0, 0, 0, 0})).empty());  // would never end
   EXPECT_TRUE(Find(Bytes({1, 4, 0, 0, 0, 0, 0, 0, 0})).empty());
   EXPECT_TRUE(Find(Bytes({8, 4, 0, 0, 0, 0, 0, 0})).empty());  // an interface too short
-  // What came before counts.
+  // Interfaces before the error count.
   std::vector<std::byte> bytes = Composite();
   bytes[18 + 9 + 9] = std::byte{0};  // the endpoint's length
   EXPECT_EQ(Find(bytes).size(), 1u);

@@ -36,7 +36,7 @@ TEST(Matching, ByEverythingThatIsGiven) {
   std::vector<UsbDeviceEntry> devices = {Device("A", "1-1"), Device("B", "1-2"),
                                          Device("B", "1-3", 2)};
   devices[0].interfaces.clear();
-  EXPECT_EQ(PathsOf({}, devices), "1-2 1-3 ");  // a device without interfaces is none
+  EXPECT_EQ(PathsOf({}, devices), "1-2 1-3 ");  // a device without interfaces is left out
   EXPECT_EQ(PathsOf({.serial = "B"}, devices), "1-2 1-3 ");
   EXPECT_EQ(PathsOf({.product_id = 2}, devices), "1-3 ");
   EXPECT_EQ(PathsOf({.path = "1-2"}, devices), "1-2 ");
@@ -56,7 +56,7 @@ TEST(Matching, OneOfSeveralAlikeBySerialThenPlace) {
   EXPECT_EQ(number(0), "1-2 ");
   EXPECT_EQ(number(1), "1-3 ");
   EXPECT_EQ(number(2), "1-1 ");
-  // Which is which is not known before all are there.
+  // They can only be distinguished once all have been found.
   EXPECT_EQ(
       PathsOf({.vendor_id = 0x1209, .member = {{.index = 0, .count = 4, .group = "g"}}}, devices),
       "of 4 USB devices 1209:*, 3 are attached");

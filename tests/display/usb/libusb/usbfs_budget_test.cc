@@ -14,7 +14,7 @@ TEST(UsbfsBudget, IsNeverExceededAndTellsOfRoomOnce) {
   EXPECT_TRUE(budget.Take(0));
   budget.Release(40);
   EXPECT_EQ(told, 1);
-  budget.Release(10);  // nobody was refused since
+  budget.Release(10);  // no request was refused since
   EXPECT_EQ(told, 1);
   EXPECT_FALSE(budget.Take(51));
   EXPECT_TRUE(budget.Take(50));
