@@ -1,4 +1,4 @@
-"""What docs/security/advisories.toml says was tried, tried: requests that advisories of gRPC are about, against the real voxeld. Its path is in VOXELD."""
+"""Tests what docs/security/advisories.toml says was tried: sends the requests of advisories about gRPC to the real voxeld. Its path is in VOXELD."""
 import os
 import re
 import socket
@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
 DATA, HEADERS, SETTINGS, GOAWAY = 0, 1, 4, 7
 END_STREAM, ACK, END_HEADERS = 1, 1, 4
-MOST_METADATA = 8192  # what the daemon's SETTINGS say
+MOST_METADATA = 8192  # the limit in the daemon's SETTINGS
 
 
 def frame(kind: int, flags: int, stream: int, payload: bytes = b"") -> bytes:
@@ -21,7 +21,7 @@ def frame(kind: int, flags: int, stream: int, payload: bytes = b"") -> bytes:
 
 
 def field(name: bytes, value: bytes) -> bytes:
-    """A header field as it is, in no table (RFC 7541, 6.2.2)."""
+    """Returns a literal header field that is not indexed (RFC 7541, 6.2.2)."""
     def length(size: int) -> bytes:
         if size < 127:
             return bytes([size])
@@ -34,21 +34,21 @@ def field(name: bytes, value: bytes) -> bytes:
 
 
 def call(stream: int, *, scheme: bytes = b"http", te: bytes = b"trailers", more: bytes = b"") -> bytes:
-    """Asks for the daemon's health, as anybody may."""
+    """Returns a call that asks for the daemon's health, which needs no authorisation."""
     headers = (field(b":method", b"POST") + field(b":scheme", scheme) + field(b":path", b"/grpc.health.v1.Health/Check")
                + field(b":authority", b"voxeld") + field(b"content-type", b"application/grpc") + field(b"te", te) + more)
     return frame(HEADERS, END_HEADERS, stream, headers) + frame(DATA, END_STREAM, stream, bytes(5))
 
 
 class Peer:
-    """A connection, and the frames that come over it."""
+    """A connection, and the frames that arrive on it."""
 
     def __init__(self, port: int) -> None:
         self.socket = socket.create_connection(("127.0.0.1", port), timeout=LONG)
         self.received = b""
 
     def read(self) -> tuple[int, int, int, bytes] | None:
-        """Kind, flags, stream, payload; None at the end."""
+        """Returns kind, flags, stream and payload; None at the end."""
         while True:
             if len(self.received) >= 9:
                 size = int.from_bytes(self.received[:3], "big")
@@ -65,7 +65,7 @@ class Peer:
             self.received += more
 
     def answer(self, stream: int) -> bytes:
-        """Header blocks of a stream until it ends, or all that came until the connection did."""
+        """Returns the header blocks of a stream until the stream ends, or all that arrived before the connection ended."""
         blocks = b""
         while (read := self.read()) is not None:
             kind, flags, where, payload = read
@@ -77,7 +77,7 @@ class Peer:
 
 
 class Headers(unittest.TestCase):
-    """CVE-2023-1428 and its like: headers at which gRPC's parser stumbles."""
+    """CVE-2023-1428 and similar ones: headers that gRPC's parser fails on."""
 
     def setUp(self) -> None:
         self.folder = tempfile.TemporaryDirectory()
@@ -96,10 +96,10 @@ class Headers(unittest.TestCase):
         return " ready " in self.log.read_text()
 
     def begin(self) -> Peer:
-        """One whose first call was answered, and that has taken the daemon's SETTINGS: from then on gRPC holds it to them."""
+        """Starts a connection whose first call was answered and that has received the daemon's SETTINGS, which gRPC enforces from then on."""
         peer = Peer(self.port)
         peer.socket.sendall(PREFACE + frame(SETTINGS, 0, 0))
-        # The listener's own SETTINGS come first, gRPC's with its first answer.
+        # The listener's own SETTINGS arrive first, gRPC's with its first answer.
         first = peer.read()
         assert first is not None and first[0] == SETTINGS
         peer.socket.sendall(call(1))
@@ -116,7 +116,7 @@ class Headers(unittest.TestCase):
                 peer = self.begin()
                 peer.socket.sendall(request)
                 answer = peer.answer(3)
-                # That it was refused for its size is how it is known to have come as far as the advisory's mistake.
+                # The refusal for its size shows that it reached the code with the advisory's error.
                 self.assertIn(b"metadata size exceeds limit", answer)
                 peer.socket.close()
                 self.assertIsNone(self.daemon.poll(), self.log.read_text())
@@ -128,7 +128,7 @@ class Headers(unittest.TestCase):
 
 class Sources(unittest.TestCase):
     def test_nobody_asks_for_sending_without_copies(self) -> None:
-        """CVE-2024-11407 is of GRPC_ARG_TCP_TX_ZEROCOPY_ENABLED and its name."""
+        """CVE-2024-11407 is about GRPC_ARG_TCP_TX_ZEROCOPY_ENABLED and its name."""
         seen = 0
         for folder in ("daemon", "client", "tools"):
             for path in (ROOT / folder).rglob("*"):

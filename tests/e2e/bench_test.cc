@@ -1,5 +1,5 @@
-// The real voxel-bench with the real voxeld: that each says what it promises and that the sums are
-// right, never how fast.
+// Tests the real voxel-bench with the real voxeld: that each benchmark reports what it promises and
+// that the sums are right, but never how fast.
 #include <gmock/gmock.h>
 
 #include <filesystem>
@@ -20,7 +20,7 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-// What it printed, which must be JSON alone, with a sound head and sound figures.
+// Runs it and returns its output, which must be only JSON, with a valid head and plausible numbers.
 nlohmann::json RunBench(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), ProgramBeside("voxel-bench"));
   arguments.emplace_back("--json");
@@ -86,7 +86,7 @@ TEST(Bench, IngestComparesEveryCaseWithTheSink) {
                   daemon["values"][i].get<double>() / sink["values"][i].get<double>(), 1e-9);
     }
   }
-  // Over TLS and recorded: beside a daemon without.
+  // Over TLS and recorded: compared with a daemon without these.
   for (const std::string name : {"batch_tls", "batch_unix_recorded"}) {
     const nlohmann::json& daemon = Figure(report, name + ".daemon");
     const nlohmann::json& without = Figure(report, name + ".without");

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Runs the bundle with an empty library path: everything but glibc must come from it. Packs it from the build, or takes it from the folder
-# VOXELD_DIST, where tools/package wrote it.
+# Runs the bundle with an empty library path: everything except glibc must come from it. Packs it from the build, or takes it from the
+# folder VOXELD_DIST, where tools/package wrote it.
 # usage: bundle_test.sh SOURCE BUILD
 set -euo pipefail
 source=$1

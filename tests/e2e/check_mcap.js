@@ -1,5 +1,6 @@
-// A recording as another implementation reads it: by its index, every CRC checked, messages decoded by the
-// schemas that the file itself has. Prints one JSON object. Its argument is the file; NODE_PATH has the packages.
+// Reads a recording with another implementation: by its index, with every CRC checked, and with
+// messages decoded by the schemas that the file itself has. Prints one JSON object. Its argument is
+// the file; NODE_PATH has the packages.
 "use strict";
 
 const fs = require("node:fs");
@@ -57,7 +58,7 @@ async function main(path) {
     }
   }
   result.shapes = shapes;
-  // From front to back as well, as a file that was cut off is read.
+  // Also reads it from front to back, as a truncated file is read.
   const stream = new McapStreamReader({ validateCrcs: true, decompressHandlers });
   stream.append(fs.readFileSync(path));
   let messages = 0;

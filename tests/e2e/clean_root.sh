@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# The package in a Debian that has nothing else, by docs/operations.md step by step, with Debian's Prometheus scraping. By hand,
-# as root: it downloads a Debian. systemd does not run in there, so the daemon is started as its unit does, less what shuts it in.
+# Installs the package in a Debian that has nothing else, following docs/operations.md step by step, with Debian's Prometheus scraping. Run
+# it manually, as root: it downloads a Debian. systemd does not run there, so the daemon is started like its unit does, but without the
+# unit's confinement.
 set -euo pipefail
 
 [ $# = 2 ] || { echo "usage: $0 PACKAGE.deb ROOT   (ROOT: an empty or missing folder, left there)" >&2; exit 2; }
@@ -9,7 +10,7 @@ source=$(realpath "$(dirname "$0")/../..")
 root=$2
 fail() { echo "clean_root: $*" >&2; exit 1; }
 step() { echo "== $*"; }
-# The n-th block of code under a heading of the manual.
+# Prints the n-th block of code under a heading of the manual.
 block() {
   awk -v heading="## $1" -v wanted="$2" '
     /^## / { within = $0 == heading }
@@ -21,7 +22,7 @@ step "a Debian with nothing else"
 mkdir -p "$root"
 root=$(realpath "$root")
 debootstrap --variant=minbase --include=ca-certificates bookworm "$root" >"$root.log" || fail "debootstrap: $(tail -5 "$root.log")"
-# Its process is the one that is started, as it is in a subshell: `in_root … &`.
+# The process of a subshell becomes the one that is started: `in_root … &`.
 start_in_root() { exec chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 "$@"; }
 in_root() { chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@"; }
 daemons=()

@@ -1,7 +1,7 @@
 // A client to be killed: e2e_client TARGET LAYER clear|linger|keep LINGER_NS
 //
-// Puts up one sphere, waits for its outcome, says "up", and goes on committing, each time from
-// within a frame that it has not ended, until somebody ends it.
+// Inserts one sphere, waits for its outcome, prints "up", and keeps committing, each time from
+// within a frame that it has not ended, until it is killed.
 #include <grpcpp/grpcpp.h>
 
 #include <cstdio>

@@ -1,4 +1,4 @@
-"""`voxelctl demo` over the real daemon. Paths are in VOXELD and VOXELCTL; DATA is where tools/setup puts data."""
+"""Tests `voxelctl demo` with the real daemon. Paths are in VOXELD and VOXELCTL; DATA is where tools/setup puts data."""
 import json
 import os
 import shutil
@@ -24,7 +24,7 @@ DISPLAYS = {
 
 
 class Daemon:
-    """A voxeld with one display, by its name in DISPLAYS, or with all of them."""
+    """A voxeld with one display, selected by its name in DISPLAYS, or with all of them."""
 
     def __init__(self, test: unittest.TestCase, *displays: str) -> None:
         folder = tempfile.TemporaryDirectory()
@@ -51,7 +51,7 @@ class Daemon:
 
 class Demo(unittest.TestCase):
     def begins(self, playing: "subprocess.Popen[str]") -> dict:
-        """The next line that says that a scene is up; none may have been passed over."""
+        """Reads the next line that reports a scene; none may have been skipped."""
         assert playing.stdout is not None
         while True:
             line = playing.stdout.readline()
@@ -72,7 +72,7 @@ class Demo(unittest.TestCase):
         self.addCleanup(playing.kill)
         for name in NAMES:
             self.assertEqual(self.begins(playing)["scene"], name)
-            time.sleep(0.4)  # what it shows is looked at while it moves
+            time.sleep(0.4)  # it is captured while it moves
             shown[name] = [int(display["lit_voxels"]) for display in daemon.json("stats")["displays"]]
         words, errors = playing.communicate(timeout=LONG)
         self.assertEqual(playing.returncode, 0, errors)
@@ -102,7 +102,7 @@ class Demo(unittest.TestCase):
         daemon = Daemon(self, "stack")
         playing = daemon.demo("life", "--seconds", "0.2")
         self.assertEqual(self.begins(playing)["scene"], "life")
-        time.sleep(1)  # it stays: longer than its time in a row of scenes
+        time.sleep(1)  # it stays: longer than its time in a sequence of scenes
         self.assertEqual(len(daemon.json("entities")["layers"]), 1)
         playing.send_signal(signal.SIGINT)
         words, errors = playing.communicate(timeout=LONG)
@@ -130,7 +130,7 @@ class Demo(unittest.TestCase):
     def test_a_file_that_is_missing_or_wrong_is_told_and_the_others_play(self) -> None:
         daemon = Daemon(self, "lattice")
         with tempfile.TemporaryDirectory() as folder:
-            # Beside this copy there is no build/data.
+            # This copy has no build/data beside it.
             program = str(Path(folder) / "bin" / "x" / "voxelctl")
             Path(program).parent.mkdir(parents=True)
             shutil.copy(VOXELCTL, program)
@@ -157,7 +157,7 @@ class Demo(unittest.TestCase):
             self.assertEqual(alone.returncode, 1)
             self.assertIn("none of these scenes can be played", errors)
 
-            # There, but something else.
+            # It exists, but has other contents.
             (Path(folder) / "countries-50m.json").write_text("no map", encoding="utf-8")
             playing = daemon.demo("--once", "--seconds", "0.2", "--data", folder, "globe", "clock", program=program)
             words, errors = playing.communicate(timeout=LONG)

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The real programs, end to end: shapes and expressions as they are typed, seen in what the display shows.
+# Tests the real programs end to end: shapes and expressions as typed by a user, checked in what the display shows.
 # usage: draw_test.sh VOXELD VOXELCTL
 set -euo pipefail
 voxeld=$1
@@ -16,29 +16,29 @@ daemon=$!
 for _ in $(seq 600); do
   "$voxelctl" displays >/dev/null 2>&1 && break
   kill -0 "$daemon"
-  sleep 0.1 # the daemon has no other way to say that it listens
+  sleep 0.1 # polled: the daemon does not signal when it listens
 done
 
-# field FILE EXPRESSION: prints what Python makes of the JSON document `d`.
+# field FILE EXPRESSION: prints the value of a Python expression on the JSON document `d`.
 field() { python3 -c 'import json, sys; d = json.load(open(sys.argv[1])); print(eval(sys.argv[2]))' "$1" "$2"; }
 fail() { echo "$1" >&2; exit 1; }
 
-# Draws its arguments; what the display shows then has between LEAST and MOST lit pixels.
+# Draws its arguments, and checks that the display then shows between LEAST and MOST lit pixels.
 draws() {
   local least=$1 most=$2
   shift 2
   "$voxelctl" --json draw "$@" >"$work/draw.json"
-  # At once: a picture is of all that is up when it is asked for.
+  # Immediately: a picture includes everything that is in the scene when it is requested.
   "$voxelctl" --json snapshot "$work/picture.png" --size 300x250 >"$work/picture.json"
   lit=$(field "$work/picture.json" 'd["lit_pixels"]')
   [ "$lit" -ge "$least" ] && [ "$lit" -le "$most" ] || fail "$*: $lit lit pixels, not $least to $most"
 }
 
-# Of a paraboloid over the unit disc, 5.33 units of area, 32² voxels each; where it is steep it takes fewer.
+# For a paraboloid over the unit disc, 5.33 units of area, 32² voxels each; where it is steep it takes fewer.
 draws 3200 5400 "x^2+y^2-z = 0 where x^2+y^2 <= 1"
 draws 16000 17500 "sphere radius=0.5 fill=solid"
 draws 4096 4096 "points vertices=0,0,0 splat=cell scale=0.5"
-# What is drawn otherwise than asked is drawn, and told.
+# A shape that cannot be drawn exactly as requested is drawn, with a message.
 draws 400 700 "mesh vertices='-0.5,-0.5,0 0.5,-0.5,0 0,0.5,0' fill=solid"
 [ "$(field "$work/draw.json" '["its surface is drawn" in note for note in d["notes"]]')" = "[True]" ] || fail "$(cat "$work/draw.json")"
 "$voxelctl" draw "mesh vertices='-0.5,-0.5,0 0.5,-0.5,0 0,0.5,0' fill=solid" 2>"$work/note"
@@ -51,12 +51,12 @@ draws 17000 19000 "sphere radius=0.5 fill=solid" "torus radius=0.8 tube_radius=0
 "$voxelctl" --json entities >"$work/entities.json"
 [ "$(field "$work/entities.json" 'len(d["entities"])')" = 3 ] || fail "--add took something away"
 
-# Nothing is put up, or taken down, for the sake of one that is wrong.
+# If one argument is wrong, nothing is drawn or removed.
 if "$voxelctl" draw "sphere radius=1" "x +" 2>"$work/error"; then fail "x + was drawn"; fi
 grep -q "at character 4: found the end where a number, a name or ( would be right" "$work/error" || fail "$(cat "$work/error")"
 if "$voxelctl" draw "spere radius=1" 2>"$work/error"; then fail "a spere was drawn"; fi
 grep -q 'there is no shape spere; did you mean sphere?' "$work/error" || fail "$(cat "$work/error")"
-# What the server refuses is said once, with the shape that it is of.
+# A refusal of the server is reported once, with the shape that it concerns.
 if "$voxelctl" draw "sphere radius=1" "sphere radius=0" 2>"$work/error"; then fail "a sphere of no radius was drawn"; fi
 grep -q '"sphere radius=0": radius is 0; give a number greater than 0' "$work/error" || fail "$(cat "$work/error")"
 [ "$(grep -o "radius is 0" "$work/error" | wc -l)" = 1 ] || fail "said again: $(cat "$work/error")"
@@ -67,14 +67,14 @@ grep -q '"x^2+": at character 5: found the end where a number' "$work/error" || 
 "$voxelctl" --json entities >"$work/entities.json"
 [ "$(field "$work/entities.json" 'len(d["entities"])')" = 3 ] || fail "a refused shape took something away"
 
-# A pattern hides nothing that is drawn.
+# A pattern does not hide what is drawn.
 "$voxelctl" pattern corners
 draws 16000 17500 "sphere radius=0.5 fill=solid"
 
 "$voxelctl" --json gallery "$work/gallery.png" --each "$work/each/shape" >"$work/gallery.json"
 [ "$(field "$work/gallery.json" 'd["shapes"] > 10 and d["width"] > 1000')" = True ] || fail "$(cat "$work/gallery.json")"
 [ "$(head -c 8 "$work/gallery.png" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ]
-# A file of each, all of them different pictures with a palette (colour type 3 at byte 25).
+# One file for each, all of them different pictures with a palette (colour type 3 at byte 25).
 [ "$(find "$work/each/shape" -name '*.png' | wc -l)" = "$(field "$work/gallery.json" 'd["shapes"]')" ] || fail "$(ls "$work/each/shape")"
 [ "$(cat "$work"/each/shape/*.png | wc -c)" -lt 500000 ] || fail "$(ls -l "$work/each/shape")"
 [ "$(md5sum "$work"/each/shape/*.png | cut -d' ' -f1 | sort | uniq -d)" = "" ] || fail "two shapes look alike"

@@ -1,8 +1,8 @@
-"""What a program's file says of its defences, by readelf and objdump alone."""
+"""Finds the hardening of a program in its file, using only readelf and objdump."""
 import re
 import subprocess
 
-# What Defences finds, each with what it takes for it to be there.
+# The defences that are looked for, and the condition for each.
 ALL = {
     "pie": "is loaded anywhere (ET_DYN with the flag PIE)",
     "relro": "has memory that is made read-only after loading (GNU_RELRO)",
@@ -30,7 +30,7 @@ def search_path(path):
 
 
 def defences(path):
-    """Names of ALL that `path` has."""
+    """Returns the names of those in ALL that `path` has."""
     headers, dynamic = _said("readelf", "-hlW", path), _said("readelf", "-dW", path)
     symbols, notes = _said("readelf", "--dyn-syms", "-W", path), _said("readelf", "-nW", path)
     code = _said("objdump", "-d", "--no-show-raw-insn", path)
@@ -50,7 +50,7 @@ def defences(path):
         "stack_protector": "__stack_chk_fail" in imported,
         "fortify": any(re.fullmatch(r"__\w+_chk", name) for name in imported),
         "library_assertions": any("__glibcxx_assert_fail" in name for name in imported),
-        # The probe may lie anywhere in the new page: GCC may touch its far end.
+        # The probe may be anywhere in the new page: GCC may touch its far end.
         "stack_clash": re.search(
             r"sub\s+\$0x1000,%rsp\n.*or[ql]?\s+\$0x0,(?:0x[0-9a-f]+)?\(%rsp\)", code
         )

@@ -1,6 +1,6 @@
-// Faults of the GPU while a client streams: the real voxeld, with an engine's program that faults
-// when it finds a file. Every volume is what an unfaulted daemon shows, nobody loses a commit, and
-// the engine comes back each time. Prints how long the CPU took to take over, and the GPU to return.
+// Faults of the GPU while a client streams: the real voxeld, with an engine program that faults
+// when it finds a file. Every volume is what a daemon without faults shows, no commit is lost, and
+// the engine returns each time. Prints how long the CPU took to take over, and the GPU to return.
 //
 //   VOXELD_DRILL_FAULTS   how many; default 6
 //   VOXELD_DRILL_ENGINE   the program, beside this one; default faulty_engine, which needs no GPU
@@ -44,16 +44,17 @@ using daemon::services::SetDeadline;
 using daemon::services::SphereIn;
 
 constexpr const char* kDisplays[] = {"stack", "rotor"};
-// Between two faults; an engine that has drawn so many frames is well again.
+// The commits between two faults; an engine that has drawn that many frames counts as healthy
+// again.
 constexpr int kCommitsBetween = 60;
-constexpr int kCompared = 10;  // of those; while an engine is away all are
+constexpr int kCompared = 10;  // of those; while an engine is lost, all are
 
 std::string FromEnvironment(const char* name, const char* otherwise) {
   const char* value = std::getenv(name);
   return value == nullptr ? otherwise : value;
 }
 
-// Commit i, the same whoever asks.
+// Sends commit i, which is the same for every client.
 void SendScene(Client& client, int i) {
   const double t = 0.07 * i;
   client.Send(SphereIn("a", "ball", 0.3 + 0.2 * std::sin(t)));
@@ -88,8 +89,8 @@ void SendScene(Client& client, int i) {
 
 class Drilled {
  public:
-  // `engine`: the program; empty: the CPU in the daemon's own process. `fault_color`: of geometries
-  // that fault. `more`: of every display's options.
+  // `engine`: the program; empty: the CPU in the daemon's own process. `fault_color`: the colour of
+  // geometries that fault. `more`: further options of every display.
   explicit Drilled(const std::string& engine, const std::string& fault_color = "",
                    const std::string& more = "") {
     std::string config = "[engine]\n";
@@ -137,7 +138,7 @@ class Drilled {
     }
   }
 
-  // What the displays show then.
+  // Returns what the displays show after the commit.
   std::vector<std::string> CommitAndLook(int i) {
     Commit(i);
     std::vector<std::future<std::string>> captures;
@@ -168,7 +169,7 @@ class Drilled {
   }
   bool faulted() const { return !std::filesystem::exists(fault_file_); }
   const Client& client() const { return *client_; }
-  // Its exit code.
+  // Returns its exit code.
   std::optional<int> End() {
     client_->Cancel();
     process_->Signal(SIGTERM);
@@ -201,7 +202,7 @@ class Drilled {
   std::unique_ptr<Client> client_;
 };
 
-// Both get the same commits; what they show is compared.
+// Two daemons that get the same commits; what they show is compared.
 class Pair {
  public:
   explicit Pair(const std::string& fault_color = "", const std::string& more = "")
@@ -219,7 +220,7 @@ class Pair {
       EXPECT_TRUE(got[d] == want[d]) << kDisplays[d] << " differs at commit " << commits;
     }
   }
-  // The same, but nobody looks.
+  // The same without a comparison.
   void CommitQuickly() {
     ++commits;
     std::future<void> without =
@@ -227,17 +228,17 @@ class Pair {
     faulted.Commit(commits);
     without.get();
   }
-  // Enough for an engine that came back to be well again.
+  // Makes enough commits for an engine that returned to count as healthy again.
   void CommitMany() {
     for (int i = 0; i < kCompared; ++i) Commit();
     for (int i = kCompared; i < kCommitsBetween; ++i) CommitQuickly();
   }
-  // With the next commit.
+  // Sends it with the next commit.
   void Send(const v1::StreamRequest& request) {
     faulted.Send(request);
     unfaulted.Send(request);
   }
-  // Commits until all displays' figures are so.
+  // Commits until the statistics of all displays satisfy `so`.
   void CommitUntil(const std::function<bool(const v1::DisplayStats&)>& so) {
     const auto all = [&] {
       const v1::Stats stats = faulted.Stats();
@@ -271,7 +272,7 @@ TEST(FaultDrill, EveryVolumeIsAsWithoutFaultsAndTheEngineComesBackEachTime) {
         << "of VOXELD_DRILL_KINDS";
   }
   Pair pair;
-  std::map<std::string, std::vector<double>> takeovers;  // ms
+  std::map<std::string, std::vector<double>> takeovers;  // in ms
   std::vector<double> redraws, returns;
   pair.CommitMany();
   pair.CommitUntil(Pair::OnCuda);
@@ -280,7 +281,7 @@ TEST(FaultDrill, EveryVolumeIsAsWithoutFaultsAndTheEngineComesBackEachTime) {
     pair.faulted.Fault(kind);
     pair.Commit();
     ASSERT_TRUE(pair.faulted.faulted());
-    // All displays share the process, so all have lost their engine.
+    // All displays share the process, so all lose their engine.
     pair.CommitUntil([&](const v1::DisplayStats& d) {
       return d.engine_faults() > static_cast<uint64_t>(fault);
     });
@@ -321,8 +322,8 @@ TEST(FaultDrill, EveryVolumeIsAsWithoutFaultsAndTheEngineComesBackEachTime) {
   Print("return", returns);
 }
 
-// Each display over two GPUs: whichever of the four ranks faults, its display's other one goes too, the
-// other display does not, and they come back together.
+// Each display uses two GPUs: whichever of the four ranks faults, its display's other rank is lost
+// too, the other display is not affected, and they return together.
 TEST(FaultDrill, ALostRankTakesItsDisplaysOthersAlongAndTheyComeBack) {
   int faults = 0;
   ASSERT_TRUE(absl::SimpleAtoi(FromEnvironment("VOXELD_DRILL_FAULTS", "6"), &faults));
@@ -368,14 +369,14 @@ TEST(FaultDrill, ALostRankTakesItsDisplaysOthersAlongAndTheyComeBack) {
   Print("return", returns);
 }
 
-// Whatever is under way: the engine's end comes before that of what it writes into.
+// At any stage: the engine ends before the memory into which it writes.
 TEST(FaultDrill, TheDaemonEndsWellWhileTheEngineComesBack) {
   for (int tenth = 0; tenth < 10; ++tenth) {
     Drilled drilled(ProgramBeside(FromEnvironment("VOXELD_DRILL_ENGINE", "faulty_engine")));
     drilled.Commit(1);
     drilled.Fault("crash");
     drilled.Commit(2);
-    // Waits for nothing: it spreads the ends over the moments in which the engine comes back.
+    // It does not wait for anything: it spreads the ends over the time in which the engine returns.
     std::this_thread::sleep_for(std::chrono::milliseconds(230 + 5 * tenth));
     EXPECT_EQ(drilled.End(), 0) << drilled.output();
   }

@@ -1,4 +1,5 @@
-// A Foxglove WebSocket server, by Foxglove's own library: says its port, then sends a message for each line of standard input.
+// A Foxglove WebSocket server, using Foxglove's own library: prints its port, then sends a message
+// for each line of standard input.
 //   {"topic": "/a", "update": {…}}   a foxglove.SceneUpdate, as protobuf or JSON as its topic is
 //   {"topic": "/a", "bytes": "…"}    these bytes (base64) in its place
 // The first argument is a file of the messages' definitions; NODE_PATH has the packages.

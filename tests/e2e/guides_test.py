@@ -1,14 +1,15 @@
-"""The guides of docs/guides, done as a reader does them: every block is carried out in its order, and what a guide says a block prints is
-looked for in what it prints. Paths are in VOXELD, VOXELCTL, EMULATOR, BUILD and SOURCE; VOXELD_CMAKE is the cmake that built them.
+"""Follows the guides of docs/guides as a reader does: runs every block in order, and checks that the output that a guide shows for a block
+occurs in what it prints. Paths are in VOXELD, VOXELCTL, EMULATOR, BUILD and SOURCE; VOXELD_CMAKE is the cmake that built them.
 
 How a guide is written:
-  sh      is run by bash, and goes on in the folder where the one before ended; one that is nothing but a call of voxeld or voxeld-emulator is a terminal of its own: it runs on, and the one
-          before it ends
+  sh      is run by bash, in the folder in which the previous block ended; a block that only calls voxeld
+          or voxeld-emulator has a terminal of its own: it keeps running, and the one
+          before it is ended
   python, c, cpp, cmake, toml
-          below a line that names a file in backticks and ends with a colon, is that file; other python is pasted, as it stands, at the prompt of
-          one interpreter, and prints no more there than somebody would read
-  text    is what the block before prints: each line is part of a line, in this order; a number stands for any, "…" for anything
-  console and others are only read"""
+          below a line that names a file in backticks and ends with a colon, is that file; other python is pasted, unchanged, at the prompt of
+          one interpreter, and prints at most as much as a user would read
+  text    is the output of the block before: each line is part of a line, in this order; a number matches any number, "…" matches anything
+  console and other blocks are not run"""
 import os
 import re
 import signal
@@ -30,7 +31,7 @@ READABLE = 1500  # characters that one block prints at a prompt
 class Block(NamedTuple):
     line: int
     kind: str
-    file: str  # empty: it is run
+    file: str  # empty: the block is run
     text: str
 
 
@@ -53,14 +54,14 @@ def blocks(guide: str) -> list[Block]:
 
 
 def pattern(line: str) -> str:
-    """Of a line of a text block."""
+    """Returns the pattern of a line of a text block."""
     parts = re.split(r"(…|\d+(?:\.\d+)?)", line.strip())
-    exact = bool(re.search(r"(?:\b[0-9A-F]{2} ){4}", line))  # bytes are what they are
+    exact = bool(re.search(r"(?:\b[0-9A-F]{2} ){4}", line))  # bytes must match exactly
     return "".join(".*" if part == "…" else r"[\d.,]+" if part[:1].isdigit() and not exact else re.escape(part) for part in parts)
 
 
 def unsaid(text: str, output: str) -> Optional[str]:
-    """The first line of `text` that is not, in its order, in the output."""
+    """Returns the first line of `text` that does not occur, in its order, in the output."""
     left = output.splitlines()
     for line in text.splitlines():
         while left and not re.search(pattern(line), left[0]):
@@ -72,7 +73,7 @@ def unsaid(text: str, output: str) -> Optional[str]:
 
 
 class Reader:
-    """Somebody who does a guide, in a folder that looks like a clone that is built."""
+    """A reader who follows a guide, in a folder that looks like a built clone."""
 
     def __init__(self, case: unittest.TestCase) -> None:
         self._case = case
@@ -118,7 +119,7 @@ class Reader:
                 self.ran += 1
 
     def shell(self, text: str) -> str:
-        # What it leaves running ends with it: a process group of its own.
+        # Processes that it leaves running end with it: they have a process group of their own.
         with tempfile.TemporaryFile("w+") as output, tempfile.NamedTemporaryFile("r") as where:
             shell = subprocess.Popen(["bash", "-euo", "pipefail", "-c", f"{text}pwd >{where.name}"], cwd=self.folder, env=self.environment, stdout=output,
                                      stderr=subprocess.STDOUT, start_new_session=True)
@@ -169,7 +170,7 @@ class Reader:
             self._interpreter = subprocess.Popen([f"{self.environment['HOME']}/voxel/bin/python", "-i", "-q", "-u"], cwd=self.folder, text=True,
                                                  env=self.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         assert self._interpreter.stdin is not None and self._interpreter.stdout is not None
-        # Where the block is not at its end, its next line is wrong, and prints nothing.
+        # If the block is incomplete, its next line is an error, and prints nothing.
         self._interpreter.stdin.write(f"{text}print('next')\n\nprint('\\0')\n")
         self._interpreter.stdin.flush()
         said = ""
@@ -218,7 +219,7 @@ class Guides(unittest.TestCase):
         pasted = next(one.text for one in blocks(use) if "voxelctl play" in one.text)
         reader.serve("voxeld\n")
         self.assertIn("export PATH=$PWD/build/demo/bin:$PATH", pasted)
-        # Fewer pictures; those of a gallery are tested elsewhere.
+        # Fewer pictures; the pictures of a gallery are tested elsewhere.
         short = re.sub(r"(?m)^voxelctl gallery .*\n", "", pasted).replace("turn.gif", "turn.gif --frames 4")
         said = reader.shell(short)
         recorded = "voxelctl record --still build/preset.mcap"

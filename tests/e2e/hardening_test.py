@@ -1,4 +1,4 @@
-"""The installed programs have the defences that docs/security/hardening.md says, and their sources were compiled with its flags."""
+"""Checks that the installed programs have the defences listed in docs/security/hardening.md, and that their sources were compiled with its flags."""
 import json
 import os
 import re
@@ -10,12 +10,13 @@ from pathlib import Path
 from elf_defences import ALL, defences, search_path
 
 BUILD = os.environ["BUILD"]
-# By their folders: what is compiled without a flag, and why is in docs/security/hardening.md.
+# By folder: the sources compiled without a flag; docs/security/hardening.md gives the reasons.
 LEFT_OUT = json.loads(os.environ["HARDENING_LEFT_OUT"])
 FLAGS = ["-fstack-protector-strong", "-fstack-clash-protection", "-fcf-protection=full", "-ftrivial-auto-var-init=zero",
          "-D_FORTIFY_SOURCE=3", "-D_GLIBCXX_ASSERTIONS", "-Werror=format-security"]
 
-# Has what each flag is for: an array on the stack, a large frame, a copy whose size the compiler does not know, a vector's element.
+# Has something for each flag to protect: an array on the stack, a large frame, a copy whose size the compiler does not know, a vector's
+# element.
 VICTIM = r"""
 #include <cstdio>
 #include <cstring>
@@ -45,13 +46,13 @@ def compiled(folder, *flags):
 
 
 class Looking(unittest.TestCase):
-    """That what is looked for is found where it is, and missed where it is not."""
+    """Checks that a defence is found where it exists, and not found where it does not."""
 
     def test_a_program_without_any_has_none(self) -> None:
         with tempfile.TemporaryDirectory() as folder:
             bare = compiled(folder, "-O1", "-fno-pie", "-no-pie", "-fno-stack-protector", "-fcf-protection=none", "-U_FORTIFY_SOURCE",
                             "-fno-stack-clash-protection", "-fuse-ld=bfd", "-Wl,-z,norelro,-z,lazy,-z,execstack,-rpath,/tmp", "-DBARE")
-            # It has no text relocations, as nothing on this machine would load it with them; crt1.o begins with endbr64 on some.
+            # It has no text relocations, since nothing on this machine would load it with them; crt1.o begins with endbr64 on some.
             self.assertLessEqual(defences(bare), {"no_text_relocations", "branch_targets"})
 
     def test_a_program_with_all_has_all(self) -> None:

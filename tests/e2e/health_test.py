@@ -1,5 +1,6 @@
-"""What health says, by gRPC and by http, while a display goes and comes back: an Open Pixel Control controller, which is a socket here.
-The path of voxeld is in VOXELD."""
+"""Tests the health reports, by gRPC and by http, while a display is lost and returns: an Open Pixel Control controller, which is a socket
+here. The path of
+voxeld is in VOXELD."""
 import contextlib
 import json
 import os
@@ -22,7 +23,7 @@ SERVING, NOT_SERVING = b"\x08\x01", b"\x08\x02"  # grpc.health.v1.HealthCheckRes
 
 
 class Controller:
-    """Takes whatever it is sent."""
+    """Accepts whatever it is sent."""
 
     def __init__(self, port: int) -> None:
         self._listening = socket.create_server(("127.0.0.1", port))
@@ -71,7 +72,7 @@ class Health(unittest.TestCase):
                     deadline = time.monotonic() + LONG
                     while status != 200:
                         self.assertLess(time.monotonic(), deadline)
-                        with contextlib.suppress(OSError):  # what is no 200 is one too
+                        with contextlib.suppress(OSError):  # an answer other than 200 counts too
                             with urllib.request.urlopen(f"http://127.0.0.1:{http}/healthz", timeout=LONG) as answer:
                                 status = answer.status
                     with socket.socket(socket.AF_UNIX) as client:
@@ -113,7 +114,7 @@ class Health(unittest.TestCase):
                     controller = Controller(port)
                     self.until(asked, SERVING)
                     self.until(lambda: asked(b"voxeld.v1.SceneService"), SERVING)
-                    self.until(page, (200, [("cube", "device")]))  # that it was lost is told for a minute
+                    self.until(page, (200, [("cube", "device")]))  # a loss is reported for a minute
             finally:
                 daemon.terminate()
                 self.assertEqual(daemon.wait(LONG), 0)

@@ -29,7 +29,7 @@ int Connected(const std::string& address) {
   return -1;
 }
 
-// What was answered, as far as it came.
+// Returns the answer, as far as it arrived.
 std::string Exchange(int fd, const std::string& path) {
   const std::string request =
       absl::StrCat("GET ", path, " HTTP/1.1\r\nHost: test\r\nConnection: close\r\n\r\n");

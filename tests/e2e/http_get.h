@@ -1,4 +1,4 @@
-// Just enough HTTP to ask a daemon.
+// A minimal HTTP client for querying a daemon.
 #pragma once
 
 #include <string>
@@ -13,17 +13,17 @@ class HttpConnection {
   HttpConnection(const HttpConnection&) = delete;
   HttpConnection& operator=(const HttpConnection&) = delete;
 
-  // Asks for `path`, and reads to the end of the connection.
+  // Requests `path`, and reads to the end of the connection.
   std::string Get(const std::string& path);
 
  private:
   const int fd_;
 };
 
-// The same from a server that may end meanwhile; empty if it does.
+// The same from a server that may exit in the meantime; returns an empty string if it does.
 std::string HttpGetIfThere(const std::string& address, const std::string& path);
 
-// Head and body.
+// Returns head and body.
 inline std::string HttpGet(const std::string& address, const std::string& path) {
   return HttpConnection(address).Get(path);
 }

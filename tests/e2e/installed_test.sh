@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# Installs the packages in a root in which nothing else of voxeld is, starts the service as its unit does, and draws with the wheel; with
-# the development files, a C++ client as well. Then removes the packages. What it writes is thrown away.
+# Installs the packages in a root without any other part of voxeld, starts the service as its unit does, and draws with the wheel; with the
+# development files, builds and runs a C++ client as well. Then removes the packages. Whatever it writes is discarded.
 # usage: installed_test.sh PACKAGES WHEEL SOURCE CACHE
 #   PACKAGES  the folder of the .deb files; CACHE a folder that may be kept between calls
 # VOXELD_DIST=FOLDER: the packages and the wheel are those of this folder, as tools/package wrote it, and its checksums are checked.
 # The clean root is a Debian system made by debootstrap, plus the packages needed to build a client. It is kept in CACHE.
-# VOXELD_CLEAN_ROOT=FOLDER uses another root. With VOXELD_CLEAN_ROOT=/, the test uses this system's /usr (without /usr/local), /etc and /var;
-# it may then miss an undeclared dependency that happens to be installed. Requires root, debootstrap, a network for the first run, and a
-# kernel with overlayfs. Exit status 77: the test was skipped because something required is missing.
+# VOXELD_CLEAN_ROOT=FOLDER uses another root. With VOXELD_CLEAN_ROOT=/, the test uses this system's /usr (without /usr/local), /etc and
+# /var; it may then miss an undeclared dependency that happens to be installed. Requires root, debootstrap, a network for the first run, and
+# a kernel with overlayfs. Exit status 77: the test was skipped because something required is missing.
 set -euo pipefail
 skip() { echo "installed_test: skipped: $*" >&2; exit 77; }
 fail() { echo "installed_test: $*" >&2; exit 1; }
@@ -27,7 +27,7 @@ ls "$packages"/voxeld_*.deb >/dev/null 2>&1 || fail "there is no package voxeld 
 [ -f "$wheel" ] || fail "there is no wheel $wheel"
 [ "$(id -u)" = 0 ] || skip "only root can change its root folder"
 
-# Everything that is mounted or started is gone with the namespaces.
+# All mounts and processes disappear with the namespaces.
 if [ -z "${INSTALLED_WORK:-}" ]; then
   work=$(mktemp -d)
   trap 'rmdir "$work" 2>/dev/null || true' EXIT
@@ -60,7 +60,7 @@ root=$INSTALLED_WORK/root
 mount -t overlay overlay -o "lowerdir=${base:-/},upperdir=$INSTALLED_WORK/upper,workdir=$INSTALLED_WORK/changes" "$root" 2>/dev/null ||
   skip "this kernel has no overlayfs here"
 if [ -z "$base" ]; then
-  # Only what Debian's packages bring is left of this system.
+  # Only the files of Debian's packages are left of this system.
   for folder in "$root"/*; do
     case "${folder##*/}" in
       bin | dev | etc | lib* | proc | run | sbin | sys | tmp | usr | var) ;;
@@ -71,7 +71,7 @@ if [ -z "$base" ]; then
   echo "   this system's packages: $(in_root sh -c '. /etc/os-release; echo "$PRETTY_NAME"')"
 else
   cp /etc/resolv.conf "$root/etc/resolv.conf"
-  # What is downloaded is kept, so that the next call needs no network.
+  # Downloads are kept, so that the next call needs no network.
   mkdir -p "$cache/archives" "$root/var/cache/apt/archives"
   mount --bind "$cache/archives" "$root/var/cache/apt/archives"
   echo "   $base: $(in_root dpkg-query -W -f '.\n' | wc -l) packages"
@@ -102,7 +102,7 @@ done
 
 step "the service, as its unit starts it"
 in_root install -D -m 0644 /usr/share/doc/voxeld/examples/voxeld.toml /etc/voxeld/voxeld.toml
-# Ports of this machine may be taken; the socket's path is the root's own.
+# Ports of this machine may be in use; the socket's path is inside the root.
 in_root sed -i 's/^listen = .*/listen = ["unix:\/run\/voxeld\/voxeld.sock"]/; s/^http = .*/http = "off"/' /etc/voxeld/voxeld.toml
 in_root voxeld --check-config >/dev/null || fail "the example of a configuration is refused"
 in_root install -d -o voxeld -g voxeld -m 0750 /run/voxeld
@@ -113,7 +113,7 @@ daemon=$!
 for _ in $(seq 600); do
   ! grep -q ' ready\|"ready' "$INSTALLED_WORK/daemon.log" || break
   kill -0 "$daemon" 2>/dev/null || fail "voxeld ended: $(cat "$INSTALLED_WORK/daemon.log")"
-  sleep 0.1 # its log is how it says that it listens
+  sleep 0.1 # polled: its log shows when it listens
 done
 grep ' ready\|"ready' "$INSTALLED_WORK/daemon.log" | sed 's/^/   /' || fail "voxeld is not ready: $(cat "$INSTALLED_WORK/daemon.log")"
 if grep 'cannot be started' "$INSTALLED_WORK/daemon.log"; then fail "voxeld does not find its engine's program"; fi

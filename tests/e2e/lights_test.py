@@ -1,6 +1,8 @@
-"""Lights that come in: `voxelctl input` fed by programs that others wrote (olad for Open Pixel Control, npm's sacn for E1.31,
-npm's artnet for Art-Net) and by DDP packets written out here, `voxelctl pipe` by raw bytes; what the display shows, light by light,
-and that every message is accounted for. Paths are in VOXELD, VOXELCTL and NODE_MODULES."""
+"""Tests incoming lights: `voxelctl input` fed by third-party programs (olad for Open Pixel Control, npm's sacn for E1.31, npm's artnet for
+Art-Net) and by
+DDP packets written out here, and `voxelctl pipe` fed by raw bytes; checks what the display shows, light by light, and that every message is
+accounted
+for. Paths are in VOXELD, VOXELCTL and NODE_MODULES."""
 import contextlib
 import json
 import os
@@ -28,7 +30,8 @@ LIGHTS = X * Y * Z  # two universes: 170 lights and 70
 
 
 def unread(port: int) -> int:
-    """Bytes that the kernel holds for who listens at this port of 127.0.0.1; a datagram over loopback is among them once it is sent."""
+    """Returns the bytes that the kernel holds for the receiver at this port of 127.0.0.1; a datagram over loopback is counted as soon as it
+    is sent."""
     for line in Path("/proc/net/udp").read_text(encoding="ascii").splitlines()[1:]:
         fields = line.split()
         if fields[1] == f"0100007F:{port:04X}":
@@ -37,7 +40,7 @@ def unread(port: int) -> int:
 
 
 class Reading:
-    """A process whose standard output, JSON line by line, is read as it comes."""
+    """A process whose standard output, one JSON document a line, is read as it arrives."""
 
     def __init__(self, *command: str) -> None:
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -75,7 +78,7 @@ class Lights(unittest.TestCase):
         port = self.controller.getsockname()[1]
         self.daemon = self.enterContext(subprocess.Popen(
             [os.environ["VOXELD"], "--listen", self.server, "--http", "off", "--log-level", "warn", "--engine", "cpu",
-             # Wired in its own way: light n of those that feed it is its nth pixel.
+             # With another wiring than the senders: light n of those that feed it is its nth pixel.
              "--display", f"cube=network,address=127.0.0.1:{port},protocol=ddp,cube={X}x{Y}x{Z},order=zyx,serpentine=rows,dither=none",
              "--display", f"box=simulated,size={2 * X}x{2 * Y}x{2 * Z},rate=100"]))
         self.addCleanup(self.daemon.wait, LONG)
@@ -92,7 +95,7 @@ class Lights(unittest.TestCase):
         return reading, int(reading.lines[0]["listen"].rsplit(":", 1)[1])
 
     def tally(self, reading: Reading) -> dict[str, Any]:
-        """At its end."""
+        """Ends the process, and returns its counts."""
         code, errors = reading.stop()
         self.assertEqual((code, errors), (0, ""))
         tally = reading.lines[-1]
@@ -155,7 +158,7 @@ class Lights(unittest.TestCase):
         self.assertEqual((tally["malformed"], tally["connections"]), (0, 1))
 
     def feed(self, protocol: str, port: int, first: int) -> None:
-        """By a sender that others wrote."""
+        """Uses a third-party sender."""
         sender = subprocess.Popen(["node", str(Path(__file__).with_name("send_lights.js")), os.environ["NODE_MODULES"], protocol, f"{port}"],
                                   stdin=subprocess.PIPE, text=True)
         self.addCleanup(sender.wait, LONG)
@@ -259,7 +262,7 @@ class Lights(unittest.TestCase):
             self.v.close()
             self.daemon.terminate()
             self.daemon.wait(LONG)
-            send(150)  # nobody shows it
+            send(150)  # nothing shows it
             self.daemon = self.enterContext(subprocess.Popen(
                 [os.environ["VOXELD"], "--listen", self.server, "--http", "off", "--log-level", "warn", "--engine", "cpu",
                  "--display", f"box=simulated,size={2 * X}x{2 * Y}x{2 * Z},rate=100"]))
@@ -281,7 +284,7 @@ class Lights(unittest.TestCase):
         done = self.pipe(b"".join(picture.tobytes() for picture in pictures), "--size", f"{X}x{Y}x{Z}", "--display", "box", "--keep")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(json.loads(done.stdout), {"pictures": 20, "accepted": 20, "refused": 0})
-        # Light (x, y, z) is voxels (2x, 2y, 2z) and the seven beside it.
+        # Light (x, y, z) is voxel (2x, 2y, 2z) and the seven beside it.
         last = pictures[-1].reshape(Z, Y, X, 3)
         big = last.repeat(2, axis=0).repeat(2, axis=1).repeat(2, axis=2).reshape(-1, 3)
         until(lambda: np.array_equal(self.lit("box"), big), "the last picture is up")
@@ -299,7 +302,7 @@ class Lights(unittest.TestCase):
             self.assertIn(words, wrong.stderr)
 
     def test_layout(self) -> None:
-        # Four lights of a square, and a number without one.
+        # Four lights of a square, and a number without a light.
         layout = Path(self.folder, "layout.json")
         layout.write_text(json.dumps([{"point": [0, 0, 0]}, {"point": [1, 0, 0]}, None, {"point": [0, 1, 0]}, {"point": [1, 1, 0]}]))
         colors = np.array([[255, 0, 0], [0, 255, 0], [9, 9, 9], [0, 0, 255], [255, 255, 0]], np.uint8)

@@ -1,4 +1,4 @@
-"""voxelctl markers with a server of Foxglove's own. Paths are in VOXELD, VOXELCTL and NODE_MODULES."""
+"""Tests voxelctl markers with a server from Foxglove. Paths are in VOXELD, VOXELCTL and NODE_MODULES."""
 import base64
 import json
 import os
@@ -68,7 +68,7 @@ class Markers(unittest.TestCase):
             self.assertLess(time.monotonic(), deadline, [entity.key.id for entity in v.entities()])
 
     def shown(self, v: voxel.Connection) -> Any:
-        """With all that the daemon has taken until now."""
+        """Returns what is shown, including everything that the daemon has received so far."""
         accepted = v.commit().wait(LONG).accepted
         assert accepted is not None
         return v.capture(at_least_snapshot=accepted.snapshot, timeout=LONG).rgb.copy()
@@ -86,7 +86,7 @@ class Markers(unittest.TestCase):
                 {"pose": pose(0.4, 0.2, 0), "size": {"x": 0.5, "y": 0.5, "z": 0.5}, "color": WHITE}]}]})
             self.await_ids(v, "/shapes a#0", "/shapes b#0")
             theirs = self.shown(v)
-            # Moved, gone, and one in words with its time.
+            # One is moved, one is removed, and one is sent to /words with its time.
             self.send("/shapes", {"entities": [cube("a", 0.5)], "deletions": [{"type": 0, "id": "b"}]})
             self.send("/words", {"entities": [{**cube("a", 0.0), "timestamp": {"sec": 1700000000, "nsec": 5},
                                                "lifetime": {"sec": 0, "nsec": 0}, "frame_id": "map"}]})

@@ -1,7 +1,10 @@
-"""What voxeld sends by E1.31 and Art-Net, as a receiver that others wrote reads it: olad, the Open Lighting Architecture's
-daemon. A lattice of more lights than a universe holds goes to olad at 127.0.0.1; olad is asked for every slot of both its
-universes, and what it says is compared with what wiring and colours come to here: in the dark, with a colour of its own in
-each light, after changes in one universe and in both, and once voxeld has ended. The path of voxeld is in VOXELD."""
+"""Tests what voxeld sends by E1.31 and Art-Net, as read by a third-party receiver: olad, the daemon of the Open Lighting Architecture. A
+lattice of more
+lights than fit into a universe is sent to olad at 127.0.0.1; olad is asked for every slot of both its universes, and its answers are
+compared with
+those computed here from wiring and colours: in the dark, with a colour of its own in each light, after changes in one universe and in both,
+and after
+voxeld has exited. The path of voxeld is in VOXELD."""
 import contextlib
 import http.client
 import json
@@ -20,14 +23,14 @@ import voxeld as voxel
 
 LONG = 60.0
 X, Y, Z = 8, 6, 5  # 240 lights: 170 in the first universe, 70 in the second
-SLOTS = 510        # of a universe
+SLOTS = 510        # in a universe
 NET, SUBNET = 5, 9
-E131, ARTNET = 40001, NET << 8 | SUBNET << 4 | 3  # the first universes
-PORTS = {"E1.31": 5568, "Art-Net": 6454}         # olad listens nowhere else
+E131, ARTNET = 40001, NET << 8 | SUBNET << 4 | 3  # the first universe of each
+PORTS = {"E1.31": 5568, "Art-Net": 6454}         # olad uses no other ports
 
 CONFIG = {
     "port": f"11-1-I-0 = {E131}\n11-1-I-1 = {E131 + 1}\n2-1-I-0 = {ARTNET}\n2-1-I-1 = {ARTNET + 1}\n",  # plugin-device-I-input
-    # It wants an interface for multicast, which cannot be the loopback; what is sent to the machine itself comes all the same.
+    # It needs an interface for multicast, which cannot be the loopback; packets sent to the machine itself arrive all the same.
     "e131": "enabled = true\ninput_ports = 2\noutput_ports = 0\n",
     "artnet": f"enabled = true\nip = 127.0.0.1\nuse_loopback = true\nnet = {NET}\nsubnet = {SUBNET}\noutput_ports = 0\n",
     **dict.fromkeys("dummy espnet ftdidmx gpio karate kinet milinst opendmx openpixelcontrol osc pathport renard sandnet "
@@ -55,7 +58,7 @@ class Olad:
             Path(folder, f"ola-{name}.conf").write_text(text, encoding="utf-8")
         assert shutil.which("olad"), "olad not found; run tools/setup --test"
         user: dict[str, Any] = {}
-        if os.geteuid() == 0:  # which olad does not run as
+        if os.geteuid() == 0:  # olad does not run as root
             nobody = pwd.getpwnam("nobody")
             user = {"user": nobody.pw_uid, "group": nobody.pw_gid, "extra_groups": []}
             for path in (Path(folder), *Path(folder).iterdir()):
@@ -81,7 +84,7 @@ class Olad:
             connection.close()
 
     def until(self, right: Callable[[Any], Any], ask: Callable[[], Any]) -> Any:
-        """The first answer that is right, else the first after the deadline."""
+        """Returns the first answer that is right, or the first one after the deadline."""
         deadline = time.monotonic() + LONG
         while True:
             with contextlib.suppress(subprocess.TimeoutExpired):

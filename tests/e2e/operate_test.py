@@ -1,4 +1,5 @@
-"""voxeld as a service: who may do what, over sockets and TLS, and what outlives its end. The real programs, by the commands of
+"""Tests voxeld as a service: access control over sockets and TLS, and the state that outlives it. Uses the real programs with the commands
+of
 docs/operations.md. Paths are in VOXELD and VOXELCTL; KILLS says how often the daemon is killed under load."""
 import contextlib
 import json
@@ -30,7 +31,7 @@ def free_port() -> int:
 
 
 class Daemon:
-    """Ready when it has been made. Its log, line by line, is in `log`."""
+    """The daemon is ready when the constructor returns. `log` has its log, line by line."""
 
     def __init__(self, config: str, *options: str) -> None:
         began = time.monotonic()
@@ -53,7 +54,7 @@ class Daemon:
         self._lines.put(None)
 
     def await_line(self, event: str) -> dict[str, str]:
-        """The next line with that event."""
+        """Returns the next line with that event."""
         while True:
             line = self._lines.get(timeout=LONG)
             assert line is not None, f"voxeld ended before {event!r}: {self.log}"
@@ -152,11 +153,11 @@ class Access(unittest.TestCase):
                                ({"VOXELD_TLS_CA": ""}, "not by an authority that this machine knows; VOXELD_TLS_CA names")):
                 told = voxelctl("--server", tls, "displays", **{**mine, **wrong}).stderr
                 self.assertIn(why, told)
-                self.assertRegex(told, r"\Avoxelctl: ")  # and not by a library's own line
+                self.assertRegex(told, r"\Avoxelctl: ")  # and not by a message of a library
             self.assertIn("its host's name is not known to this machine",
                           voxelctl("--server", "tls:no.such.host.invalid:1", "displays", **mine).stderr)
 
-            # The Python client over both, and a token that is taken away in the middle of a stream.
+            # The Python client over both, and a token that is revoked in the middle of a stream.
             who = voxel.Credentials(token_file=painter, ca=mine["VOXELD_TLS_CA"], certificate=mine["VOXELD_TLS_CERT"],
                                     key=mine["VOXELD_TLS_KEY"], server_name="display.example")
             with contextlib.ExitStack() as stack:
@@ -175,7 +176,7 @@ class Access(unittest.TestCase):
                 w.sphere("ball", radius=0.2)
                 w.commit().wait(LONG)
 
-            # A file that is wrong lets nobody new in, and says where.
+            # With an invalid file, new clients are refused; the error names the line.
             with open(self.grants, "a", encoding="utf-8") as file:
                 file.write("[[token]]\nname =\n")
             self.assertIn("grants.toml:", daemon.await_line("the grants file is wrong: nobody new is let in by it")["why"])
@@ -213,7 +214,7 @@ class State(unittest.TestCase):
 
     def test_what_is_kept_is_shown_again_the_same(self) -> None:
         with self.daemon() as daemon:
-            # All shapes that there are, and an object, in layers that stay.
+            # All existing shapes, and an object, in persistent layers.
             shown = voxelctl("--server", self.socket, "gallery", f"{self.folder.name}/gallery.png")
             self.assertEqual(shown.returncode, 0, shown.stderr)
             v = voxel.connect(self.socket, on_disconnect="keep", timeout=LONG)
@@ -227,10 +228,10 @@ class State(unittest.TestCase):
             frame = v.commit(durable=True).wait_durable(LONG)
             self.assertTrue(frame.durable)
             v.close()
-            with voxel.connect(self.socket) as brief:  # goes with its session
+            with voxel.connect(self.socket) as brief:  # is removed with its session
                 brief.sphere("gone", radius=0.9)
                 brief.commit().wait(LONG)
-            with voxel.connect(self.socket, timeout=LONG) as after:  # a volume that was drawn after it had gone
+            with voxel.connect(self.socket, timeout=LONG) as after:  # a volume that was drawn after its removal
                 until(lambda: all(entity.key.id != "gone" for entity in after.entities()), "the end of what goes")
                 accepted = after.commit().wait(LONG).accepted
                 assert accepted is not None
@@ -254,7 +255,7 @@ class State(unittest.TestCase):
                     v.capture(timeout=LONG)  # the first picture after the start
                     slowest = max(slowest, time.monotonic() - began)
                     there = [int(one.label[1:]) for one in v.entities()]
-                    # One of each round's owner; what came later may be there, too.
+                    # One by the owner of each round; later ones may be there, too.
                     self.assertGreaterEqual(max(there, default=0), durable, f"after kill {round_}")
                     self.assertEqual(len(there), round_)
                     if round_ == KILLS:
@@ -271,7 +272,7 @@ class State(unittest.TestCase):
                     durable = max(n for n, frame in waiting if frame.durable)
                     v.close(0)
         print(f"{KILLS} kills, {durable} the last durable commit; the first picture after {slowest:.2f} s at most", flush=True)
-        self.assertLess(slowest, 5)  # a second is the figure; machines that test are busy
+        self.assertLess(slowest, 5)  # the promise is one second; test machines are busy
 
     def test_a_file_that_is_damaged_is_put_aside_and_the_daemon_runs(self) -> None:
         with self.daemon() as daemon, voxel.connect(self.socket, on_disconnect="keep", timeout=LONG) as v:
@@ -315,14 +316,14 @@ class Recording(unittest.TestCase):
         recorder = self.tool("record", self.file)
         deadline = time.monotonic() + LONG
         with voxel.connect(self.socket, timeout=LONG) as v:
-            while not os.path.exists(self.file) or os.path.getsize(self.file) < 100:  # its first change set is on the disk
+            while not os.path.exists(self.file) or os.path.getsize(self.file) < 100:  # until its first change set is on the disk
                 self.assertLess(time.monotonic(), deadline)
                 v.sphere("wake", radius=0.1)
                 v.commit().wait(LONG)
         return recorder
 
     def show(self, told: float = 0.3) -> dict[int, np.ndarray[Any, Any]]:
-        """States of a scene, each for long enough to be told by itself: what is shown of each, by its snapshot."""
+        """Shows the states of a scene, each long enough to be reported separately. Returns what is shown of each, by its snapshot."""
         shown: dict[int, np.ndarray[Any, Any]] = {}
         rng = np.random.default_rng(3)
 
@@ -353,7 +354,7 @@ class Recording(unittest.TestCase):
         return shown
 
     def replayed(self, *options: str) -> Iterator[tuple[int, np.ndarray[Any, Any]]]:
-        """What is shown after each change set, by the snapshot that it was recorded of."""
+        """Yields what is shown after each change set, by the snapshot from which it was recorded."""
         replay = self.tool("--json", "replay", self.file, "--step", *options)
         assert replay.stdin is not None and replay.stdout is not None
         with voxel.connect(self.socket, timeout=LONG) as v:
@@ -382,7 +383,7 @@ class Recording(unittest.TestCase):
             if snapshot in shown:
                 np.testing.assert_array_equal(picture, shown[snapshot], f"snapshot {snapshot}")
                 compared += 1
-        self.assertGreaterEqual(compared, len(shown) - 1)  # one may have been told together with the next
+        self.assertGreaterEqual(compared, len(shown) - 1)  # one may have been reported together with the next
         self.assertEqual(len({picture.tobytes() for picture in shown.values()}), len(shown), "all differ")
         with voxel.connect(self.socket, timeout=LONG) as v:
             self.assertEqual(v.entities(), [], "what replay put up went with it")
@@ -430,11 +431,11 @@ class Recording(unittest.TestCase):
         began = time.monotonic()
         fast = voxelctl("--server", self.socket, "replay", self.file, "--speed", "100")
         self.assertEqual(fast.returncode, 0, fast.stderr)
-        self.assertLess(time.monotonic() - began, 1.5)  # it was longer than that when it was recorded
+        self.assertLess(time.monotonic() - began, 1.5)  # recording took longer than that
         looping = self.tool("--json", "replay", self.file, "--speed", "50", "--loop")
         assert looping.stdout is not None
         last = -1
-        while (now := json.loads(looping.stdout.readline())["time_ns"]) >= last:  # until it has begun again
+        while (now := json.loads(looping.stdout.readline())["time_ns"]) >= last:  # until it has started again
             last = now
         looping.send_signal(signal.SIGINT)
         looping.communicate(timeout=LONG)

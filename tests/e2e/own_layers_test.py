@@ -1,4 +1,4 @@
-"""What commands of voxelctl take down, and of whom: with a token that may draw, and with what replay and pipe leave."""
+"""Tests which layers the commands of voxelctl remove, and whose: with a token that may draw, and with the layers that replay and pipe leave."""
 import json
 import os
 import subprocess
@@ -90,7 +90,7 @@ class Layers(unittest.TestCase):
         self.assertNotIn('nothing of "draw 1"', said)
         self.assertRegex(said, r'nothing of "draw 2" can be seen on display sim: .*outside')
         self.assertRegex(said, r'nothing of "draw 3" can be seen on display sim: .*black')
-        # All of them are asked about, however many.
+        # Details are requested for all of them, however many there are.
         many = ["sphere radius=0.1"] * 20 + ["sphere radius=0.1 at=9,9,9"]
         told = json.loads(self.run_as("painter", "--json", "draw", *many).stdout)
         self.assertEqual(len(told["unseen"]), 1)
@@ -119,7 +119,7 @@ class Layers(unittest.TestCase):
         self.does("other", "draw", "sphere radius=0.5")
         self.assertRegex(self.does("boss", "record", "--still", preset), r"logo.mcap: 1 change, \d+ B|logo.mcap: 1 change, [0-9.]+ kB")
         self.does("boss", "clear")
-        for who in ("painter", "painter", "boss"):  # with a token the owner is the same, else another
+        for who in ("painter", "painter", "boss"):  # with a token the owner is the same, without one it differs
             said = self.does(who, "replay", "--keep", preset)
             self.assertIn("replays", said)
             self.assertIn("one state of a scene", said)

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes the Debian packages of the build (voxeld, libvoxeld-dev, and voxeld-cuda if the build has CUDA) and looks at them as dpkg, udev and
-# systemd would; runs what they hold from an empty folder. Nothing is installed.
+# Makes the Debian packages of the build (voxeld, libvoxeld-dev, and voxeld-cuda if the build has CUDA) and checks them as dpkg, udev and
+# systemd would; runs their programs from an empty folder. Nothing is installed.
 # usage: package_test.sh CPACK BUILD VERSION
 set -euo pipefail
 cpack=$1
@@ -22,7 +22,7 @@ packages=(voxeld libvoxeld-dev)
 [ ! -x "$build/bin/voxeld-engine-cuda" ] || packages+=(voxeld-cuda)
 diff <(printf "%s_${version}_$architecture.deb\n" "${packages[@]}" | LC_ALL=C sort) <(cd "$work/made" && ls *.deb | LC_ALL=C sort) ||
   fail "other packages were made (>)"
-root=$work/root  # of voxeld, which the others are looked at beside
+root=$work/root  # of voxeld, beside which the others are checked
 for package in "${packages[@]}"; do
   mkdir -p "$work/$package"
   dpkg-deb -x "$work/made/${package}_${version}_$architecture.deb" "$work/$package"
@@ -176,7 +176,7 @@ for program in "${programs[@]}"; do
   package=${program#"$work"/}
   package=${package%%/*}
   depends=$(field "$package" Depends | tr ',' '\n' | awk '{ print $1 }')
-  # e2e.hardening looks at the programs as they are built; these are what stripping must leave.
+  # e2e.hardening checks the programs as they are built; these defences must survive stripping.
   readelf -lW "$program" | grep -q GNU_RELRO && readelf -dW "$program" | grep -q BIND_NOW || fail "$program has lost RELRO or BIND_NOW"
   if readelf -lW "$program" | grep GNU_STACK | grep -q RWE; then fail "$program has an executable stack"; fi
   if readelf -d "$program" | grep -E 'RPATH|RUNPATH'; then fail "$program has a path of its own to libraries"; fi
@@ -187,7 +187,7 @@ for program in "${programs[@]}"; do
     file=$(realpath "$path")
     owner=$(dpkg-query -S "$file" 2>/dev/null || dpkg-query -S "${file#/usr}") || fail "$file is of no package"
     owner=${owner%%:*}
-    # A package may be depended on by a name that it provides.
+    # A package may depend on a name that another one provides.
     names=$(dpkg-query -W -f '${Package}\n${Provides}\n' "$owner" | tr ',' '\n' | awk '{ print $1 }')
     grep -qxF "$names" <<<"$depends" || fail "$program needs $name of $owner, which is not among:" $depends
   done
@@ -195,7 +195,7 @@ done
 for package in "${packages[@]}"; do
   depends=$(field "$package" Depends | tr ',' '\n' | awk '{ print $1 }')
   if [ "$package" != libvoxeld-dev ] && grep -e '-dev$' <<<"$depends"; then fail "$package depends on what only building needs"; fi
-  # The GPU's driver comes from elsewhere, and ROS is not part of any package.
+  # The GPU's driver has another source, and ROS is not part of any package.
   if grep -iE 'cuda|nvidia|nccl|^libros|^ros-' <<<"$depends"; then fail "$package depends on CUDA or ROS"; fi
 done
 grep -qx libabsl-dev <<<"$(field libvoxeld-dev Depends | tr ',' '\n' | awk '{ print $1 }')" || fail "libvoxeld-dev: $(field libvoxeld-dev Depends)"
@@ -205,7 +205,7 @@ for package in voxeld-cuda voxeld-import; do
 done
 if readelf -d "$work/voxeld/usr/bin/voxelctl" | grep -E 'NEEDED.*(assimp|gdcm|gdal|ITK|rsvg)'; then fail "voxelctl is linked with a library that reads files"; fi
 
-# ---- voxeld and its engine's program, from where they lie
+# ---- voxeld and its engine's program, run in place
 unset LD_LIBRARY_PATH VOXELD_SERVER XDG_CONFIG_HOME
 export HOME=$work
 voxeld=$root/usr/bin/voxeld
@@ -220,7 +220,7 @@ daemon=$!
 for _ in $(seq 600); do
   grep -q ' ready ' "$work/log" && break
   kill -0 "$daemon" 2>/dev/null || { cat "$work/log" >&2; fail "voxeld ended"; }
-  sleep 0.1 # its log is how it says that it listens
+  sleep 0.1 # polled: its log shows when it listens
 done
 cat "$work/log"
 "$voxelctl" --json pattern white >/dev/null
@@ -230,14 +230,15 @@ python3 -c 'import json, sys; d = json.load(open(sys.argv[1])); assert d["displa
 kill -TERM "$daemon"
 wait "$daemon" || fail "voxeld did not end in peace"
 daemon=
-# An engine's program that is found answers, if only that there is no GPU for it; one that is not is named.
+# If the engine's program is found, it answers, if only that there is no GPU; if not, the message names it.
 grep -q ' display name=stack ' "$work/log" || fail "no line of the display"
 if grep 'cannot be started' "$work/log"; then fail "voxeld does not find its engine's program"; fi
 mv "$root/usr/libexec/voxeld/voxeld-engine" "$work/engine"
 if "$voxeld" --engine cuda --listen "$VOXELD_SERVER" --http off 2>"$work/log"; then fail "an engine without its program"; fi
 grep -qF "$root/usr/libexec/voxeld/voxeld-engine cannot be started" "$work/log" || fail "looked elsewhere: $(cat "$work/log")"
 mv "$work/engine" "$root/usr/libexec/voxeld/voxeld-engine"
-# The CUDA engine is preferred, once its package is there: the daemon starts with it where there is a GPU, and says what it lacks elsewhere.
+# The CUDA engine is preferred once its package is installed: the daemon starts with it where there is a GPU, and elsewhere reports what is
+# missing.
 if [ -d "$work/voxeld-cuda" ]; then
   cp -a "$work/voxeld-cuda/." "$root/"
   mv "$root/usr/libexec/voxeld/voxeld-engine-cuda" "$work/engine"
@@ -316,14 +317,14 @@ else
   echo "left out: udevadm verify (comes with systemd 254)"
 fi
 
-# ---- systemd: nothing to say about the unit, a user that is in the GPU's group
+# ---- systemd: no complaints about the unit, and a user in the GPU's group
 mkdir "$root/etc"
 systemd-sysusers --root="$root" voxeld.conf 2>/dev/null
 grep -q '^voxeld:.*:/usr/sbin/nologin$' "$root/etc/passwd" || fail "no user voxeld: $(cat "$root/etc/passwd")"
 grep -q '^video:.*:voxeld$' "$root/etc/group" || fail "not in video: $(cat "$root/etc/group")"
-cp -an /usr/lib/systemd/system/. "$root/usr/lib/systemd/system/" # the targets that every unit has around it
+cp -an /usr/lib/systemd/system/. "$root/usr/lib/systemd/system/" # the standard targets around every unit
 mkdir -p "$root/bin"
-cp /bin/kill "$root/bin/" # of a package that it depends on
+cp /bin/kill "$root/bin/" # from a package on which it depends
 said=$(systemd-analyze verify --root="$root" voxeld.service voxeld.socket voxeld-playlist.service voxeld-engine.socket \
         voxeld-engine@0.service 2>&1) || fail "systemd-analyze verify: $said"
 [ -z "$said" ] || fail "systemd-analyze verify: $said"
@@ -337,7 +338,7 @@ systemd-analyze security --offline=true --root="$root" --threshold=6 voxeld-engi
   fail "exposed: $(cat "$work/security")"
 tail -n 1 "$work/security"
 
-# ---- maintainer scripts: on a machine with everything, where commands fail, and with nothing
+# ---- maintainer scripts: on a machine with everything, with failing commands, and with nothing
 commands=$work/commands
 control=$work/voxeld.control
 run() { env -i PATH="$commands" CALLS="$work/calls" /bin/sh -e "$control/$1" "${@:2}" >"$work/said" 2>&1; }
@@ -387,7 +388,7 @@ EOT
 calls 1 systemd-sysusers
 if run postinst configure; then fail "no user, and not a word"; fi
 
-# ---- those of voxeld-cuda, from the tree: they are the same in every build
+# ---- maintainer scripts of voxeld-cuda, from the tree: they are the same in every build
 control=$(dirname "$0")/../../packaging/cuda
 calls 0 systemctl
 run postinst configure && run postinst abort-upgrade 9 && run postrm upgrade 9 && run postrm remove || fail "voxeld-cuda: $(cat "$work/said")"

@@ -1,4 +1,4 @@
-"""What voxelctl makes of what real displays show: turntables and files for other programs. Paths are in VOXELD and VOXELCTL."""
+"""Tests voxelctl's pictures of real displays: turntables, and files for other programs. Paths are in VOXELD and VOXELCTL."""
 import json
 import signal
 import subprocess
@@ -78,7 +78,8 @@ class Pictures(unittest.TestCase):
         until(lambda: list(self.daemon.folder.glob("a.gif.*.tmp")), "the picture's beginning")
         process.send_signal(signal.SIGINT)
         self.assertEqual(process.wait(LONG), 130)
-        self.assertRegex(process.stderr.read(), r"\A(drawing 10000 pictures …\n)?voxelctl: interrupted\n\Z")  # said as soon as it begins
+        # reported as soon as it begins
+        self.assertRegex(process.stderr.read(), r"\A(drawing 10000 pictures …\n)?voxelctl: interrupted\n\Z")
         self.assertEqual(list(self.daemon.folder.glob("a.gif*")), [])
 
 

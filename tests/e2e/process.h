@@ -1,4 +1,5 @@
-// A child process with its output, for tests: what cannot be started or does not end is a failure.
+// A child process with its output, for tests: a child that cannot be started or does not exit is a
+// test failure.
 #pragma once
 
 #include <sys/types.h>
@@ -20,27 +21,28 @@ inline constexpr std::chrono::seconds kPatience{60};
 // Bound to one thread. A child that still runs is killed on destruction.
 class Process {
  public:
-  // `environment` goes over the test's own.
+  // `environment` overrides the test's own.
   Process(const std::vector<std::string>& arguments,
           const std::map<std::string, std::string>& environment = {});
 
   pid_t pid() const { return child_->pid(); }
   void Signal(int signal) { child_->Signal(signal); }
 
-  // The next line of its standard output or error, without the newline; nothing at the end, or when
-  // patience has run out.
+  // Returns the next line of its standard output or error, without the newline; nullopt at the end,
+  // or after a timeout.
   std::optional<std::string> ReadLine() { return child_->ReadLine(); }
-  // The first further line that has `text` in it.
+  // Returns the first further line that contains `text`.
   std::optional<std::string> ReadLineWith(const std::string& text) {
     return child_->ReadLineWith(text);
   }
 
-  // Waits for its end. The exit code, or −signal; nothing if it did not end in `limit`.
+  // Waits for its exit. Returns the exit code, or −signal; nullopt if it did not exit within
+  // `limit`.
   std::optional<int> Wait(std::chrono::milliseconds limit = kPatience) {
     return child_->Wait(limit);
   }
 
-  // All that it has said so far (after Wait: all).
+  // Returns its output so far (after Wait: all of it).
   const std::string& output() const { return child_->output(); }
 
  private:
@@ -52,7 +54,7 @@ struct Ended {
   std::string output;
 };
 
-// Runs to the end.
+// Runs a program until it exits.
 Ended RunToEnd(const std::vector<std::string>& arguments,
                const std::map<std::string, std::string>& environment = {});
 

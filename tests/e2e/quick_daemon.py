@@ -10,7 +10,7 @@ VOXELCTL = os.environ["VOXELCTL"]
 
 
 class QuickDaemon:
-    """Ready when it has been made: two displays, `stack` and `rotor`."""
+    """The daemon is ready when the constructor returns. It has two displays, `stack` and `rotor`."""
 
     def __init__(self) -> None:
         self._folder = tempfile.TemporaryDirectory()

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The wheel, the page and a library of the working tree, built twice in other folders: the same bytes. tools/reproduce does so of all that is
-# installed, which takes as long as two builds.
+# Builds the wheel, the page and a library of the working tree twice, in different folders, and checks that the bytes are the same.
+# tools/reproduce does that for everything that is installed, which takes as long as two builds.
 # usage: reproducible_test.sh SOURCE
 set -euo pipefail
 source=$1
@@ -11,7 +11,7 @@ fail() {
   exit 1
 }
 
-# A clone whose newest commit is the tree as it is here, committed or not.
+# A clone whose newest commit is the working tree, committed or not.
 git clone -q --no-local --no-tags --depth 1 "file://$source" "$work/clone"
 (cd "$source" && git ls-files -z --cached --others --exclude-standard | while IFS= read -r -d '' file; do [ ! -f "$file" ] || printf '%s\0' "$file"; done |
   tar -cf - --null -T -) | tar -C "$work/clone" -xf -
@@ -25,7 +25,7 @@ for file in python/voxeld-*.whl daemon/usage/libvoxeld_usage.a; do
   ls "$work"/built/a/out/$file >/dev/null || fail "nothing like $file was compared"
 done
 
-# What differs is found: a module that has the folder's name in it.
+# Checks that a difference is found: a module that contains the folder's name.
 echo 'file(WRITE ${stage}/voxeld/where.py "WHERE = \"${CMAKE_BINARY_DIR}\"\n")' >>client/python/CMakeLists.txt
 git -c user.name=test -c user.email=test@voxeld.invalid commit -q -a -m "a name"
 if tools/reproduce --preset test --jobs 1 --work "$work/built" python_client >"$work/said"; then fail "a name in the wheel was not seen: $(cat "$work/said")"; fi

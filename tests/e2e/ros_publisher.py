@@ -1,6 +1,8 @@
-"""A ROS node that publishes what lines of JSON say, and answers each with a line: when its topic has a subscriber and it is published.
-Lines: {"topic", "type": "MarkerArray" or "Marker", "message": fields}, {"topic", "type", "bytes": base64 of a message} or
-{"topic", "advertise": type}, which does not wait. The environment has ROS_MASTER_URI."""
+"""A ROS node that publishes the contents of JSON lines, and answers each with a line once its topic has a subscriber and it is published.
+Lines:
+{"topic", "type": "MarkerArray" or "Marker", "message": fields}, {"topic", "type", "bytes": base64 of a message} or {"topic", "advertise":
+type}, which
+does not wait. The environment has ROS_MASTER_URI."""
 import base64
 import json
 import sys
@@ -25,7 +27,7 @@ class Listener(rospy.SubscribeListener):  # type: ignore[misc]
 
 
 def raw(kind: Any) -> Any:
-    """Messages whose bytes are as they are given."""
+    """Returns messages with exactly the given bytes."""
 
     class Raw(kind):  # type: ignore[misc]
         def __init__(self, data: bytes) -> None:

@@ -1,4 +1,4 @@
-"""voxeld-ros with a ROS master and a publisher of ROS's own. Paths are in VOXELD, VOXELCTL and VOXELD_ROS."""
+"""Tests voxeld-ros with a ROS master and a publisher of ROS itself. Paths are in VOXELD, VOXELCTL and VOXELD_ROS."""
 import base64
 import json
 import os
@@ -105,7 +105,7 @@ class Ros(unittest.TestCase):
             self.assertLess(time.monotonic(), deadline, [entity.key.id for entity in v.entities()])
 
     def shown(self, v: voxel.Connection) -> Any:
-        """With all that the daemon has taken until now."""
+        """Returns what is shown, including everything that the daemon has received so far."""
         accepted = v.commit().wait(LONG).accepted
         assert accepted is not None
         return v.capture(at_least_snapshot=accepted.snapshot, timeout=LONG).rgb.copy()
@@ -131,7 +131,7 @@ class Ros(unittest.TestCase):
             self.assertEqual({entity.key.layer for entity in v.entities()}, {"robot"})
             theirs = self.shown(v)
             tally = self.last(process)
-            self.await_ids(v)  # they were its own
+            self.await_ids(v)  # the entities belonged to the process
             positions = np.array([[p["x"], p["y"], p["z"]] for p in corners], np.float32)
             mine = v.layer("mine")
             mine.box("a1", size=0.4, center=(-0.5, 0, 0), color=(255, 0, 0))
@@ -148,7 +148,7 @@ class Ros(unittest.TestCase):
         self.start_master()
         self.start_robot()
         process = self.follow()
-        # Where a cube's faces lie in the voxels that are its outermost as a solid, so that triangles are no others.
+        # Where a cube's faces are in the outermost voxels of the solid cube, so that triangles cover no other voxels.
         two = [xyz(-0.5, -0.5, 0), xyz(0.5, 0.5, 0.25)]
         with voxel.connect(self.socket, timeout=LONG, autocommit=False) as v:
             self.publish("/all", *[marker("t", kind, kind, size=0.3, text="A", mesh_resource="package://a.dae",
@@ -204,7 +204,7 @@ class Ros(unittest.TestCase):
                          marker("b", 5, pose={"position": xyz(0, 0, 0), "orientation": {"x": 3, "y": 0, "z": 0, "w": 0}}),
                          marker("b", 6))
             self.await_ids(v, "/bad a/2#0", "/bad b/6#0")
-            # One marker is promised, and not there; more than there could be; and none that is too much.
+            # All three are malformed: one promises a marker that is missing, one an impossible number, and one is empty.
             for data in (b"\x01\0\0\0", b"\xff\xff\xff\xff", b""):
                 self.tell(topic="/bad", type="MarkerArray", bytes=base64.b64encode(data).decode())
             self.publish("/bad", marker("", 0, action=DELETEALL), marker("good", 1))
@@ -249,7 +249,7 @@ class Ros(unittest.TestCase):
             self.start_robot()
             self.publish("/plan", marker("a", 2))
             self.await_ids(v, "/plan a/1#0", "/plan a/2#0")
-            # A silent one does not hold up the end.
+            # A master that does not answer does not delay the exit.
             master.send_signal(signal.SIGSTOP)
             process.send_signal(signal.SIGTERM)
             process.communicate(timeout=LONG)

@@ -1,6 +1,6 @@
-"""The list of what voxeld is made of is one, by SPDX's own rules, and has what the loader finds; the notices have what is inside.
+"""Checks that the list of voxeld's components is valid by SPDX's own rules, and has what the loader finds; and that the notices cover what is included.
 
-SBOM is the folder of both, PROGRAMS those that are installed, joined by colons; PAGE is empty where the daemon has no page.
+SBOM is the folder of both, PROGRAMS has the installed programs, joined by colons; PAGE is empty if the daemon has no page.
 """
 import json
 import os
@@ -27,7 +27,7 @@ EXCEPTIONS = {"GCC-exception-3.1", "LLVM-exception", "Linux-syscall-note"}
 
 
 def faults(document):
-    """What SPDX 2.3 asks for and the document has not, as far as it can be said without its schema."""
+    """Returns the requirements of SPDX 2.3 that the document does not meet, as far as they can be checked without its schema."""
     wrong = []
 
     def want(right, what):
@@ -101,7 +101,7 @@ class Sbom(unittest.TestCase):
         libraries = {os.path.realpath(path) for program in PROGRAMS
                      for path in re.findall(r"(?:=> )?(/\S+) \(0x", subprocess.run(["ldd", program], capture_output=True, text=True, check=True).stdout)}
         self.assertGreater(len(libraries), 50)
-        # dpkg itself is asked, which knows some files under /lib.
+        # dpkg itself is asked, since it lists some files under /lib.
         asked = sorted(libraries | {path.removeprefix("/usr") for path in libraries})
         said = subprocess.run(["dpkg-query", "-S", *asked], capture_output=True, text=True).stdout
         owners = {path.removeprefix("/usr"): package.split(":")[0] for package, path in re.findall(r"^(\S+): (/\S+)$", said, re.M)}
@@ -126,7 +126,7 @@ class Sbom(unittest.TestCase):
 
     def test_every_licence_is_named(self) -> None:
         for name, package in self.packages.items():
-            # Of some packages neither a paragraph for all files nor our own reading is there: then all that occur are named.
+            # Some packages have neither a paragraph for all files nor a conclusion of our own: then all licences that occur are named.
             if package["licenseDeclared"] == package["licenseConcluded"] == "NOASSERTION":
                 self.assertRegex(package.get("licenseComments", "") + package.get("comment", ""), "Licences named in|is prose|not brought along", name)
 
@@ -139,7 +139,7 @@ class Sbom(unittest.TestCase):
             self.assertEqual(package["checksums"][0]["algorithm"], "SHA512")
             self.assertIn(f"{name} {package['versionInfo']} (npm)", notices)
         if os.environ["PAGE"]:
-            self.assertIn("Leon Sorokin", notices)  # uPlot's, whose notice is not in the page itself
+            self.assertIn("Leon Sorokin", notices)  # uPlot's author; its notice is not in the page itself
             self.assertRegex(notices, r"three\.js authors|Three\.js Authors")
 
     def test_notices_have_what_headers_bring(self) -> None:
@@ -149,7 +149,7 @@ class Sbom(unittest.TestCase):
 
 
 class Parts(unittest.TestCase):
-    """The scripts that it is made by, where what they read is known."""
+    """Tests the scripts that make the list, with known input."""
 
     def test_copyright_files(self) -> None:
         import debian

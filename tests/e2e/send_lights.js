@@ -1,5 +1,5 @@
-// Sends lights as programs do that others wrote: E1.31 by npm's sacn, Art-Net by npm's artnet. A line on standard input is
-// [universe, [value, …]], from the first channel on.
+// Sends lights as third-party programs do: E1.31 by npm's sacn, Art-Net by npm's artnet. A line on
+// standard input is [universe, [value, …]], from the first channel on.
 // usage: send_lights.js NODE_MODULES e131|artnet PORT
 const readline = require('readline');
 const [modules, protocol, port] = process.argv.slice(2);

@@ -1,5 +1,6 @@
-"""voxeld as systemd runs it, and what a long-running one goes through: engines that somebody else starts, assets that outlive it,
-a configuration that changes. Paths are in VOXELD and VOXELCTL."""
+"""Tests voxeld as systemd runs it, and events in the life of a long-running daemon: engines that another process starts, assets that
+outlive it, a
+configuration that changes. Paths are in VOXELD and VOXELCTL."""
 import contextlib
 import hashlib
 import json
@@ -45,10 +46,10 @@ class Service(unittest.TestCase):
         return v.capture(at_least_snapshot=accepted.snapshot, timeout=LONG)
 
     def engines(self, manager: int) -> list[int]:
-        """Processes that the manager of the socket has started."""
+        """Returns the processes that the manager of the socket has started."""
         found = []
         for child in Path(f"/proc/{manager}/task/{manager}/children").read_text(encoding="ascii").split():
-            with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # it has ended meanwhile
+            with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # it has exited in the meantime
                 if "voxeld-engine" in Path(f"/proc/{child}/comm").read_text(encoding="ascii"):
                     found.append(int(child))
         return found

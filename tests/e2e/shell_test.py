@@ -1,4 +1,4 @@
-"""What a shell and a reader of manuals have of the programs: completions, by bash itself, and manual pages."""
+"""Tests how the programs appear in a shell and in manuals: completions, by bash itself, and manual pages."""
 import os
 import re
 import select
@@ -36,7 +36,7 @@ class Completions(unittest.TestCase):
         assert made.returncode == 0, made.stderr
 
     def complete(self, line: str, program: str = VOXELCTL, **environment: str) -> list[str]:
-        """What bash would put in place of the last word, or of its part behind a colon or an equals sign."""
+        """Returns what bash would substitute for the last word, or for its part after a colon or an equals sign."""
         made = subprocess.run(["bash", "-c", COMPLETE, "bash", str(self.script), program, line], cwd=self.daemon.folder,
                               env={**self.daemon.environment, **environment}, capture_output=True, text=True, timeout=LONG)
         self.assertEqual((made.returncode, made.stderr), (0, ""))

@@ -1,4 +1,4 @@
-// The real binary: command line, configuration, start, stop.
+// Tests the real binary: command line, configuration, start, stop.
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 #include <signal.h>
@@ -113,7 +113,7 @@ TEST(Start, BusyAddressesAreErrors) {
 }
 
 TEST(Start, ABusyDefaultHttpPortIsAWarning) {
-  // Whoever comes first has it; the other warns.
+  // The first daemon gets the port; the other one warns.
   const Folder folder;
   const auto start = [&](const std::string& name) {
     return Voxeld(
@@ -148,7 +148,7 @@ TEST(Http, HealthAndMetricsOfTheRunningDaemon) {
     metrics = HttpGet(daemon.http(), "/metrics");
   } while (metrics.find(kShowing) == std::string::npos &&
            std::chrono::steady_clock::now() < deadline);
-  // On a machine that is busy the daemon may not have run for a second, of which it tells.
+  // On a busy machine the daemon may not have run for a second, which it reports.
   EXPECT_THAT(HttpGet(daemon.http(), "/healthz"),
               AnyOf(HasSubstr("{\"status\":\"ok\",\"reasons\":[]}"),
                     ContainsRegex("degraded.*\"reasons\":\\[\\{\"what\":\"time\",[^{]*\\]")));
@@ -161,7 +161,7 @@ TEST(Full, AFurtherClientIsToldSoAtOnce) {
   const Folder folder;
   Daemon daemon(
       {"--config", folder.File("full.toml", "[server]\nmax_connections_per_address = 2\n")});
-  // Each with a connection of its own.
+  // Each client has a connection of its own.
   const auto channel = [&] {
     grpc::ChannelArguments arguments;
     arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
@@ -193,7 +193,7 @@ TEST_P(Stop, WithClientsConnectedEndsInTimeAndWell) {
   busy.Send(SphereIn("layer", "ball"));
   busy.Commit(1);
   busy.ReadOutcomes(1);
-  // One that never reads what it is told.
+  // A client that never reads.
   Client deaf(*scene);
   deaf.Open();
   for (int i = 0; i < 200; ++i) deaf.Commit(i);
@@ -229,7 +229,8 @@ INSTANTIATE_TEST_SUITE_P(Signal, Stop, ::testing::Values(SIGTERM, SIGINT), [](co
   return std::string(info.param == SIGTERM ? "SIGTERM" : "SIGINT");
 });
 
-// A commit that takes minutes to apply: each of its last operations looks at every instance.
+// Returns a commit that takes minutes to apply: each of its last operations examines every
+// instance.
 v1::ApplyUpdateRequest LongCommit() {
   v1::ApplyUpdateRequest request;
   const v1::Entity ball = SphereIn("", "").upsert().entity();
@@ -279,11 +280,11 @@ void PutHeavyScene(Client& client) {
   while (client.answers.empty()) ASSERT_TRUE(client.Read().has_value());
 }
 
-// The commit of LongCommit under way in a call of its own. Destroy after the daemon has ended.
+// Makes the commit of LongCommit in a call of its own. Destroy it after the daemon has exited.
 class LongCall {
  public:
   explicit LongCall(v1::SceneService::Stub& scene) : request_(LongCommit()) {
-    grpc::ClientContext small;  // a first call over TCP may not be large
+    grpc::ClientContext small;  // a first call over TCP must not be large
     SetDeadline(small);
     v1::ListEntitiesResponse nothing;
     EXPECT_TRUE(scene.ListEntities(&small, {}, &nothing).ok());
@@ -314,7 +315,7 @@ TEST(Stop, WithALongCommitUnderWayEndsInTimeAndWell) {
   Daemon daemon;
   const auto scene = v1::SceneService::NewStub(Channel(daemon.tcp_target()));
   LongCall call(*scene);
-  // Others are answered meanwhile.
+  // Other clients are answered in the meantime.
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(2);
   while (std::chrono::steady_clock::now() < until) {
     grpc::ClientContext list;
@@ -336,7 +337,7 @@ TEST(Stop, WithAHeavySceneBeingDrawnEndsInTimeAndWell) {
   ExpectEndsWell(daemon);
 }
 
-// VOXELD_STOPS: how often under each load.
+// VOXELD_STOPS: how often it is stopped under each load.
 class StopUnderLoad : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(StopUnderLoad, EndsInTimeAndWell) {
@@ -346,7 +347,7 @@ TEST_P(StopUnderLoad, EndsInTimeAndWell) {
     Daemon daemon;
     const auto scene = v1::SceneService::NewStub(Channel(daemon.unix_target()));
     std::atomic<bool> ended = false;
-    std::atomic<uint64_t> work = 0;  // done by the load
+    std::atomic<uint64_t> work = 0;  // counts the work done by the load
     std::atomic<uint64_t> opened = 0;
     uint64_t streams = 0;
     std::vector<std::thread> load;
@@ -389,20 +390,20 @@ TEST_P(StopUnderLoad, EndsInTimeAndWell) {
       });
     } else if (GetParam() == "Http") {
       load.emplace_back([&] {
-        // Once it has ended there is no answer.
+        // After it has exited, it gives no answer.
         while (!ended && HttpGetIfThere(daemon.http(), "/metrics").starts_with("HTTP/1.1 200 "))
           ++work;
       });
     }
     for (uint64_t k = 0; k < streams; ++k) load.emplace_back(commit_on);
-    // The signal must not come while a stream is being opened.
+    // The signal must not arrive while a stream is being opened.
     while (opened < streams) std::this_thread::yield();
-    // At another moment of the load each time.
+    // At a different moment of the load each time.
     while (!load.empty() && work < 20 + 37 * static_cast<uint64_t>(i)) std::this_thread::yield();
     ExpectEndsWell(daemon);
     ended = true;
     for (std::thread& thread : load) thread.join();
-    // A call of which not all has been received is cancelled.
+    // A call of which a part has not been received is cancelled.
     if (call != nullptr) EXPECT_FALSE(call->Wait().ok());
   }
 }

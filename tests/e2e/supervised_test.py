@@ -1,4 +1,4 @@
-"""voxeld as a supervisor starts it."""
+"""Tests voxeld started by a supervisor."""
 
 import contextlib
 import os
@@ -14,7 +14,7 @@ from operate_test import DISPLAY, KILLS, LONG, voxelctl
 
 
 class Supervised(unittest.TestCase):
-    """As under systemd: it has made the sockets, is told, and watches."""
+    """A supervisor like systemd: it has made the sockets, receives notifications, and runs a watchdog."""
 
     def setUp(self) -> None:
         self.folder = tempfile.TemporaryDirectory()
@@ -29,7 +29,7 @@ class Supervised(unittest.TestCase):
         self.notify.bind(f"{self.folder.name}/notify")
         self.notify.settimeout(LONG)
         self.config = Path(self.folder.name, "voxeld.toml")
-        # The address is the socket's own: it is not asked for again.
+        # The address is that of the inherited socket: it is not bound again.
         self.config.write_text(f'[server]\nlisten = ["unix:{self.path}"]\nhttp = "off"\n{DISPLAY}')
 
     def start(self) -> "subprocess.Popen[bytes]":
@@ -55,7 +55,7 @@ class Supervised(unittest.TestCase):
         self.assertEqual(self.hear("READY=1"), "READY=1\nSTATUS=1 display")
         for _ in range(3):
             self.hear("WATCHDOG=1")
-        daemon.send_signal(signal.SIGSTOP)  # hangs
+        daemon.send_signal(signal.SIGSTOP)  # simulates a hang
         time.sleep(0.3)
         self.notify.setblocking(False)
         with contextlib.suppress(BlockingIOError):

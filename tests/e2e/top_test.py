@@ -1,4 +1,4 @@
-"""voxelctl top on a pseudo-terminal: what is to be seen, its keys, and that the terminal is as it was whatever ends it."""
+"""Tests voxelctl top on a pseudo-terminal: what it shows, its keys, and that the terminal is restored however it ends."""
 import fcntl
 import json
 import os
@@ -16,7 +16,7 @@ from quick_daemon import LONG, VOXELCTL, QuickDaemon
 
 
 class Screen:
-    """What a VT100 would show of bytes that curses sends to one."""
+    """Renders what a VT100 would show of the bytes that curses sends."""
 
     def __init__(self, rows: int, columns: int) -> None:
         self.resize(rows, columns)
@@ -170,7 +170,7 @@ class TopTest(unittest.TestCase):
         top.press(b"\t")
         text = top.until(lambda text: ">rotor" in text)
         self.assertIn("LATENCY of rotor", text)
-        top.press(b"\x1bOA")  # up, as a keypad in its mode sends it
+        top.press(b"\x1bOA")  # up, as sent by a keypad in its mode
         top.until(lambda text: ">stack" in text)
 
         top.press(b"p")

@@ -123,7 +123,7 @@ class TracedImports(unittest.TestCase):
             Path(folder, "a.stl").write_text("solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n")
             played = cls.daemon.voxelctl("play", "--other-files", "none", f"{folder}/a.stl")
         if "Landlock" in played.stderr:
-            # Nothing would be read, so nothing would be checked.
+            # Nothing would be read, so nothing would be tested.
             raise unittest.SkipTest(played.stderr)
         assert played.returncode == 0, played.stderr
 

@@ -1,5 +1,5 @@
-// Two clients on two layers; one is killed. What becomes of its layer is what it chose; the other's
-// is untouched, and every commit has its answer and its outcome.
+// Tests two clients on two layers, one of which is killed. Its layer is treated according to its
+// policy; the other's layer is unaffected, and every commit has its answer and its outcome.
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 #include <signal.h>
@@ -53,8 +53,8 @@ class TwoClients : public ::testing::Test {
     return AwaitStats(*displays_, right).value_or(v1::Stats());
   }
 
-  // Starts the other client, lets both commit, kills it, goes on committing; then checks all that
-  // must hold whatever the policy was.
+  // Starts the other client, lets both commit, kills it, and keeps committing; then checks what
+  // must hold with every policy.
   void KillTheOther(const std::string& policy, int64_t linger_ns) {
     Process victim({ProgramBeside("e2e_client"), daemon_.unix_target(), "theirs", policy,
                     std::to_string(linger_ns)});
@@ -104,7 +104,7 @@ class TwoClients : public ::testing::Test {
   std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<v1::SceneService::Stub> scene_;
   std::unique_ptr<v1::DisplayService::Stub> displays_;
-  Scene at_once_;  // after the kill, with this test's client still there
+  Scene at_once_;  // after the kill, while this test's client is still connected
 };
 
 TEST_F(TwoClients, OneIsKilledAndItsLayerIsCleared) {

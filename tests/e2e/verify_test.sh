@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The real voxelctl over the emulated device: what it writes is read back by Python's parsers, and its exit codes.
+# Tests the real voxelctl with the emulated device: its output is parsed by Python, and its exit codes are checked.
 # usage: verify_test.sh VOXELCTL
 set -euo pipefail
 voxelctl=$1
@@ -7,7 +7,7 @@ voxelctl=$1
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# code WANT COMMAND…: runs it and compares how it ended.
+# code WANT COMMAND…: runs a command and compares its exit code.
 code() {
   local want=$1 got=0
   shift
@@ -19,7 +19,7 @@ code 0 "$voxelctl" verify lab=simulated,size=16x12x10,serial='<A&1>' --json --se
 mv "$work/out" "$work/all.json"
 code 0 "$voxelctl" verify simulated,size=8x8x4 --list --json
 mv "$work/out" "$work/list.json"
-# A fault on the cable is found, and told with what was expected.
+# A fault on the cable is found, and reported with what was expected.
 code 1 "$voxelctl" verify simulated,size=8x8x4,faults=stall@t1 --filter 'volume.whole' --json --junit "$work/bad.xml"
 mv "$work/out" "$work/bad.json"
 grep -q '1 failed' "$work/err"
@@ -72,7 +72,7 @@ grep -q '/nowhere/verify.xml cannot be written' "$work/err"
 code 3 "$voxelctl" verify voxlink,serial=nobody-has-this-one
 grep -q 'nobody-has-this-one' "$work/err"
 
-# Interrupted: it says so, and soon.
+# When interrupted, it reports that, and exits soon.
 "$voxelctl" verify simulated >"$work/out" 2>"$work/err" &
 run=$!
 until grep -q passed "$work/out"; do kill -0 "$run"; sleep 0.05; done

@@ -10,7 +10,7 @@
 
 namespace voxeld::e2e {
 
-// A folder that is removed with all that is in it.
+// A folder that is removed with all its contents.
 class Folder {
  public:
   Folder();
@@ -22,16 +22,16 @@ class Folder {
   std::string path_;
 };
 
-// Nothing of the machine's own configuration is seen.
+// Returns an environment in which the machine's own configuration is not found.
 std::map<std::string, std::string> CleanEnvironment(const Folder& folder);
 
-// The program.
+// Returns the path of the program.
 std::string VoxeldBinary();
-// It and these.
+// Returns the program with these arguments.
 std::vector<std::string> Voxeld(std::vector<std::string> arguments);
 
-// A running daemon that listens on a unix socket, on a port and on an http port of the system's
-// choice, with a small quick display named "sim".
+// A running daemon that listens on a Unix socket, and on a port and an http port chosen by the
+// system, with a small, quick display named "sim".
 class Daemon {
  public:
   explicit Daemon(const std::vector<std::string>& more = {});

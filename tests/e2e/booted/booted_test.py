@@ -1,5 +1,6 @@
-"""The daemon as its package installs it, under systemd itself: what kills it or stops it, and how long clients wait then.
-Runs in the container that `run` boots, as root. Each test prints what it measured."""
+"""The daemon as installed by its package, under systemd itself: what kills or stops it, and how long clients wait then. Runs as root in the
+container
+that `run` boots. Each test prints what it measured."""
 import os
 import re
 import signal
@@ -15,7 +16,7 @@ import voxeld as voxel
 from polling import LONG, until
 
 SERVER = "unix:/run/voxeld/voxeld.sock"
-WATCHDOG = 3.0  # seconds, here; the unit has 30
+WATCHDOG = 3.0  # seconds in this test; the unit has 30
 STOPS = 10.0  # its TimeoutStopSec
 CONFIG = ('[[display]]\nname = "sim"\ndriver = "simulated"\nsize = "16x16x12"\nrate = 60\n'
           '[[display]]\nname = "other"\ndriver = "simulated"\nsize = "8x8x8"\nrate = 60\n')
@@ -52,7 +53,7 @@ class Booted(unittest.TestCase):
         v.close(LONG)
 
     def back(self, began: float, most: float, what: str) -> None:
-        """A client that asks at once is served, by another process, and what was durable is shown."""
+        """Checks that a client that calls at once is served, by another process, and that what was durable is shown."""
         with voxel.connect(SERVER, timeout=LONG) as v:
             names = [entity.key.id for entity in v.entities(timeout=LONG)]
             served = time.monotonic() - began
@@ -67,7 +68,7 @@ class Booted(unittest.TestCase):
         for number in (signal.SIGKILL, signal.SIGSEGV):
             began = time.monotonic()
             os.kill(self.pid, number)
-            self.back(began, 5, signal.Signals(number).name)  # RestartSec=1, and the start
+            self.back(began, 5, signal.Signals(number).name)  # RestartSec=1, and the time to start
             self.pid, self.restarts = int(shows("MainPID")), int(shows("NRestarts"))
 
     def play_confined(self, without: str) -> "tuple[str, str]":
@@ -93,10 +94,10 @@ class Booted(unittest.TestCase):
     def test_files_of_strangers_are_read_in_the_units_confinement(self) -> None:
         result, output = self.play_confined(without="^$")
         if "Landlock" in output:
-            self.skipTest(output)  # this kernel has none
+            self.skipTest(output)  # this kernel does not support it
         self.assertEqual(result, "success", output)
         self.assertIn("1 presented", output)
-        # Where the unit forbids Landlock's calls they are refused, with the reason.
+        # Where the unit forbids Landlock's calls, files are refused, with the reason.
         result, output = self.play_confined(without="landlock")
         self.assertEqual(result, "exit-code", output)
         self.assertIn("Landlock", output)
@@ -109,7 +110,7 @@ class Booted(unittest.TestCase):
 
     def test_stopped_for_less(self) -> None:
         os.kill(self.pid, signal.SIGSTOP)
-        time.sleep(WATCHDOG / 3)  # so long it is stopped
+        time.sleep(WATCHDOG / 3)  # it stays stopped for that long
         os.kill(self.pid, signal.SIGCONT)
         with voxel.connect(SERVER, timeout=LONG) as v:
             v.sphere("ball", radius=0.3, color="green")
@@ -124,7 +125,7 @@ class Booted(unittest.TestCase):
         systemctl("stop", "voxeld.service")
         print(f"stopped in {time.monotonic() - began:.2f} s", flush=True)
         self.assertEqual((shows("Result"), shows("ExecMainStatus")), ("success", "0"))
-        # Its socket is still there, and whoever comes has it started.
+        # Its socket still exists, and a client that connects starts the daemon.
         with voxel.connect(SERVER, timeout=LONG) as v:
             self.assertIn("box", [entity.key.id for entity in v.entities(timeout=LONG)])
 

@@ -49,7 +49,7 @@ class Victim {
 
   bool connected() const { return result_.connected; }
 
-  // All of it; false when the connection or the time is over.
+  // Sends all of it; returns false if the connection ended or the time is over.
   bool Send(std::string_view bytes) {
     while (!bytes.empty()) {
       if (!Await(POLLOUT)) return false;
@@ -63,7 +63,7 @@ class Victim {
     return true;
   }
 
-  // Reads until a frame of `type` begins; what was before is thrown away. For what is small.
+  // Reads until a frame of `type` begins; discards everything before it. Only for small amounts.
   bool AwaitFrame(FrameType type) {
     for (;;) {
       while (got_.size() >= 9) {
@@ -81,7 +81,8 @@ class Victim {
     }
   }
 
-  // Waits for the end, reading what comes; `pause` at most. False when it has come.
+  // Waits for the end, for at most `pause`, reading what arrives. Returns false if the end has
+  // come.
   bool Idle(milliseconds pause) {
     const auto until = std::min(end_, steady_clock::now() + pause);
     while (steady_clock::now() < until) {
@@ -111,7 +112,8 @@ class Victim {
     return static_cast<int>(std::max<int64_t>(0, left.count()));
   }
 
-  // Until one of `events`; what comes meanwhile is read. False when the connection or time is over.
+  // Waits for one of `events`; reads what arrives in the meantime. Returns false if the connection
+  // ended or the time is over.
   bool Await(short events) {
     for (;;) {
       pollfd poll_fd = {socket_, static_cast<short>(events | POLLIN), 0};
@@ -137,7 +139,7 @@ class Victim {
   AttackResult result_;
 };
 
-// Each on a stream of its own; 1 is the first that a client may have.
+// Each call has a stream of its own; 1 is the first that a client may use.
 void HugeHeader(Victim& victim, uint32_t stream) {
   std::string begin = CallFields(kHealthPath);
   begin.push_back('\0');
@@ -172,7 +174,7 @@ void ContinuationFlood(Victim& victim, uint32_t stream) {
   }
 }
 
-// Calls one after another, each followed by what ends it: a frame of `type` on its stream.
+// Makes calls one after another, each followed by a frame of `type` on its stream that ends it.
 void Resets(Victim& victim, const char* path, uint32_t stream,
             FrameType type = FrameType::kResetStream,
             std::string_view payload = std::string_view("\0\0\0\x08", 4), uint8_t flags = 0) {
@@ -191,7 +193,7 @@ void Resets(Victim& victim, const char* path, uint32_t stream,
 constexpr std::string_view kWrongMessage("\x09\0\0\0\0", 5);
 constexpr std::string_view kNothing("\0\0\0\0", 4);
 
-// One call that is answered, if only with a refusal.
+// Makes one call that is answered, if only with a refusal.
 bool Call(Victim& victim, const char* path, std::string_view message) {
   const bool answered = victim.Send(Frame(FrameType::kHeaders, kEndHeaders, 1, CallFields(path)) +
                                     Frame(FrameType::kData, kEndStream, 1, GrpcMessage(message))) &&
@@ -200,7 +202,7 @@ bool Call(Victim& victim, const char* path, std::string_view message) {
   return answered;
 }
 
-// After a call of `first`: calls that a frame makes the server reset.
+// After a call of `first`: makes calls that a frame causes the server to reset.
 void MadeResets(Victim& victim, const char* first, FrameType type, std::string_view payload,
                 uint8_t flags = 0) {
   if (Call(victim, first, "")) Resets(victim, kStreamPath, 3, type, payload, flags);
@@ -213,7 +215,7 @@ void Drip(Victim& victim, std::string_view bytes) {
 }
 
 void LargeFirstCall(Victim& victim) {
-  // A field that nobody knows, of 1 MiB: a message that can be parsed.
+  // An unknown field of 1 MiB: the message can be parsed.
   const size_t size = 1u << 20;
   std::string message = "\xfa\x01";
   for (size_t left = size; left > 0; left >>= 7) {
@@ -341,7 +343,7 @@ AttackResult RunAttack(Attack attack, const std::string& target, const std::stri
   const bool silent = attack == Attack::kHalfOpen || attack == Attack::kSlowLoris;
   if (!silent && !victim.Send(Greeting())) return victim.Result();
   Carry(attack, victim);
-  while (victim.Idle(std::chrono::hours(1))) {  // whatever came of it
+  while (victim.Idle(std::chrono::hours(1))) {  // whatever the result
   }
   return victim.Result();
 }
@@ -353,7 +355,7 @@ int BeginToConnect(const std::string& target, const std::string& source) {
   to.sin_port = htons(static_cast<uint16_t>(std::atoi(target.c_str() + colon + 1)));
   to.sin_addr.s_addr = Loopback(target.substr(0, colon));
   from.sin_addr.s_addr = Loopback(source);
-  // Nobody else is attacked.
+  // No other machine is attacked.
   if (to.sin_addr.s_addr == INADDR_NONE || from.sin_addr.s_addr == INADDR_NONE) return -1;
   const int made = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (made < 0) return -1;

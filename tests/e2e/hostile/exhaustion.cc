@@ -20,15 +20,15 @@ constexpr size_t kSpare = 16;  // for eight connections
 std::shared_ptr<grpc::Channel> NewChannel(const std::string& target) {
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  // Tries again at once: what is measured is the daemon.
+  // Retries at once: the daemon is what is measured.
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 100);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 100);
   return grpc::CreateCustomChannel(target, grpc::InsecureChannelCredentials(), arguments);
 }
 
-// Over a connection that may still have to be made, and may have to be tried again: the descriptors of before may not
-// quite have come back.
+// Uses a connection that may still have to be made, possibly several times: the previous
+// descriptors may not have been released yet.
 bool Answers(v1::DisplayService::Stub& stub) {
   grpc::ClientContext context;
   daemon::services::SetDeadline(context);
@@ -40,7 +40,7 @@ bool Answers(v1::DisplayService::Stub& stub) {
 }  // namespace
 
 std::optional<double> ExhaustAndRecover(const Daemon& daemon) {
-  // A connection of before, over which the daemon says how it is.
+  // An existing connection, over which the daemon reports its state.
   const auto watch = v1::DisplayService::NewStub(NewChannel(daemon.unix_target()));
   if (!Answers(*watch)) return {};
   const auto before = daemon::services::AwaitStats(*watch, [](const v1::Stats&) { return true; });

@@ -1,4 +1,4 @@
-// Clients that mean harm, and those that do not, against the real voxeld over loopback.
+// Tests malicious and well-behaved clients with the real voxeld over loopback.
 #include <gmock/gmock.h>
 #include <grpcpp/generic/generic_stub.h>
 #include <grpcpp/grpcpp.h>
@@ -36,13 +36,13 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
-// Another machine's, as it were: after an attack others are served at once.
+// Stands for another machine: after an attack, other clients are served at once.
 constexpr char kAttacker[] = "127.0.0.2";
-// What comes before the listener has a connection, its greeting, comes besides.
+// The connection preface, which is read before the listener has a connection, is added to this.
 constexpr uint64_t kGreetingBytes = 1024;
 constexpr size_t kLarge = 1u << 20;
 #if defined(VOXELD_SANITIZED)
-constexpr bool kMemoryTells = false;  // sanitizers keep what was freed
+constexpr bool kMemoryTells = false;  // sanitizers keep freed memory
 #else
 constexpr bool kMemoryTells = true;
 #endif
@@ -65,7 +65,7 @@ class Hostile : public ::testing::Test {
     return Await([](const v1::ConnectionStats&) { return true; });
   }
   AttackResult Run(Attack attack) {
-    Now();  // what this takes the daemon is not the attack's
+    Now();  // the memory that this takes is not the attack's
     const uint64_t before = MostResidentKib(daemon_.process_id());
     const AttackResult result =
         RunAttack(attack, daemon_.tcp_target(), kAttacker, steady_clock::now() + kPatience);
@@ -74,12 +74,12 @@ class Hostile : public ::testing::Test {
   }
 
   Daemon daemon_;
-  uint64_t growth_kib_ = 0;  // of the daemon's memory, by the last attack
+  uint64_t growth_kib_ = 0;  // growth of the daemon's memory by the last attack
   std::unique_ptr<v1::DisplayService::Stub> local_ =
       v1::DisplayService::NewStub(NewChannel(daemon_.unix_target()));
 };
 
-// A daemon that is well serves a new client over TCP.
+// Checks that the daemon serves a new client over TCP.
 void ExpectServes(const std::string& target) {
   const auto stub = v1::DisplayService::NewStub(NewChannel(target));
   grpc::ClientContext context;
@@ -98,7 +98,8 @@ TEST_P(Strangers, AreCutBeforeGrpcSeesThemAndNobodyElseIsHurt) {
   EXPECT_LT(result.seconds, kMostSeconds);
   EXPECT_LE(result.bytes_delivered, kMostBytes);
   EXPECT_TRUE(!kMemoryTells || growth_kib_ <= kMostGrowthKib) << growth_kib_;
-  const auto figures = Await([](const auto& now) { return now.open() == 1; });  // the figures' own
+  // the statistics' own
+  const auto figures = Await([](const auto& now) { return now.open() == 1; });
   EXPECT_EQ(figures.cut_for_greeting(), 1u);
   EXPECT_EQ(figures.cut_for_bytes() + figures.cut_for_cancelling(), 0u);
   ExpectServes(daemon_.tcp_target());
@@ -164,7 +165,7 @@ INSTANTIATE_TEST_SUITE_P(All, Resets,
                                            Attack::kTrustedMadeResetByEnd),
                          [](const auto& info) { return std::string(AttackName(info.param)); });
 
-// gRPC takes a window that grows by nothing for an error of the whole connection, and ends that itself.
+// gRPC treats a window increment of zero as an error of the whole connection, and ends that itself.
 TEST_F(Hostile, AWindowThatGrowsByNothingEndsItsConnection) {
   const AttackResult result = Run(Attack::kTrustedMadeResetByWindow);
   ASSERT_TRUE(result.prepared);
@@ -252,7 +253,7 @@ TEST_F(Hostile, WhoAwaitsOpenedMaySendAsMuchAsTheyLike) {
   EXPECT_EQ(now.cut_for_bytes() + now.cut_for_time() + now.cut_for_cancelling(), 0u);
 }
 
-// Open, and eight batches of 1 MiB behind it before anything was answered.
+// Sends Open, and eight batches of 1 MiB directly after it, before anything is answered.
 grpc::Status SendAllAtOnce(v1::SceneService::Stub& scene) {
   Client client(scene);
   v1::StreamRequest open;
@@ -278,7 +279,7 @@ TEST_F(Hostile, OverAUnixSocketWhoDoesNotAwaitOpenedIsServedAllTheSame) {
   EXPECT_EQ(now.cut_for_bytes() + now.cut_for_greeting() + now.cut_for_flooding(), 0u);
 }
 
-// Over which a call has been answered.
+// Returns a channel over which a call has been answered.
 std::shared_ptr<grpc::Channel> WarmChannel(const std::string& target) {
   const auto channel = NewChannel(target);
   grpc::ClientContext context;
@@ -297,7 +298,7 @@ TEST_F(Hostile, OnAWarmConnectionWhoDoesNotAwaitOpenedIsServedAllTheSame) {
   EXPECT_EQ(Now().cut_for_bytes(), 0u);
 }
 
-// Our own client awaits Opened, whatever it is given to send first.
+// Our own client waits for Opened, whatever it is given to send first.
 TEST_F(Hostile, TheClientLibraryMayBeginWithAsMuchAsItLikes) {
   for (int i = 0; i < 5; ++i) {
     auto session = client::Session::Open({.address = daemon_.tcp_target()});
@@ -361,7 +362,7 @@ TEST_F(Hostile, DescriptorsThatComeBackAreUsedAgainWithinASecond) {
   EXPECT_TRUE(daemon_.process().ReadLineWith("connections are accepted again").has_value());
 }
 
-// In a process of its own, so that its limits are its own.
+// A daemon in a process of its own, so that it has its own limits.
 class Limited {
  public:
   explicit Limited(const std::string& server)
@@ -383,7 +384,7 @@ TEST(Limits, TooManyConnectionsFromOneAddressMakeRoomOldestFirst) {
   EXPECT_TRUE(AwaitStats(limited.stub(), [](const v1::Stats& stats) {
                 return stats.connections().cut_for_room() == 1;
               }).has_value());
-  // The daemon's own probe is not among them.
+  // The daemon's own probe is not counted.
   const auto stats = AwaitStats(
       limited.stub(), [](const v1::Stats& stats) { return stats.uptime_ns() > 500'000'000; });
   ASSERT_TRUE(stats.has_value());
@@ -394,7 +395,7 @@ TEST(Limits, TooManyConnectionsFromOneAddressMakeRoomOldestFirst) {
 }
 
 TEST(Limits, StrangersThatSayNothingKeepNobodyAway) {
-  // They are not closed for their time.
+  // They are not closed because of their time.
   Limited limited(
       "max_http_connections = 4\nhttp_idle_limit_ns = 3_600_000_000_000\n"
       "unauthorised_limit_ns = 60_000_000_000\n");
@@ -430,7 +431,7 @@ INSTANTIATE_TEST_SUITE_P(All, TrustedFloods,
                                            Attack::kTrustedContinuation),
                          [](const auto& info) { return std::string(AttackName(info.param)); });
 
-// What the health service says of the whole: 1 serves, 2 does not.
+// Returns the health service's status of the whole daemon: 1 is serving, 2 is not serving.
 int Health(const std::shared_ptr<grpc::Channel>& channel) {
   grpc::GenericStub stub(channel);
   grpc::ClientContext context;
@@ -453,7 +454,7 @@ TEST(Probe, ADaemonThatCannotAcceptSaysSoAndTakesItBack) {
   const auto channel = NewChannel(daemon.unix_target());
   const auto stub = v1::DisplayService::NewStub(channel);
   EXPECT_EQ(Health(channel), 1);
-  // One: the probe's own, so that it connects, and nobody takes the connection.
+  // One: for the probe itself, so that it connects, but nobody accepts the connection.
   ASSERT_TRUE(LeaveDescriptors(daemon.process_id(), 1));
   const auto deaf = AwaitStats(*stub, [](const v1::Stats& stats) {
     return stats.connections().unreachable().find("no answer came in time") != std::string::npos;
@@ -503,7 +504,7 @@ TEST(Ipv6, ConnectionsAreKnownByTheirCalls) {
   const auto displays = v1::DisplayService::NewStub(channel);
   Client client(*scene);
   client.Open();
-  // Well beyond the time in which a stranger is cut.
+  // Far longer than an unauthorised client may stay.
   ASSERT_TRUE(AwaitStats(*displays, [](const v1::Stats& stats) {
                 return stats.uptime_ns() > 1'000'000'000;
               }).has_value());

@@ -1,4 +1,5 @@
-// HTTP/2 as bytes (RFC 9113, RFC 7541), written by hand: what a library would refuse to send.
+// HTTP/2 as bytes (RFC 9113, RFC 7541), written by hand, including what a library would refuse to
+// send.
 #pragma once
 
 #include <cstdint>
@@ -19,22 +20,22 @@ enum class FrameType : uint8_t {
 };
 inline constexpr uint8_t kEndStream = 1, kEndHeaders = 4;
 
-// A frame's 9 bytes and its payload; `payload` is at most 2²⁴ − 1 bytes.
+// Returns a frame's 9 bytes and its payload; `payload` is at most 2²⁴ − 1 bytes.
 std::string Frame(FrameType type, uint8_t flags, uint32_t stream, std::string_view payload);
 
-// An HPACK integer of a byte whose upper bits, those above `prefix_bits`, are zero.
+// Returns an HPACK integer whose first byte has zeros in the bits above `prefix_bits`.
 std::string HpackInteger(uint64_t value, int prefix_bits);
 
-// A field as a literal that is not kept.
+// Returns a field as a literal that is not indexed.
 std::string Field(std::string_view name, std::string_view value);
 
-// The fields of a gRPC call of `path`, "/package.Service/Method".
+// Returns the fields of a gRPC call of `path`, "/package.Service/Method".
 std::string CallFields(std::string_view path);
 
-// Preface and empty settings: what every client begins with.
+// Returns the preface and empty settings, with which every client begins.
 std::string Greeting();
 
-// One message as gRPC frames it.
+// Returns one message in gRPC's framing.
 std::string GrpcMessage(std::string_view message);
 
 }  // namespace voxeld::e2e

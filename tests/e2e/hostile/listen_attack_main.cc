@@ -1,16 +1,17 @@
-// Attacks a real voxeld, its own child, over loopback, and judges what it cost.
+// Attacks a real voxeld, its own child, over loopback, and judges the cost.
 //
 //   listen_attack [ATTACK…] [--seconds N] [--peers N] [--json] [--option VOXELD_OPTION…]
 //   listen_attack descriptors [--cycles N]
 //
-// Without ATTACK: all, and descriptors. Of each attack, by so many peers at once, each from an address
-// of its own and again and again: the most bytes and seconds until one was cut, what the daemon's
-// memory grew by, and another client's median and 99th percentile of a call, before (a quarter of the
-// time) and beside the attack; each against what the daemon promises. The attackers' threads are of the
-// system's idle class: they are to cost the others what the daemon spends on them, and not the processor
-// that in earnest would be in another machine.
+// Without ATTACK, all are run, and descriptors. Each attack is made by N peers at once, each from
+// an address of its own, repeatedly. Reports the most bytes and seconds until one was disconnected,
+// the growth of the daemon's memory, and another client's median and 99th percentile of a call,
+// before the attack (a quarter of the time) and during it; each is compared with the daemon's
+// promises. The attackers' threads are in the system's idle class: they should cost the others only
+// what the daemon spends on them, and not the processor, which in a real attack would be in another
+// machine.
 //
-// Ends with 0 if all promises were kept, 1 if not, 2 if the options are wrong.
+// Exits with 0 if all promises were kept, 1 if not, 2 if the options are wrong.
 #include <grpcpp/grpcpp.h>
 #include <pthread.h>
 #include <sched.h>
@@ -40,7 +41,7 @@ using Json = nlohmann::ordered_json;
 using std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kBetweenCalls{5};
-constexpr int kMostPeers = 250;  // an address each, 127.0.1.x
+constexpr int kMostPeers = 250;  // one address each, 127.0.1.x
 
 struct Options {
   std::vector<std::string> what, daemon;
@@ -49,7 +50,7 @@ struct Options {
   bool json = false;
 };
 
-// Milliseconds that calls took until `end`, on one connection that was there before.
+// Returns the milliseconds that calls took until `end`, on one existing connection.
 std::vector<double> TimeCalls(v1::DisplayService::Stub& stub, steady_clock::time_point end) {
   std::vector<double> times;
   while (steady_clock::now() < end) {
@@ -62,7 +63,7 @@ std::vector<double> TimeCalls(v1::DisplayService::Stub& stub, steady_clock::time
       continue;
     }
     times.push_back(std::chrono::duration<double, std::milli>(steady_clock::now() - begin).count());
-    // The measured client's pace; nothing is waited for.
+    // The measured client's pace; it does not wait for an event.
     std::this_thread::sleep_until(begin + kBetweenCalls);
   }
   std::sort(times.begin(), times.end());
@@ -81,7 +82,7 @@ void RunIdle() {
   }
 }
 
-// Adds the verdicts; false if a promise was broken.
+// Adds the verdicts; returns false if a promise was broken.
 bool AddVerdicts(const std::vector<Verdict>& verdicts, Json& out) {
   bool kept = true;
   for (const Verdict& verdict : verdicts) {
@@ -125,7 +126,7 @@ Json RunOne(Attack attack, const Options& options) {
   std::thread watch([&] {
     while (!done) {
       most_kib = std::max(most_kib, ResidentKib(daemon.process().pid()));
-      // Between two samples of the memory; nothing is waited for.
+      // The time between two samples of the memory; it does not wait for an event.
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
   });

@@ -1,4 +1,4 @@
-// What an outsider sees of a running process.
+// Information on a running process, as seen from outside.
 #pragma once
 
 #include <sys/types.h>
@@ -8,12 +8,12 @@
 
 namespace voxeld::e2e {
 
-// In KiB; 0 if it is not there.
+// Returns KiB; 0 if the process does not exist.
 uint64_t ResidentKib(pid_t process);
-// The most that it ever was.
+// Returns the greatest value so far.
 uint64_t MostResidentKib(pid_t process);
-// Limits the process, from now on, to what it has open and `spare` more: the limit is for the
-// numbers of descriptors, and new ones get the least that is free.
+// Limits the process, from now on, to its open descriptors and `spare` more: the limit applies to
+// the numbers of descriptors, and new ones get the lowest free number.
 bool LeaveDescriptors(pid_t process, size_t spare);
 
 }  // namespace voxeld::e2e

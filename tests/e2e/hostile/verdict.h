@@ -1,4 +1,4 @@
-// What the daemon promises of a client that means harm, and whether it was kept.
+// The daemon's promises about malicious clients, and whether they were kept.
 #pragma once
 
 #include <cstdint>
@@ -11,24 +11,24 @@ namespace voxeld::e2e {
 
 inline constexpr uint64_t kMostBytes = 64u << 10;
 inline constexpr double kMostSeconds = 5;
-inline constexpr double kMostGrowthKib = 1024;  // a peer
-inline constexpr double kMostSlowdown = 1.2;    // of others' 99th percentile
+inline constexpr double kMostGrowthKib = 1024;  // for each peer
+inline constexpr double kMostSlowdown = 1.2;    // for the 99th percentile of other clients
 inline constexpr double kMostRecoverySeconds = 1;
 
-// What one attack by some peers came to.
+// The results of one attack by several peers.
 struct AttackFigures {
   uint64_t connections = 0;  // that were made
   uint64_t cut = 0;
   uint64_t under_way = 0;  // at the end of the measurement
   uint64_t most_bytes = 0;
-  double most_seconds = 0;  // of any connection, also of those that were not cut
-  double growth_kib = 0;    // of the daemon's memory, a peer
-  double p99_alone_ms = 0, p99_attacked_ms = 0;  // of another client's calls
+  double most_seconds = 0;  // of any connection, including those that were not disconnected
+  double growth_kib = 0;    // growth of the daemon's memory for each peer
+  double p99_alone_ms = 0, p99_attacked_ms = 0;  // for another client's calls
 };
 
-// Adds one connection. `last`: the measurement ended with it, cut or not.
+// Adds one connection. `last`: the measurement ended with it, disconnected or not.
 void Add(const AttackResult& result, bool last, AttackFigures& figures);
-// Adds what another peer's connections came to.
+// Adds the results of another peer's connections.
 void Add(const AttackFigures& peer, AttackFigures& figures);
 
 struct Verdict {
@@ -37,8 +37,8 @@ struct Verdict {
   bool reached = false;
 };
 
-// Of a client without trust: cut, in bytes, seconds, memory and others' time. Of one with trust only
-// that it was cut, as it may send.
+// Judges an unauthorised client by its disconnection, bytes, seconds, memory and the time of
+// others; an authorised one, which may send, only by its disconnection.
 std::vector<Verdict> Judge(bool trusted, const AttackFigures& figures);
 
 }  // namespace voxeld::e2e
