@@ -49,7 +49,7 @@ def read_archive(path):
     """Returns the inputs of an archive: name → bytes. Refuses everything but plain files without a folder in their names."""
     inputs = {}
     try:
-        # All of it is decompressed first: tarfile alone does not notice that an archive lacks its end.
+        # All of it is decompressed first: tarfile alone does not notice that an archive is truncated.
         with tarfile.open(fileobj=io.BytesIO(lzma.decompress(path.read_bytes())), mode="r:") as archive:
             for member in archive:
                 # An input is written under its name, so a name must not lead out of the target's folder.
@@ -64,7 +64,7 @@ def read_archive(path):
 
 
 def write_archive(path, inputs):
-    """Writes an archive of these inputs (name → bytes). The same inputs give the same bytes, whoever writes them and when."""
+    """Writes an archive of these inputs (name → bytes). The same inputs give the same bytes, regardless of who writes them and when."""
     packed = io.BytesIO()
     with tarfile.open(fileobj=packed, mode="w", format=tarfile.USTAR_FORMAT) as archive:
         for name, data in sorted(inputs.items()):

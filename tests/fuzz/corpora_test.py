@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Tests of the corpora's archives: what the tree holds is whole, and what is no corpus is refused."""
+"""Tests the archives of the corpora: those in the tree are complete, and files that are not a corpus are refused."""
 import io
 import os
 import pathlib

@@ -1,5 +1,6 @@
-// What passes between a target and what it attacks, counted where it happens: a transfer that was answered, a message that was taken.
-// For programs that run targets for long (tests/fuzz/exchanges); elsewhere nobody reads it. One thread.
+// Counts what passes between a target and the code under attack, where it happens: a transfer that
+// was answered, a message that was accepted. For programs that run targets for a long time
+// (tests/fuzz/exchanges); elsewhere the counts are not read. Single-threaded.
 #pragma once
 
 #include <array>
@@ -16,7 +17,7 @@ enum class ExchangeKind : uint8_t {
   kWrite,
   kEvent,
   kPackets,
-  // What a driver or a device is told outside a session.
+  // Data about or from a driver or a device, outside a session.
   kCapabilityBlock,
   kDecoded,
   kModel,
@@ -42,17 +43,17 @@ enum class ExchangeOutcome : uint8_t {
   kAccepted,  // or the truth
   kRefused,   // with a reason
   // Lies of a device.
-  kFailed,    // the transfer ends otherwise
-  kTookLess,  // of what it was sent, or so it says
-  kBytes,     // some are others
-  kNumber,    // where numbers are
+  kFailed,    // the transfer ends with another status
+  kTookLess,  // fewer bytes than it was sent, or so it says
+  kBytes,     // some bytes are changed
+  kNumber,    // in places that hold numbers
   kGarbage,
   kShort,
-  kFlipped,   // bits
-  kSequence,  // another number of an event
+  kFlipped,   // flipped bits
+  kSequence,  // another sequence number of an event
   kDelayed,
-  kReplayed,  // an answer of before
-  kDamaged,   // what it was sent, on the way: a wrong CRC
+  kReplayed,  // an earlier answer
+  kDamaged,   // what it was sent is changed on the way: a wrong CRC
   kEnd
 };
 inline constexpr std::array<const char*, static_cast<size_t>(ExchangeOutcome::kEnd)> kOutcomeNames =
@@ -62,14 +63,14 @@ inline constexpr std::array<const char*, static_cast<size_t>(ExchangeOutcome::kE
 struct Exchanges {
   uint64_t total = 0;
   std::array<std::array<uint64_t, kOutcomeNames.size()>, kExchangeNames.size()> by = {};
-  // Of drivers: what the lies came to.
+  // Results of the lies in drivers.
   uint64_t attaches = 0, transfers_failed = 0, slices_resent = 0, volumes_shown = 0,
            volumes_lost = 0;
-  uint64_t overcome = 0;  // sessions of which the end was right, once all told the truth
+  uint64_t overcome = 0;  // sessions that ended well once both sides told the truth
 };
 
 inline Exchanges unread_exchanges;
-// Where to count; never null.
+// The counters in use; never null.
 inline Exchanges* exchanges = &unread_exchanges;
 
 inline void CountExchange(ExchangeKind kind, ExchangeOutcome outcome) {

@@ -1,5 +1,5 @@
-// What must hold of every input: EXPECT_THAT_HOLDS(count == 3, "count is ", count). If it does not, the program ends as if it had
-// crashed, which is what fuzzers look for.
+// Conditions that must hold for every input: EXPECT_THAT_HOLDS(count == 3, "count is ", count). If
+// one does not, the program terminates as if it had crashed, which is what fuzzers look for.
 #pragma once
 
 #include <cstdio>
@@ -29,7 +29,7 @@ namespace voxeld::fuzz {
 
 namespace voxeld::fuzz {
 
-// An error says something, in printable text.
+// Checks that an error has a message, in printable text.
 inline void ExpectSays(const absl::Status& status) {
   if (status.ok()) return;
   EXPECT_THAT_HOLDS(!status.message().empty());

@@ -1,4 +1,4 @@
-"""Seeds by hand for the readers of points, voxels and volumes: every format that they know, and each of their refusals. As
+"""Hand-written seeds for the readers of points, voxels and volumes: every format that they support, and each of their refusals. Like
 shape_seeds.py."""
 import gzip
 import struct
@@ -91,7 +91,7 @@ def ply(put):
         files.append(head("element vertex 1", *every, form=form) + struct.pack(order + "bBhHiIfd", 1, 2, 3, 4, 5, 6, 7, 8))
         files.append(head("element vertex 1", *every, form=form) + b"abc")
         files.append(head("element vertex 2", *xyz, "property list uchar int l", form=form) + struct.pack(order + "3fBi", 1, 2, 3, 1, 9) + struct.pack(order + "3fB", 1, 2, 3, 200))
-        # As after a copy that took each CR LF for LF: a byte is lost before each 0x0A.
+        # As after a copy that replaced each CR LF by LF: a byte is lost before each 0x0A.
         row = lambda i: bytearray(struct.pack(order + "6f", i % 5, i % 4, i % 3, 0, 0, 1))
         text = head(*["comment"] * 110, "element vertex 40", *xyz, *normals, form=form)
         for lost in ((14,), (14, 18, 23), (0,), (39,)):
@@ -217,7 +217,7 @@ def files(put):
 
 
 def recordings(put, encode):
-    """MCAP files; `encode` makes bytes of a WatchSceneResponse's text."""
+    """Writes seeds of MCAP files; `encode` makes bytes of a WatchSceneResponse's text."""
     string = lambda s: struct.pack("<I", len(s)) + s
     record = lambda kind, body: bytes([kind]) + struct.pack("<Q", len(body)) + body
     message = lambda body, number=0, channel=1: record(5, struct.pack("<HIQQ", channel, number, 5 + number, 5 + number) + body)
@@ -245,7 +245,7 @@ def recordings(put, encode):
                  + struct.pack("<I", 99)), whole[:len(head) + 40], head + message(encode(layer("a", 1))) + told[1] + end, head + record(0x80, b"later") + told[0] + end,
                  head + chunk(b"".join(told), b"zstd", body=b"\x28\xb5\x2f\xfd\x24\x03\x19\x00\x00abc\x00\x00\x00\x00"), head + b"".join(told[i % 6] for i in range(40)) + end):
         put("mcap_file", magic + body, 16384)
-    # A block of zstd that is not compressed, without a checksum: a frame as whole as any.
+    # An uncompressed block of zstd, without a checksum: as valid as any frame.
     plain = b"".join(told)
     frame = b"\x28\xb5\x2f\xfd\xa0" + struct.pack("<I", len(plain)) + struct.pack("<I", len(plain) << 3 | 1)[:3] + plain
     for packed in (frame, frame + b"\0", frame[:-9]):

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Seeds for the fuzz targets from real traffic: a voxeld of this tree with a network display of each protocol, and voxelctl drawing an
-example of every shape; what passes between them, what is kept and what is recorded becomes inputs. The rest is this tree's own files
+example of every shape; their messages, the persistent state and recordings become inputs. The rest is made from this tree's own files
 and documents, and the protocols' own examples. They go to build/fuzz/seeds/TARGET, and from there to where tools/fuzz works
-(build/fuzz/corpus); `tools/fuzz --merge` takes into the tree what reaches something.
+(build/fuzz/corpus); `tools/fuzz --merge` adds those that reach new code to the tree.
 
   tests/fuzz/make_seeds.py [--bin build/test/bin]
 """
@@ -34,7 +34,7 @@ MOST = 4096
 
 
 def text(data):
-    """As Script::Text reads it (tests/fuzz/script.h)."""
+    """Encodes a text as Script::Text reads it (tests/fuzz/script.h)."""
     return data.replace(b"\\", b"\\\\") + b"\\a"
 
 
@@ -47,10 +47,10 @@ def put(target, data, most=MOST):
         (folder / name).write_bytes(data)
 
 
-# ---- what passes between voxeld and its clients
+# ---- traffic between voxeld and its clients
 
 class Recorder:
-    """A server in front of the daemon's, which passes on every call as it is, and keeps what clients send."""
+    """A server in front of the daemon's, which forwards every call unchanged, and records what clients send."""
 
     def __init__(self, listen, daemon):
         import grpc
@@ -85,7 +85,7 @@ class Recorder:
 
 
 def shapes():
-    """The examples of voxelctl's gallery, each with all its parts."""
+    """Returns the examples of voxelctl's gallery, each with all its parts."""
     source = (ROOT / "tools/voxelctl/shape/examples.cc").read_text()
     literal = r'"(?:[^"\\]|\\.)*"'
     found = re.findall(r'\{"[^"]*",\s*((?:' + literal + r'\s*)+)\}', source)
@@ -207,7 +207,7 @@ def traffic(programs, folder):
 
 
 def kept(programs, folder):
-    """What outlives a daemon that an example of every shape was drawn with."""
+    """Writes seeds of the persistent state of a daemon with which an example of every shape was drawn."""
     address = f"unix:{folder}/k.sock"
     process = subprocess.Popen([programs / "voxeld", "--listen", address, "--http", "off", "--state-dir", folder / "kept", "--display",
                                 "cube=simulated,size=24x24x24"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -227,7 +227,7 @@ def kept(programs, folder):
     database.execute("PRAGMA journal_mode=DELETE")
     database.execute("DELETE FROM rows WHERE length(bytes) > 400 OR owner % 16 != 0")
     database.commit()
-    database.execute("PRAGMA page_size=512")  # small inputs
+    database.execute("PRAGMA page_size=512")  # keeps inputs small
     database.execute("VACUUM")
     database.close()
     put("state_file", (folder / "kept/state.db").read_bytes(), 16384)
@@ -277,7 +277,7 @@ def texts():
             for path in [*ROOT.glob(f"tests/tools/data/*.{extension}"), *pathlib.Path("/usr/share").glob(f"assimp/models/*/*.{extension}"),
                          *ROOT.glob(f"docs/**/*.{extension}")][:40]:
                 put(target, bytes([number]) + path.read_bytes(), 8192)
-    # What tests write of them by hand.
+    # The texts that tests contain.
     for path in ROOT.glob("tests/tools/voxelctl/*_test.cc"):
         for block in re.findall(r'R"[a-z]*\((.*?)\)[a-z]*"', path.read_text(), re.S):
             for target, number in (("import_text", 0), ("import_text", 1), ("import_text", 2), ("import_text", 4), ("import_text", 5),
@@ -314,7 +314,7 @@ def texts():
 
 
 def pictures():
-    """PNGs of every kind of pixel, 5x3, and a JPEG, by ffmpeg where it is."""
+    """Writes seeds of PNGs of every kind of pixel, 5x3, and a JPEG, made by ffmpeg if it is installed."""
     chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
     for kind, channels in ((0, 1), (2, 3), (3, 1), (4, 2), (6, 4)):
         for depth in (1, 2, 4, 8, 16):
@@ -341,7 +341,7 @@ def pictures():
                 put("pictures", (pathlib.Path(folder) / name).read_bytes())
 
 
-# ---- protocols, by hand
+# ---- protocols, written by hand
 
 def crc32c(data):
     crc = 0xFFFFFFFF
@@ -353,7 +353,7 @@ def crc32c(data):
 
 
 def voxlink():
-    """Sessions as tests/fuzz/voxlink/device_session.cc and packets.h read them."""
+    """Writes seeds of sessions as tests/fuzz/voxlink/device_session.cc and packets.h read them."""
     begin = lambda volume, base, bits=b"": bytes([0, volume, base, 4]) + text(bits)
     picture = lambda volume, slice_, value: bytes([2, volume, slice_, 0, 18, value])
     end = lambda volume, show=1: bytes([3, volume, show])
@@ -394,7 +394,7 @@ def voxlink():
 
 
 def programs():
-    """Programs of expressions, as gpu/implicit/program.h has them."""
+    """Writes seeds of programs of expressions, as gpu/implicit/program.h defines them."""
     code = lambda *instructions: [w for op, to, a, b, now in instructions for w in (op | to << 8 | a << 16 | b << 24, now & 0xFFFFFFFF)]
     x, y, constant, pow_i, add, sin = 1, 2, 0, 16, 17, 11
     surface = code((x, 0, 0, 0, 0), (y, 1, 0, 0, 0), (add, 2, 0, 1, 0), (sin, 3, 2, 2, 0), (pow_i, 4, 3, 3, 3))

@@ -1,4 +1,4 @@
-"""What tests/fuzz/run.sh needs on a machine without anything of this one: programs, their libraries, corpora, dictionaries. For tools/fuzz --pack."""
+"""Packs what tests/fuzz/run.sh needs on a machine without this tree: programs, their libraries, corpora, dictionaries. For tools/fuzz --pack."""
 import pathlib
 import re
 import shlex
@@ -7,19 +7,19 @@ import subprocess
 import tempfile
 
 HERE = pathlib.Path(__file__).resolve().parent
-# Targets that take microseconds an input, which a program with more than their own edges would slow down.
+# Targets that take microseconds for an input; a program with more edges than their own would slow them down.
 ALONE = {"expression_program", "expression_text", "greeting", "light_datagrams", "network_packets", "opc_stream", "pictures", "voxlink_capabilities"}
 
 
 def libraries(programs):
-    """Shared libraries that these and their libraries need, but for glibc's own: name → path."""
+    """Returns the shared libraries that these programs and their libraries need, except glibc's own: name → path."""
     glibc = re.compile(r"(ld-linux-x86-64|libc|libm|libdl|librt|libpthread|libresolv|libutil|libanl)\.so")
     told = subprocess.run(["ldd", *map(str, programs)], capture_output=True, text=True, check=True).stdout
     return {name: path for name, path in re.findall(r"^\s*(\S+) => (/\S+)", told, re.M) if not glibc.match(name)}
 
 
 def link_of(build, name):
-    """How a program is linked: all words of the command, and its objects."""
+    """Returns how a program is linked: all words of the command, and its objects."""
     told = subprocess.run(["ninja", "-C", str(build), "-t", "commands", name], capture_output=True, text=True, check=True).stdout
     words = [word.replace("\\$", "$") for word in shlex.split(told.splitlines()[-1])]
     return words, [word for word in words if word.endswith(".o")]
@@ -30,7 +30,7 @@ def is_library(word):
 
 
 def together(names, build, folder):
-    """Links the targets of these names and hostile_exchanges to one program; its path."""
+    """Links the targets of these names and hostile_exchanges into one program. Returns its path."""
     words, objects = link_of(build, "hostile_exchanges")
     entry = lambda name: "Fuzz" + "".join(part.capitalize() for part in name.split("_"))
     inputs, needed = [], [w for w in words if is_library(w)]
@@ -57,14 +57,14 @@ def together(names, build, folder):
     inputs.append(folder / "main.o")
     subprocess.run([compiler, "-std=c++20", "-O1", "-fPIE", f"-I{folder}", "-c", str(HERE / "packed_main.cc"), "-o", str(inputs[-1])], check=True)
     program = folder / "packed_fuzz"
-    # Some sources are in several targets, and are the same in all.
+    # Some sources are in several targets, and are the same in all of them.
     subprocess.run([compiler, *flags, "-fsanitize=fuzzer", "-Wl,-z,muldefs", *map(str, inputs), "-Wl,--start-group", *needed, "-Wl,--end-group", "-o", str(program)],
                    cwd=build, check=True)
     return program
 
 
 def pack(targets, build, folder, commit):
-    """`folder` and `folder`.tar.xz of these targets (tools/fuzz), as they are built. ValueError if something else is there."""
+    """Writes `folder` and `folder`.tar.xz with these targets (tools/fuzz), as they are built. Raises ValueError if the folder has something else."""
     if folder.exists() and not (folder / "COMMIT").exists():
         raise ValueError(f"{folder} is there, and nothing that --pack wrote; name another")
     shutil.rmtree(folder, ignore_errors=True)
@@ -74,7 +74,7 @@ def pack(targets, build, folder, commit):
         packed = [t.name for t in targets if t.name not in ALONE]
         programs = {"packed_fuzz": together(packed, build, pathlib.Path(work))} | {t.program.name: t.program for t in targets if t.name in ALONE}
         for name, program in programs.items():
-            # Which lines were reached is told at home.
+            # Coverage is reported where the tree is.
             subprocess.run(["objcopy", "--strip-all", "-R", "__llvm_covmap", "-R", "__llvm_covfun", str(program), str(folder / "bin" / name)], check=True)
         needed = libraries([build / "bin/tests/hostile_exchanges", *(t.program for t in targets)])
     for name in ["hostile_exchanges"] + [f"{name}_fuzz" for name in packed]:

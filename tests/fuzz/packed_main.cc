@@ -1,5 +1,6 @@
-// Many targets and hostile_exchanges in one program, which is the one whose name it is called by: what they have in common is there
-// once. tests/fuzz/pack.py makes it, and the list of targets: TARGET(store, FuzzStore) for each.
+// Combines many targets and hostile_exchanges in one program, which acts as the one by whose name
+// it is called: what they have in common exists once. tests/fuzz/pack.py makes it, and the list of
+// targets: TARGET(store, FuzzStore) for each.
 
 #include <cstddef>
 #include <cstdint>

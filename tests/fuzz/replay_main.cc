@@ -1,5 +1,5 @@
-// A target's main where there is no libFuzzer: runs it on each file named, and on those in each folder named, and says how many
-// they were. As tests of every build, without looking for anything new.
+// A target's main without libFuzzer: runs it on each file named, and on those in each folder named,
+// and prints their number. Every build tests with it, without searching for new inputs.
 
 #include <algorithm>
 #include <cstddef>
@@ -32,7 +32,7 @@ int main(int argc, char** argv) {
       return 1;
     }
     const std::vector<char> bytes{std::istreambuf_iterator<char>(in), {}};
-    // Of just that size, so that reading beyond is seen.
+    // It has exactly that size, so that reading beyond it is detected.
     const std::unique_ptr<uint8_t[]> exact(new uint8_t[bytes.size()]);
     std::copy(bytes.begin(), bytes.end(), exact.get());
     std::fprintf(stderr, "%s: %zu bytes\n", path.c_str(), bytes.size());

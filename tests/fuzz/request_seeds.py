@@ -1,6 +1,7 @@
 """Seeds of requests: of every kind that the wire has (tests/fuzz/wire/requests.txt), alone and one after another, each followed by a
-commit; and the same that are wrong in one place, each field in turn left out or with a value that it should not have. The few that
-reach something are kept by `tools/fuzz --merge`. As shape_seeds.py."""
+commit; and the
+same with one error each: each field in turn left out or with a wrong value. `tools/fuzz --merge` keeps the few that reach new code. Like
+shape_seeds.py."""
 import functools
 import pathlib
 import re
@@ -16,7 +17,7 @@ NOT_A_NUMBER, INFINITE = float("nan"), float("inf")
 
 @functools.cache
 def pool():
-    """What proto/ describes."""
+    """Returns the descriptors of proto/."""
     with tempfile.TemporaryDirectory() as folder:
         described = pathlib.Path(folder) / "set"
         files = sorted(str(p.relative_to(ROOT / "proto")) for p in ROOT.glob("proto/voxeld/v1/*.proto"))
@@ -38,7 +39,7 @@ def classes(*names):
 
 
 def lines(all_=False):
-    """Those whose fields are to be wrong in turn, or all."""
+    """Returns the lines whose fields are to be made wrong in turn, or all."""
     text = (ROOT / "tests/fuzz/wire/requests.txt").read_text()
     if not all_:
         text = text[:text.index("# Refusals")]
@@ -46,7 +47,7 @@ def lines(all_=False):
 
 
 def wrong_values(field, value):
-    """What one field (of a repeated one an element) may be instead."""
+    """Returns other values for one field (for a repeated one, for an element)."""
     kind = field.type
     if kind in (field.TYPE_DOUBLE, field.TYPE_FLOAT):
         huge = 3e38 if kind == field.TYPE_FLOAT else 1e300
@@ -66,12 +67,12 @@ def wrong_values(field, value):
 
 
 def one(field):
-    """Something for a field that was not set."""
+    """Returns a value for a field that was not set."""
     return {field.CPPTYPE_STRING: b"abcd" if field.type == field.TYPE_BYTES else "x", field.CPPTYPE_DOUBLE: 2.0, field.CPPTYPE_FLOAT: 2.0, field.CPPTYPE_BOOL: True}.get(field.cpp_type, 2)
 
 
 def spoilt(root, at=None):
-    """`root`'s bytes with each of its fields wrong in turn; `at`: a message within it."""
+    """Yields `root`'s bytes with each of its fields made wrong in turn; `at`: a message within it."""
     at = root if at is None else at
     for field in at.DESCRIPTOR.fields:
         repeated = field.label == field.LABEL_REPEATED
@@ -152,7 +153,7 @@ def requests(put, text):
 
 
 def scenes(put, text, parse):
-    """What a scene refuses, whoever asks: quotas, depths, transforms, frames. Of two clients, one of which may not erase."""
+    """Requests that a scene refuses from any client: quotas, depths, transforms, frames. From two clients, one of which may not erase."""
     say = lambda client, *what: b"".join(bytes([8 | client]) + text(parse(line).SerializeToString()) + b"\x00" for line in what)
     commit = "commit { frame_id: 1 }"
     sphere = "primitive { sphere { radius: 1 } }"
@@ -177,7 +178,7 @@ def scenes(put, text, parse):
                     ['frame_begin { layer: "a" }', upsert("x", of("none")), 'frame_end { layer: "a" }', commit], [*[upsert("x", layer=f"l{i}") for i in range(12)], 'frame_begin { layer: "more" }', upsert("x", layer="more"), 'frame_end { layer: "more" }', state("visible: true", "more2"), commit],
                     [upsert(f"{i}") for i in range(150)] + [commit], [state('mask_layer: "a"'), state('mask_layer: "b"'), state('mask_layer: "a"', "b"), commit]):
                 put("store", front + say(client, *course), 16384)
-                # Within what an operator has set, in few and in small ones; and beside another's.
+                # Within the quotas that an operator has set, in few and in small requests; and beside another's.
                 put("store", front + bytes([4 | client, 6]) + say(client, *course), 16384)
                 put("store", front + bytes([4 | client, 4]) + say(client, *course), 16384)
                 both = say(client, *course) + say(1 - client, *course)
@@ -195,7 +196,7 @@ def scenes(put, text, parse):
 
 def wrong(put, text, parse, commit):
     update, entity, thing, layer, owner = classes("ApplyUpdateRequest", "KeptEntity", "KeptObject", "KeptLayer", "KeptOwner")
-    # What objects, layers and entities there are before.
+    # The objects, layers and entities that exist before.
     before = b"".join(b"\x08" + text(parse(line).SerializeToString()) + b"\x00" for line in (
         'define_object { object: "p" definition { parts { primitive { box { size { x: 1 y: 1 z: 1 } } } } } }',
         'define_object { object: "o" definition { parts { primitive { instance { object: "p" } } } } }',

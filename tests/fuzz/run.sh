@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs what tools/fuzz --pack has put beside this script: every fuzz target equally long, and hostile_exchanges beside them. It needs
+# Runs what tools/fuzz --pack has put beside this script: every fuzz target for the same time, and hostile_exchanges beside them. It needs
 # bash, tar, gzip and the coreutils.
 set -uo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -66,7 +66,7 @@ mkdir -p "$out/found" "$out/grown" || exit 2
 out=$(cd "$out" && pwd)
 cp "$here/COMMIT" "$out/COMMIT"
 asan=allocator_may_return_null=1:handle_abort=1
-# Where a process may not look into another, leaks cannot be looked for.
+# Where a process may not trace another, leaks cannot be detected.
 leaks=1
 if ! ASAN_OPTIONS=detect_leaks=1 LLVM_PROFILE_FILE=/dev/null "$here/bin/greeting_fuzz" -runs=1 >/dev/null 2>&1; then
   leaks=0
@@ -75,7 +75,7 @@ fi
 export ASAN_OPTIONS=$asan:detect_leaks=$leaks UBSAN_OPTIONS=print_stacktrace=1 LLVM_PROFILE_FILE=/dev/null
 broken=0
 
-# Notes when edges were new, and the end of the log. From libFuzzer's messages, which come line by line.
+# Notes when new edges were found, and the end of the log. Reads libFuzzer's messages line by line.
 follow() {  # TARGET BEGIN
   local line edges=0 begin=$2 now
   while IFS= read -r line; do
@@ -98,7 +98,7 @@ fuzz() {  # TARGET SECONDS
   local options=()
   mapfile -t options <"$here/options/$target"
   end=$((begin + length * 1000000))
-  # What breaks it ends it: as often as that it is begun again.
+  # An input that breaks the target ends it; it is then started again, up to that often.
   for ((tries = 0; tries < 4; ++tries)); do
     left=$(((end - ${EPOCHREALTIME/[.,]/} + 500000) / 1000000))
     [ "$left" -gt 0 ] || break

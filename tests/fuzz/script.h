@@ -1,6 +1,7 @@
-// A fuzzer's input as a script: bytes that say what is to be done, one step after another, and texts among them. Every sequence of
-// bytes is a script, and a byte more or less somewhere leaves what stands before and behind as it was, so that a fuzzer's changes
-// keep their meaning. tests/fuzz/make_seeds.py writes the same.
+// A fuzzer's input as a script: bytes that select the actions, one step after another, with texts
+// in between. Every sequence of bytes is a script, and a byte more or less leaves what is before
+// and after it unchanged, so that a fuzzer's changes keep their meaning. tests/fuzz/make_seeds.py
+// writes the same format.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +12,7 @@
 
 namespace voxeld::fuzz {
 
-// Of a script no more steps are taken than this, so that no input takes long; programs that go on for long make it more.
+// Limits the steps of a script, so that no input takes long; long-running programs increase it.
 inline int steps_times = 1;
 inline int MostSteps(int usual) { return usual * steps_times; }
 
@@ -21,7 +22,7 @@ class Script {
 
   bool done() const { return rest_.empty(); }
 
-  // 0 at the end.
+  // Returns the next byte; 0 at the end.
   uint8_t Byte() {
     if (rest_.empty()) return 0;
     const uint8_t byte = rest_.front();
@@ -29,16 +30,17 @@ class Script {
     return byte;
   }
   bool Flag() { return (Byte() & 1) != 0; }
-  // Of so many bytes, the lowest first.
+  // Returns a number of `bytes` bytes, the lowest first.
   uint64_t Number(int bytes) {
     uint64_t value = 0;
     for (int i = 0; i < bytes; ++i) value |= uint64_t{Byte()} << 8 * i;
     return value;
   }
-  // Below `end` (1 to 65536).
+  // Returns a number below `end` (1 to 65536).
   uint32_t Below(uint32_t end) { return static_cast<uint32_t>(Number(end <= 256 ? 1 : 2) % end); }
 
-  // Up to a backslash and a byte that is none, or to the end. Two backslashes are one of the text's.
+  // Returns the text up to a backslash followed by another byte, or to the end. Two backslashes are
+  // one in the text.
   std::string Text() {
     std::string text;
     while (!rest_.empty()) {
@@ -49,7 +51,7 @@ class Script {
     return text;
   }
 
-  // All that is left.
+  // Returns all remaining bytes.
   std::span<const uint8_t> Rest() {
     const std::span<const uint8_t> rest = rest_;
     rest_ = {};

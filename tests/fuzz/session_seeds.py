@@ -1,4 +1,5 @@
-"""Seeds by hand for sessions: what of a protocol's course is rare in real traffic, each refusal among it. As shape_seeds.py; `text` is
+"""Hand-written seeds for sessions: courses of a protocol that are rare in real traffic, including each refusal. Like shape_seeds.py; `text`
+is
 make_seeds.text."""
 import json
 import pathlib
@@ -48,7 +49,7 @@ def e131_sync(address, sequence=0):
 
 def lights(put, text):
     sent = lambda *packets: b"".join(b"\x40" + text(p) for p in packets)
-    put("light_datagrams", b"\x01\x03\x01" + sent(*(e131(source=i) for i in range(18))))  # more sources than are told apart
+    put("light_datagrams", b"\x01\x03\x01" + sent(*(e131(source=i) for i in range(18))))  # more sources than can be distinguished
     put("light_datagrams", b"\x01\x03\x01" + sent(e131(), e131(sync=7), e131_sync(7), e131_sync(8), e131(sequence=1, sync=7), e131(options=0x40), e131(priority=201), e131(universe=0), e131(source=1, priority=150), e131(sequence=3)))
     for protocol in range(4):
         network = bytes([protocol, 0, 100, 2, 3, 3])  # first universe 1, sync universe 2, 4 slices of 4 pixels
@@ -57,7 +58,7 @@ def lights(put, text):
 
 
 def deltas(put, text):
-    """What a worker is sent, by words: sound, and with each word of it wrong in turn (gpu/delta.h)."""
+    """Writes seeds of what a worker is sent, word by word: valid, and with each word of it wrong in turn (gpu/delta.h)."""
     record = lambda op, body: struct.pack("<IIQ", op, 0, len(body) + 16) + body
     pad = lambda data: data + bytes(-len(data) % 16)
 
@@ -93,7 +94,7 @@ def deltas(put, text):
                   geometry(3, 3, texture=(1, 0)), geometry(3, 3, (0, 1, 9)), geometry(7, 1, program), geometry(7, 0, program, params=(0, 0, 0, 1, 1, 1, 1, 0)), geometry(7, 0, program, params=(2, 0, 0, 1, 1, 1, 1, 0)), geometry(7, 0, program, params=(2, 0, 0, 1, 1, 1, 5, 0)),
                   geometry(7, 0, ()), geometry(10, 0, (1, 2)), kinds[0][:-16]):
         put("worker_messages", front + target + apply(delta))
-    # Every word, in turn, a number that is not, or too great, or below zero.
+    # Every word, in turn, is a number that does not exist, is too large, or is negative.
     for sound, size in ((kinds[0], 112), (kinds[2], 112), (kinds[7], 112), (drawable, len(drawable)), (layer, 16 + 48 + 96 + 32), (layer[:16 + 784], 16 + 784), (layer, len(layer))):
         for at in range(0, size if size < 400 else 0, 4):
             for word in (0, 1, 3, 300, 0x7FC00000, 0xBF800000, 0xFFFFFFFF):
@@ -131,14 +132,14 @@ def workers(put, text):
 
 
 def owners(put, text):
-    """What an engine's owner is answered (tests/fuzz/worker/worker_answers_fuzz.cc)."""
+    """Writes seeds of the answers that an engine's owner receives (tests/fuzz/worker/worker_answers_fuzz.cc)."""
     say = lambda *words: b"".join(bytes([w]) if isinstance(w, int) else w for w in words)
     ready, right = say(10, 0, 0, text(b"a device")), say(7, 0)
     target = lambda shape=0, sub_frames=0, form=0: say(0, shape, sub_frames, form)
     frame = lambda number, holds=0, off=0: say(3, number, holds, off)
     draw = lambda value, numbers, wrong=0: say(9, 0, value, bytes(numbers), wrong)
     delta, voxels, invite, join = say(1, 0, 7), say(4, 1, 64), say(5, text(b"a")), say(6, text(b"a"), 0, 2)
-    none = say(12, 33, 0, 77, text(b""), 0)  # of a call that was never made
+    none = say(12, 33, 0, 77, text(b""), 0)  # for a call that was never made
     front = ready + target() + right
     for shape, pictures in ((0, 4), (1, 4), (2, 4), (3, 1), (4, 4)):
         for sub_frames in (0, 1):
@@ -158,11 +159,12 @@ def owners(put, text):
     for what in asked.values():
         for answer in (right, say(8, 0, 15, text(b"lost")), say(8, 0, 3, text(b"refused")), say(8, 0, 200, text(b"")), ready, say(11, 0), say(9, 0, 1, bytes(4), 0), none, say(15, 0), say(15, 1)):
             put("worker_answers", what + answer + delta + right)
-        for kind in (33, 34, 35, 32, 0, 1, 255):  # too short, with a descriptor, too long, and what is no message
+        for kind in (33, 34, 35, 32, 0, 1, 255):  # too short, with a descriptor, too long, and what is not a message
             for how in (0, 1, 2, 4):
                 put("worker_answers", what + say(12, kind, 1, 0, text(b"ab"), how) + delta + right)
-    put("worker_answers", ready + frame(1) + say(9, 0, 1, bytes(4), 0))  # before there is a target
-    put("worker_answers", front + frame(1) + target(1) + say(7, 1) + draw(1, [1] * 4) + frame(2) + draw(2, [2] * 4))  # of the target before
+    put("worker_answers", ready + frame(1) + say(9, 0, 1, bytes(4), 0))  # before a target is set
+    # for the previous target
+    put("worker_answers", front + frame(1) + target(1) + say(7, 1) + draw(1, [1] * 4) + frame(2) + draw(2, [2] * 4))
     for kind in range(3):
         put("worker_answers", say(10, 0, kind, text(b"x" * 200)) + target() + right)
 
@@ -190,7 +192,7 @@ def viewers(put, text):
 
 
 def states(put, _):
-    """Files of the daemon's state, with rows of every kind (daemon/state/state_file.cc), and others that are none."""
+    """Writes seeds of files of the daemon's state, with rows of every kind (daemon/state/state_file.cc), and others that are not state files."""
     owner, thing, layer, entity = classes("KeptOwner", "KeptObject", "KeptLayer", "KeptEntity")
     read = lambda kind, line: text_format.Parse(line, kind()).SerializeToString()
     box = "primitive { box { size { x: 1 y: 1 z: 1 } } }"
@@ -236,7 +238,7 @@ def devices(put, text):
 
 
 def hosts(put, _):
-    """A device that lies once, in each of the first things that it says."""
+    """Writes seeds of a device that lies once, in each of the first things that it reports."""
     for holding in (0, 1):
         for at in range(16):
             tell = lambda *lie: put("voxlink_host", bytes([holding]) + bytes(at) + bytes(lie) + bytes(40) + bytes([0, 9, 2, 200, 9, 250]) + bytes(60))
@@ -250,7 +252,7 @@ def hosts(put, _):
 
 
 def producers(put, text):
-    """Over the local socket: what is no packet, and packets that go with it."""
+    """Writes seeds for the local socket: what is not a packet, and packets that go with it."""
     hello, release = b"\x00", lambda number: bytes([4, number])
     hold = lambda number, size, seals=0: bytes([1]) + struct.pack("<H", size) + bytes([number, seals])
     other = lambda choice, *more: bytes([7, choice, *more])
@@ -274,7 +276,7 @@ def producers(put, text):
 
 
 def assets(put, text):
-    """Uploads, in memory, in a folder, and in one that is none or is damaged."""
+    """Writes seeds of uploads, in memory, in a folder, and in a folder that is damaged or does not exist."""
     begin = lambda content, choice=0, *more: bytes([0, content, choice, *more])
     append = lambda upload, choice=0, size=8192, *more: bytes([2, upload, choice]) + struct.pack("<H", size) + bytes(more)
     finish, abandon = lambda upload=0: bytes([4, upload]), lambda upload=0: bytes([5, upload])

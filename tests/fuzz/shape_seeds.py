@@ -1,5 +1,6 @@
-"""Seeds by hand: files and texts of the shapes that real ones seldom have, each reader's refusals among them. For make_seeds.py, which
-gives `put(target, bytes)`."""
+"""Hand-written seeds: files and texts in forms that real ones seldom have, including each reader's refusals. For make_seeds.py, which
+passes
+`put(target, bytes)`."""
 import base64
 import copy
 import json
@@ -14,7 +15,7 @@ PROTO = pathlib.Path(__file__).resolve().parents[2] / "proto"
 
 
 def model():
-    """A glTF document that has a bit of everything."""
+    """Returns a glTF document that has a little of everything."""
     data = struct.pack("<9f", *range(9)) + struct.pack("<4H", 0, 1, 2, 0) + bytes([0, 1, 2, 0]) + struct.pack("<3I", 0, 1, 2)
     return {
         "asset": {"version": "2.0"},

@@ -1,4 +1,5 @@
-"""Seeds by hand for the readers of maps, points, molecules and drawings: every form that they know, and each of their refusals. As
+"""Hand-written seeds for the readers of maps, points, molecules and drawings: every form that they support, and each of their refusals.
+Like
 shape_seeds.py."""
 import json
 import pathlib
@@ -90,7 +91,7 @@ def drawings(put):
         '<rect width="9" height="9" fill="#888"/><circle r="1"/>', '<rect width="9" height="9" fill="white" opacity=".5"/><circle r="1"/>', "".join(f'<rect width="9" height="9" fill="#{i % 10}{i // 10}5"/>' for i in range(40)), path("M0 0 0 0 0 0z"), path("M0 0 3 0", "stroke='red'"),
         path("M0 0 9 9 0 9 9 0z", 'fill-rule="evenodd"'), path("M0 0 9 9 0 9 9 0z M1 1 8 8 1 8 8 1z"), path("M0 0 3 0z", "stroke='red' fill='blue'"), '<line x2="5" fill="red"/>', path("M0 0 0 9", "stroke='red'") + path("M0 0 0 5", "stroke='blue'"), path("M1e12 0 3 0 1 1"),
     ]
-    # Lines that cross one another too often to be filled, and more of them than are looked at one by one.
+    # Lines that cross one another too often to be filled, and more of them than are examined one by one.
     star = "M" + " ".join(f"{(i * 7919) % 997},{(i * 104729) % 991}" for i in range(1500)) + "z"
     curves = "M0 0" + "".join(f"s{i % 9} {i % 7} {i % 5} {i % 3}" for i in range(150))
     for body in (path(star), path(star[:3000]), path(curves, stroke), path("M0 0" + "h9v1h-9v1" * 700, stroke)):
@@ -114,7 +115,7 @@ def grants(put):
 
 
 def configurations(put):
-    """Each key of daemon/config/fields.h in its section, with values of every kind."""
+    """Writes seeds of each key of daemon/config/fields.h in its section, with values of every kind."""
     section = ""
     for word, name in re.findall(r'visitor\.(\w+)\("(\w+)"', (ROOT / "daemon/config/fields.h").read_text()):
         if word == "Section":

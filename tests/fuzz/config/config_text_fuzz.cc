@@ -1,4 +1,5 @@
-// The configuration's text: every fault with its place, or what reads back the same when it is printed.
+// The configuration's text: it gives either errors with their places, or a configuration that is
+// the same when it is printed and read again.
 
 #include <cstdint>
 #include <string>
@@ -13,7 +14,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace voxeld;  // NOLINT(google-build-using-namespace)
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   daemon::Config config;
-  config.server.listen = {*daemon::ParseAddress("127.0.0.1:50551")};  // as without a file
+  config.server.listen = {*daemon::ParseAddress("127.0.0.1:50551")};  // the default without a file
   const absl::Status status = daemon::ReadConfigText(text, "file", &config);
   if (!status.ok()) {
     EXPECT_THAT_HOLDS(absl::IsInvalidArgument(status), status.ToString());

@@ -1,4 +1,4 @@
-// The grants file, and callers by it.
+// The grants file, and the callers that it identifies.
 
 #include <cstdint>
 #include <set>
@@ -30,7 +30,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace voxeld;                  // NOLINT(google-build-using-namespace)
   using namespace voxeld::daemon::access;  // NOLINT(google-build-using-namespace)
   const std::string_view text(reinterpret_cast<const char*>(data), size);
-  const std::string hash = HashOf(text);  // as of a token that somebody shows
+  const std::string hash = HashOf(text);  // as if a caller presented the text as its token
   EXPECT_THAT_HOLDS(
       hash.size() == 64 && hash.find_first_not_of("0123456789abcdef") == std::string::npos, hash);
   const absl::StatusOr<Scopes> scopes = ParseScopes(text);

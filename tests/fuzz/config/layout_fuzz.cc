@@ -1,4 +1,4 @@
-// Layout files of Open Pixel Control; and, behind a '=', options that say how a cube is wired.
+// Layout files of Open Pixel Control; and, after a '=', options for the wiring of a cube.
 
 #include <cstdint>
 #include <map>
@@ -38,7 +38,7 @@ void ReadCube(const std::string& text) {
   for (const std::string& option : std::vector<std::string>(absl::StrSplit(text, ','))) {
     const std::pair<std::string, std::string> pair =
         absl::StrSplit(option, absl::MaxSplits('=', 1));
-    // A file is whoever's.
+    // A path could name any file.
     if (pair.first != "layout") options.options[pair.first] = pair.second;
   }
   display::OptionReader reader(options);

@@ -1,4 +1,4 @@
-// Profiles, and what their options come to: a display's geometry, format and tone, or what is wrong.
+// Profiles and their options: the result is a display's geometry, format and tone, or an error.
 
 #include <cstdint>
 #include <string>

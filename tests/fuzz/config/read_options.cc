@@ -28,7 +28,7 @@ void ReadOptions(const display::DisplayOptions& options) {
       for (size_t i = 1; i < channel.size(); ++i) EXPECT_THAT_HOLDS(channel[i] >= channel[i - 1]);
     }
   }
-  // Files are named by paths, and those are whoever's.
+  // Files are named by paths, which could name any file.
   if (options.options.contains("layout")) return;
   sync::FakeClock clock;
   for (const std::string& driver : display::DriverNames()) {

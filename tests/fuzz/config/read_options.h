@@ -1,11 +1,11 @@
-// A display's options, read as drivers do.
+// Reads a display's options as drivers do.
 #pragma once
 
 #include "display/drivers/options.h"
 
 namespace voxeld::fuzz {
 
-// Geometry and tone; of those that are taken, that they hold together.
+// Reads geometry and tone; if they are accepted, checks that they are consistent.
 void ReadOptions(const display::DisplayOptions& options);
 
 }  // namespace voxeld::fuzz

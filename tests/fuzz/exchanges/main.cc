@@ -1,7 +1,9 @@
-// Exchanges with devices and peers that mean harm, as many as are asked for: the targets of tests/fuzz in long sessions. Each job is a
-// process with sessions of its own, so that what ends it tells which session it was.
+// Runs a given number of exchanges with malicious devices and peers: the targets of tests/fuzz in
+// long sessions. Each job is a process with sessions of its own, so that when one is terminated the
+// session is known.
 //
-// Ends with 0 if all that must hold did, with 1 and the way to try again if something did not, with 2 if it was asked wrongly.
+// Exits with 0 if everything held that must hold, with 1 and the command to repeat it if something
+// did not, and with 2 if the arguments are wrong.
 
 #include <google/protobuf/stubs/logging.h>
 #include <sys/mman.h>
@@ -30,7 +32,8 @@
 #include "tests/fuzz/exchanges/sessions.h"
 
 #ifdef VOXELD_SANITIZED
-// What holds memory back for long, or looks at each function's own, would halve the exchanges.
+// Delaying the release of memory, or checking each function's own stack, would halve the number of
+// exchanges.
 extern "C" const char* __asan_default_options();
 extern "C" const char* __asan_default_options() {
   return "quarantine_size_mb=16:malloc_context_size=6:detect_stack_use_after_return=0:"
@@ -50,14 +53,14 @@ struct Options {
   uint64_t exchanges = 100'000;
   uint64_t jobs = 1;
   uint64_t session = 0;
-  bool one = false;  // that session alone
+  bool one = false;  // only that session
   std::string save;
   std::string corpus = VOXELD_FUZZ_CORPUS;
   double seconds = 0;
   bool json = false;
 };
 
-// Of a job, in memory that it shares with its parent.
+// The state of a job, in memory that it shares with its parent.
 struct Job {
   Exchanges exchanges;
   std::atomic<uint64_t> session = 0, sessions = 0;
@@ -120,11 +123,11 @@ uint64_t Total(const Job& job) {
       .load(std::memory_order_relaxed);
 }
 
-// A job's process.
+// Runs in the process of a job.
 [[noreturn]] void Work(const Sessions& sessions, const Options& options, Job& job, uint64_t first,
                        std::chrono::steady_clock::time_point end) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
-  google::protobuf::SetLogHandler(nullptr);  // it tells of each string that is none
+  google::protobuf::SetLogHandler(nullptr);  // it reports each invalid string
   exchanges = &job.exchanges;
   const uint64_t share = (options.exchanges + options.jobs - 1) / options.jobs;
   for (uint64_t session = first;; session += options.jobs) {
@@ -136,7 +139,7 @@ uint64_t Total(const Job& job) {
     sessions.Run(session);
     ++job.sessions;
   }
-  std::exit(0);  // with a look for leaks
+  std::exit(0);  // with a check for leaks
 }
 
 void Say(const Job& job, const Options& options, const std::string& why) {

@@ -24,7 +24,7 @@ constexpr size_t kMostInput = 256 << 10;
 
 size_t Below(std::mt19937_64& random, size_t end) { return random() % end; }
 
-// Some bytes of `from`.
+// Returns some bytes of `from`.
 Input Piece(const Input& from, std::mt19937_64& random) {
   if (from.empty()) return {};
   const size_t begin = Below(random, from.size());
@@ -97,7 +97,7 @@ Input Mutated(const std::vector<Input>& corpus, int pieces, std::mt19937_64& ran
   Input all;
   for (size_t left = 1 + Below(random, static_cast<size_t>(pieces)); left > 0; --left) {
     Input input = corpus[Below(random, corpus.size())];
-    // One in four as it is; the others the less damaged the more often.
+    // One in four stays unchanged; in the others, few changes are more frequent than many.
     if (Below(random, 4) != 0) {
       for (size_t times = size_t{1} << Below(random, 5); times > 0; --times) {
         Damage(input, corpus, random);
@@ -105,7 +105,7 @@ Input Mutated(const std::vector<Input>& corpus, int pieces, std::mt19937_64& ran
     }
     if (all.size() + input.size() > kMostInput) break;
     all.insert(all.end(), input.begin(), input.end());
-    // So that a text that was cut does not take in what follows (tests/fuzz/script.h).
+    // So that a truncated text does not include what follows it (tests/fuzz/script.h).
     if (left > 1) all.insert(all.end(), {'\\', 'a'});
   }
   return all;

@@ -1,4 +1,5 @@
-// Inputs of targets from those that are known (fuzz/corpus of the build, unpacked from tests/fuzz/corpus): put together and damaged, as a seed says.
+// Makes inputs for targets from known ones (fuzz/corpus of the build, unpacked from
+// tests/fuzz/corpus): combined and damaged according to a seed.
 #pragma once
 
 #include <cstddef>
@@ -12,14 +13,15 @@ namespace voxeld::fuzz {
 
 using Input = std::vector<uint8_t>;
 
-// Every file of `folder`, by name; empty where there is none.
+// Returns every file of `folder`, by name; empty if the folder does not exist.
 std::vector<Input> ReadCorpus(const std::filesystem::path& folder);
 
-// Up to `pieces` of `corpus` (not empty) one after another, most of them damaged: bits, bytes, numbers, what is left out, said
-// twice, or said by another.
+// Returns up to `pieces` inputs of `corpus` (not empty) one after another, most of them damaged:
+// bits, bytes and numbers are changed, and parts are removed, doubled, or replaced by parts of
+// another.
 Input Mutated(const std::vector<Input>& corpus, int pieces, std::mt19937_64& random);
 
-// `size` bytes of which each may be anything.
+// Returns `size` random bytes.
 Input AnyBytes(size_t size, std::mt19937_64& random);
 
 }  // namespace voxeld::fuzz

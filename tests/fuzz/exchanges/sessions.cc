@@ -8,7 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "tests/fuzz/script.h"
 
-// The targets, each compiled under a name of its own (CMakeLists.txt).
+// The targets, each compiled under its own name (CMakeLists.txt).
 extern "C" {
 int FuzzVoxlinkHost(const uint8_t* data, size_t size);
 int FuzzVoxlinkCapabilities(const uint8_t* data, size_t size);
@@ -29,7 +29,8 @@ int FuzzGreeting(const uint8_t* data, size_t size);
 namespace voxeld::fuzz {
 namespace {
 
-// What a script may say in one session, times what it may say to a fuzzer: setting up costs more than many messages.
+// The steps of a script in one session, as a multiple of those for a fuzzer: setting up costs more
+// than many messages.
 constexpr int kStepsTimes = 64;
 
 uint64_t Mix(uint64_t a, uint64_t b) {
@@ -105,7 +106,7 @@ Sessions::Known Sessions::InputOf(uint64_t session) const {
 
 void Sessions::Run(uint64_t session) const {
   const Chosen chosen = Choose(session);
-  // Of just that size, so that reading beyond is seen.
+  // It has exactly that size, so that reading beyond it is detected.
   const Input exact(chosen.input.begin(), chosen.input.end());
   steps_times = kStepsTimes;
   chosen.attack->run(exact.data(), exact.size());

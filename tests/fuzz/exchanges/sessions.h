@@ -1,4 +1,5 @@
-// Sessions of one side that means harm: which target, and with what input, is decided by the seed and the session's number alone.
+// Sessions with one malicious side: the seed and the session's number alone determine the target
+// and its input.
 #pragma once
 
 #include <cstdint>
@@ -13,14 +14,16 @@ namespace voxeld::fuzz {
 
 class Sessions {
  public:
-  // "device": drivers and what they read, by devices; "peer": what clients, programs and pages send, by them. InvalidArgument if it is
-  // another, NotFound where `corpora` has no seeds for a target.
+  // `side` is "device" (drivers and what they read, attacked by devices) or "peer" (clients,
+  // programs and pages).
+  // Errors: InvalidArgument for another side, NotFound if `corpora` has no seeds for a target.
   static absl::StatusOr<Sessions> Make(const std::string& side, uint64_t seed,
                                        const std::filesystem::path& corpora);
 
-  // Runs it in this thread. What must hold and does not ends the process (tests/fuzz/expect.h).
+  // Runs a session in this thread. If something that must hold does not, the process is terminated
+  // (tests/fuzz/expect.h).
   void Run(uint64_t session) const;
-  // Of that session: the target's name and its input.
+  // The target's name and the input of a session.
   struct Known {
     const char* target;
     Input input;
@@ -29,12 +32,13 @@ class Sessions {
 
  private:
   struct Attack {
-    const char* target = nullptr;  // and its folder of corpora
+    const char* target = nullptr;  // and the folder of its corpora
     int (*run)(const uint8_t* data, size_t size) = nullptr;
-    uint32_t weight = 0;  // sessions of that many of all
-    int pieces = 0;       // inputs of the corpus in one
+    uint32_t weight = 0;  // the number of sessions, out of all
+    int pieces = 0;       // inputs of the corpus in one session
     size_t any_bytes =
-        0;  // in three sessions of four so many at the most, in place of the corpus; 0: never
+        0;  // in three sessions of four, up to that many random bytes in place of the corpus; 0:
+            // never
     std::vector<Input> corpus = {};
   };
   struct Chosen {

@@ -1,5 +1,5 @@
-// A program that was let through, run on numbers, intervals and hoisted: nothing is read or written beside it, and intervals hold
-// what the numbers are.
+// Runs an accepted program on numbers, on intervals and hoisted: it reads and writes only its own
+// memory, and intervals contain the numbers.
 #pragma once
 
 #include <cstdint>
@@ -46,7 +46,7 @@ inline void Evaluate(std::span<const uint32_t> words, const float low[3], const 
                       numbers[part.slot], " is not in [", intervals[part.slot].lo, ", ",
                       intervals[part.slot].hi, "]");
   }
-  // The same operations in the same order, parted by axes.
+  // The same operations in the same order, divided by axes.
   const uint32_t depends[3] = {1, 2, 4};
   const std::vector<uint32_t> parted = gpu::implicit::Hoist(program, depends);
   const gpu::implicit::HoistedView hoisted{parted.data()};

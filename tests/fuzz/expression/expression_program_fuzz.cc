@@ -1,4 +1,4 @@
-// Words that say that they are a program: refused, or run without harm.
+// Words that claim to be a program: refused, or run without harm.
 
 #include <cstdint>
 #include <cstring>

@@ -1,4 +1,4 @@
-// Expressions as text: refused with a reason, or a program that may be run.
+// Expressions as text: refused with a reason, or compiled to a program that can be run.
 
 #include <bit>
 #include <cmath>
@@ -29,7 +29,7 @@ void Run(Script script) {
   const std::string text = script.Text();
   implicit::Parameters parameters;
   for (int i = script.Byte() % 4; i > 0; --i) {
-    std::string name = "p";  // the caller's are letters and digits
+    std::string name = "p";  // the caller's names are letters and digits
     for (const char c : script.Text()) {
       if (absl::ascii_isalnum(static_cast<unsigned char>(c))) name += c;
     }

@@ -1,5 +1,6 @@
-// The viewer and pages that mean harm: messages of text, in time, while displays show or do not, and are lost. What a page is told is JSON
-// or a volume's bytes; one that is wrong has an error, one that asks for a comparison an answer.
+// The viewer, and malicious pages: text messages over time, while displays show or do not, and are
+// lost. A page receives JSON or a volume's bytes; a wrong message is answered with an error, and a
+// request for a comparison with an answer.
 
 #include <algorithm>
 #include <cstdint>
@@ -40,7 +41,7 @@ class Peer final : public http::WebSocketPeer {
       EXPECT_THAT_HOLDS(json["error"].is_string() && !json["error"].get<std::string>().empty());
     }
   }
-  // Of any thread.
+  // May be called in any thread.
   void Post(std::function<void()> what) override {
     const sync::MutexLock lock(mutex_);
     posted_.push_back(std::move(what));
@@ -50,7 +51,7 @@ class Peer final : public http::WebSocketPeer {
     closed = true;
   }
 
-  // What was posted first, carried out. False: there is nothing.
+  // Runs the function that was posted first. Returns false if none is waiting.
   bool CarryOut() {
     std::function<void()> what;
     {
@@ -71,7 +72,7 @@ class Peer final : public http::WebSocketPeer {
   std::deque<std::function<void()>> posted_ VOXELD_GUARDED_BY(mutex_);
 };
 
-// Whether a message asks for a comparison, as docs/protocols/viewer.md has it.
+// Returns whether a message requests a comparison, according to docs/protocols/viewer.md.
 bool AsksToCompare(const Json& json) {
   if (!json.is_object() || !json.contains("compare")) return false;
   for (const char* before : {"hello", "watch", "shown", "unwatch", "dark"}) {
@@ -80,7 +81,7 @@ bool AsksToCompare(const Json& json) {
   return true;
 }
 
-// Lights at places, which a page is not told of one by one.
+// Lights at points; a page is not told their places one by one.
 display::DisplayInfo Lights() {
   display::DisplayInfo info = testing::SmallDisplay("lights");
   display::Lattice lattice;
@@ -125,7 +126,7 @@ class Session {
           break;
         default: {
           Page& page = pages_[(what >> 3) % kPages];
-          if (what >= 0xF8) page = Page();  // it goes; another comes in its place
+          if (what >= 0xF8) page = Page();  // it disconnects; another takes its place
           Say(page, script.Text(), (what & 0x80) == 0);
           break;
         }
@@ -158,7 +159,7 @@ class Session {
     simulation_.core->Step();
   }
 
-  // `wait`: for a comparison to end.
+  // `wait`: waits for a comparison to end.
   void Say(Page& page, std::string text, bool wait) {
     if (page.service == nullptr) {
       page.peer = std::make_shared<Peer>();
@@ -173,7 +174,7 @@ class Session {
     Settle();
     while (wait && AsksToCompare(json) && peer.errors == errors && peer.compared == compared) {
       if (!peer.CarryOut()) {
-        // Who compares rests between two, by the clock that stands still here.
+        // The comparer pauses between two comparisons, by the clock that stands still here.
         if (simulation_.clock.waiters() > 0) simulation_.Advance(sync::kSecond);
         std::this_thread::yield();
       }

@@ -1,5 +1,5 @@
-// A WebSocket from its upgrade on: whatever the other end sends, whole messages of text come to the service, in order, or the
-// connection ends, once.
+// A WebSocket from its upgrade on: whatever the peer sends, whole text messages reach the service
+// in order, or the connection ends, once.
 
 #include <sys/socket.h>
 #include <unistd.h>
@@ -26,7 +26,7 @@ namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace http = daemon::http;
 
-// Says back what it hears.
+// Sends back what it receives.
 class Echo final : public http::WebSocketService {
  public:
   Echo(std::shared_ptr<http::WebSocketPeer> peer, std::string* heard)
@@ -44,7 +44,7 @@ class Echo final : public http::WebSocketService {
   std::string* const heard_;
 };
 
-// A frame as clients send it, masked by zeros.
+// Returns a frame as clients send it, masked with zeros.
 std::string Frame(uint8_t head, const std::string& payload) {
   std::string frame(1, static_cast<char>(head));
   if (payload.size() < 126) {
@@ -99,7 +99,7 @@ class Session {
  private:
   void Step() {
     switch (script_.Byte() % 6) {
-      case 0: {  // one whole message
+      case 0: {  // a whole message
         const std::string text = script_.Text();
         const bool ascii = std::all_of(text.begin(), text.end(), [](char c) { return c > 0; });
         const size_t before = heard_.size();
@@ -168,7 +168,7 @@ class Session {
   std::string heard_;
   int closed_ = 0;
   bool answered_ = false, accepted_ = false;
-  bool clean_ = true;  // nothing but whole messages so far
+  bool clean_ = true;  // only whole messages so far
 };
 
 }  // namespace

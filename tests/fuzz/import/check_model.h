@@ -1,4 +1,4 @@
-// What every reader of files promises.
+// The promises of every reader of files.
 #pragma once
 
 #include <cmath>
@@ -11,7 +11,7 @@
 
 namespace voxeld::fuzz {
 
-// An input: which of `count` readers by its first byte, then the file.
+// An input selects one of `count` readers by its first byte; the rest is the file.
 inline voxelctl::SourceFile FileOf(const uint8_t* data, size_t size, const char* const* extensions,
                                    size_t count, size_t* which) {
   *which = size == 0 ? 0 : data[0] % count;

@@ -1,4 +1,4 @@
-// Points and voxels: PCD, LAS, PLY, MagicaVoxel's.
+// Points and voxels: PCD, LAS, PLY, and MagicaVoxel's format.
 
 #include <cstdint>
 

@@ -1,4 +1,5 @@
-// Meshes: STL, OBJ and glTF, and of other formats the checks that a file has to pass before a library reads it.
+// Meshes: STL, OBJ and glTF; and, for other formats, the checks that a file must pass before a
+// library reads it.
 
 #include <cstdint>
 
@@ -20,7 +21,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   } else if (which == 0 || file.extension == "gltf" || file.extension == "glb") {
     absl::StatusOr<voxeld::voxelctl::Model> model =
         which == 0 ? voxeld::voxelctl::ReadObjModel(file) : voxeld::voxelctl::ReadGltfModel(file);
-    // Which finds coordinates that are not finite.
+    // This finds coordinates that are not finite.
     if (model.ok()) {
       if (absl::Status status = voxeld::voxelctl::CheckModel(file, *model); !status.ok())
         model = status;

@@ -1,4 +1,4 @@
-// Files of text: maps, points, molecules, drawings.
+// Text files: maps, points, molecules, drawings.
 
 #include <cstdint>
 #include <nlohmann/json.hpp>
@@ -11,8 +11,8 @@
 #include "tools/voxelctl/import/molecule.h"
 #include "tools/voxelctl/import/text_points.h"
 
-// fontconfig keeps what it made of the system's configuration until the process ends, and libxml2 loses texts of damaged entities. A
-// reader ends after its file. LeakSanitizer asks this.
+// fontconfig keeps its data on the system's configuration until the process ends, and libxml2 leaks
+// texts of damaged entities. A reader process ends after its file. LeakSanitizer calls this.
 extern "C" const char* __lsan_default_suppressions();  // NOLINT: its name
 extern "C" const char* __lsan_default_suppressions() {
   return "leak:libfontconfig\nleak:xmlParseEntityValue\n";
@@ -32,7 +32,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
         voxeld::fuzz::ExpectSays(document.status());
         break;
       }
-      // As who calls them has seen to.
+      // Its callers have checked this.
       if (!document->is_object() || !document->contains("type") || !(*document)["type"].is_string())
         break;
       for (const bool globe : {false, true}) {

@@ -1,4 +1,5 @@
-// Volumes: NRRD, NIfTI, MetaImage, MRC, TIFF, raw numbers; and the checks before the library that reads DICOM.
+// Volumes: NRRD, NIfTI, MetaImage, MRC, TIFF, raw numbers; and the checks before the library that
+// reads DICOM.
 
 #include <cmath>
 #include <cstdint>
@@ -15,7 +16,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const SourceFile file = voxeld::fuzz::FileOf(data, size, kExtensions, 7, &which);
   switch (which) {
     case 0:
-      // A header that names files beside it reads those.
+      // A header that names files beside it would have those read.
       if (file.bytes.find("data file") != std::string::npos ||
           file.bytes.find("datafile") != std::string::npos)
         break;
@@ -48,7 +49,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       voxeld::fuzz::CheckModel(ReadNiftiVolume(file));
       break;
     case 4:
-      // A header that names files beside it reads those.
+      // A header that names files beside it would have those read.
       if (file.bytes.find("LOCAL") == std::string::npos) break;
       voxeld::fuzz::CheckModel(ReadMetaVolume(file));
       break;

@@ -1,4 +1,4 @@
-// DDP, E1.31 and Art-Net: datagrams one after another, in time.
+// DDP, E1.31 and Art-Net: a sequence of datagrams over time.
 
 #include <cstdint>
 #include <span>
@@ -49,7 +49,7 @@ void Run(Script script) {
       TakePicture(intake, options.lights);
     } else {
       const std::string text = script.Text();
-      // Of just that size, so that reading beyond is seen.
+      // It has exactly that size, so that reading beyond it is detected.
       const std::vector<uint8_t> packet(text.begin(), text.end());
       const lights::IntakeTally before = intake.tally();
       const absl::StatusOr<Datagram> read = lights::ReadDatagram(options.protocol, packet);

@@ -1,4 +1,5 @@
-// Packets to controllers, read again for captures: any bytes, and what was written is what is read.
+// Packets to controllers, read back for captures: any bytes may be read, and what was written is
+// what is read.
 
 #include <algorithm>
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Open Pixel Control: a stream, cut anywhere, is the messages that it is as a whole.
+// Open Pixel Control: a stream that is divided anywhere gives the same messages as the whole.
 
 #include <algorithm>
 #include <cstdint>
@@ -18,7 +18,7 @@ namespace {
 
 using Messages = std::vector<std::pair<uint16_t, std::vector<uint8_t>>>;
 
-// The protocol's page, read once more: channel, command, length, data.
+// A second implementation of the protocol's page: channel, command, length, data.
 Messages Plainly(const std::vector<uint8_t>& stream, size_t* rest) {
   Messages messages;
   size_t at = 0;

@@ -1,4 +1,4 @@
-// What must hold of an intake whatever came.
+// The invariants of an intake, whatever arrived.
 #pragma once
 
 #include "tests/fuzz/expect.h"
@@ -17,7 +17,7 @@ inline void CheckTally(const lights::Intake& intake) {
   ExpectSays(intake.malformed());
 }
 
-// Takes the picture that waits, if there is one.
+// Takes the waiting picture, if one is waiting.
 inline void TakePicture(lights::Intake& intake, size_t lights) {
   const bool waiting = intake.waiting();
   const auto picture = intake.Take();

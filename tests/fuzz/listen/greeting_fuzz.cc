@@ -1,5 +1,5 @@
-// How a stranger's connection begins: however it is cut into pieces, the verdict is the same, and it always asks for more than
-// it has.
+// The beginning of a connection: however it is divided into pieces, the verdict is the same, and it
+// always asks for more than it has.
 
 #include <algorithm>
 #include <cstdint>

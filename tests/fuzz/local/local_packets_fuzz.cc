@@ -1,6 +1,6 @@
-// The local socket, and a producer that means harm: packets over a real socket, with memfds of every size and seal, read or left
-// unread, while the server has descriptors and memory left, or not. Each packet has one answer; what is held counts, and goes with the
-// connection.
+// The local socket, and a malicious producer: packets over a real socket, with memfds of every size
+// and seal, with answers read or left unread, while the server has descriptors and memory left, or
+// not. Each packet has one answer; held memory counts, and is released with the connection.
 
 #include <fcntl.h>
 #include <sys/mman.h>
@@ -38,7 +38,7 @@ Logger& Log() {
   return log;
 }
 
-// While it is there this process can open nothing.
+// While it exists, this process can open nothing.
 class NoDescriptors {
  public:
   NoDescriptors() {
@@ -81,7 +81,7 @@ class Producer {
     EXPECT_THAT_HOLDS(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends) ==
                       0);
     socket_ = ends[0];
-    const int least = 1;  // few answers have room
+    const int least = 1;  // room for few answers
     setsockopt(ends[1], SOL_SOCKET, SO_SNDBUF, &least, sizeof(least));
     connection_ = std::make_unique<local::Connection>(Descriptor(ends[1]), 0, &Log());
   }
@@ -110,7 +110,7 @@ class Producer {
     } else if (what == 4) {
       message.mutable_release()->set_id(script.Byte() % 8);
       packet = message.SerializeAsString();
-    } else if (what == 5) {  // no memfd
+    } else if (what == 5) {  // not a memfd
       message.mutable_memory()->set_id(script.Byte() % 8);
       message.mutable_memory()->set_size(script.Byte());
       packet = message.SerializeAsString();
@@ -133,7 +133,7 @@ class Producer {
     Look();
   }
 
-  // What is no packet.
+  // Sends something that is not a packet.
   void Happen(Script& script) {
     const uint8_t choice = script.Byte();
     if (choice < 0x40) {
@@ -145,7 +145,7 @@ class Producer {
       connection_->Refuse("there is no more room");
       ReadAnswer("packet");
       Connect();
-    } else if (choice < 0x80) {  // it hears no answer
+    } else if (choice < 0x80) {  // it receives no answer
       v1::LocalMessage message;
       message.mutable_release()->set_id(99);
       Send(message.SerializeAsString(), {});
@@ -156,7 +156,7 @@ class Producer {
       EXPECT_THAT_HOLDS(connection_->Serve(tokens_) && !connection_->wants_to_write());
     } else if (choice < 0xC0) {
       PileUp(script.Byte());
-    } else if (choice < 0xE0) {  // somebody reads it for longer than it is held
+    } else if (choice < 0xE0) {  // another thread reads it for longer than it is held
       auto range = registered_.memory->Find(choice % 8u, 0, 1);
       if (range.ok() && kept_.size() < 4) kept_.push_back(*std::move(range));
     } else {
@@ -164,7 +164,8 @@ class Producer {
     }
   }
 
-  // Packets whose answers are left unread until the server cannot send any more; then they are read.
+  // Sends packets whose answers are left unread until the server cannot send any longer; then reads
+  // the answers.
   void PileUp(int packets) {
     if (connection_->memory() == nullptr) return;
     v1::LocalMessage message;
@@ -207,11 +208,11 @@ class Producer {
     EXPECT_THAT_HOLDS(answered || packet.empty(), "a packet has no answer");
   }
 
-  // `last`: there is no other. False: there is none.
+  // `last`: no other answer follows. Returns false if there was no answer.
   bool ReadAnswer(const std::string& packet, bool last) {
     char bytes[8192];
     const ssize_t got = recv(socket_, bytes, sizeof(bytes), 0);
-    if (packet.empty() || got <= 0) return false;  // an empty one is the end
+    if (packet.empty() || got <= 0) return false;  // an empty packet is the end
     v1::LocalAnswer answer;
     EXPECT_THAT_HOLDS(answer.ParseFromArray(bytes, static_cast<int>(got)));
     EXPECT_THAT_HOLDS(answer.what_case() != v1::LocalAnswer::WHAT_NOT_SET);
@@ -246,7 +247,7 @@ class Producer {
   local::Tokens tokens_;
   local::Tokens::Registered registered_;
   std::vector<wire::MappedRange> kept_;
-  bool scarce_ = false;  // when the next packet comes there is no descriptor left
+  bool scarce_ = false;  // no descriptor is left when the next packet arrives
   int socket_ = -1;
   std::unique_ptr<local::Connection> connection_;
 };

@@ -1,5 +1,5 @@
-// A Foxglove server that means harm: what it says of its channels, its messages, and the updates in them. What is up of them is what was put
-// and not removed.
+// A malicious Foxglove server: the channels that it announces, its messages, and the updates in
+// them. The entities shown are those that were put and not removed.
 
 #include <cmath>
 #include <cstdint>

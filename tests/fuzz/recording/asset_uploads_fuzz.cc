@@ -1,4 +1,5 @@
-// Assets: uploads that overlap, break off, go on and lie. What is whole has its hash; figures add up; nothing beyond the limits.
+// Assets: uploads that overlap, are interrupted, continue and lie. A complete asset has its hash;
+// statistics add up; nothing exceeds the limits.
 
 #include <fcntl.h>
 
@@ -28,13 +29,13 @@ constexpr int kMostSteps = 96;
 constexpr size_t kContents = 6;
 constexpr uint64_t kMostBytes = 24 << 10;
 
-// Contents of several sizes, one of them empty.
+// Returns contents of several sizes, one of them empty.
 std::string ContentOf(size_t number) {
   constexpr size_t kSizes[kContents] = {0, 1, 100, 4096, 5000, 8192};
   return std::string(kSizes[number], static_cast<char>('a' + number));
 }
 
-// In memory, and gone with the process.
+// Returns a folder in memory that disappears with the process.
 const std::string& Folder() {
   static const std::string& folder = *new std::string([] {
     char name[] = "/dev/shm/voxeld-fuzz-XXXXXX";
@@ -45,7 +46,7 @@ const std::string& Folder() {
   return folder;
 }
 
-// What a stray file that is called like an asset would have to hash to.
+// Returns the hash that a stray file with an asset's name would have to have.
 const std::string& StrayDigest() {
   static const std::string& digest = *new std::string(32, '\xAA');
   return digest;
@@ -57,8 +58,8 @@ daemon::Logger& Log() {
   return log;
 }
 
-// Of one of the files a byte is another, or its end is gone; or there is a file more. `runs`: while the store is there, which looks at all
-// of an asset once; then it is gone, or its end is.
+// Changes a byte of one of the files, truncates one, or adds a file. `runs`: while the store
+// exists, which checks the whole of an asset once; then a file is removed or truncated.
 void Damage(const std::string& folder, Script& script, bool runs) {
   std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
@@ -97,7 +98,7 @@ void Run(Script script) {
                            .max_assets = 4,
                            .max_uploads = 3,
                            .idle_limit_ns = sync::kSecond};
-  // In memory, or in a folder, which somebody may have put something into, or which is none.
+  // In memory, or in a folder, which may have other files, or which is not a folder.
   const uint8_t where = script.Byte();
   const std::string folder = (where & 1) != 0 ? Folder() : "";
   const std::string none = Folder() + "/none";
@@ -109,7 +110,7 @@ void Run(Script script) {
     contents[i] = ContentOf(i);
     digests[i] = HashBytes(contents[i]);
   }
-  bool damaged = false;  // what is whole is looked at when it is used
+  bool damaged = false;  // a complete file is checked when it is used
   struct Upload {
     size_t content = 0;
     uint64_t at = 0;
@@ -155,7 +156,7 @@ void Run(Script script) {
         ExpectSays(status);
         if (!status.ok()) break;
         EXPECT_THAT_HOLDS(offset == upload.at && !bytes.empty());
-        // It may have been said to be longer than it is.
+        // Its stated size may have been too large.
         upload.true_so_far &=
             upload.at <= content.size() && content.compare(upload.at, bytes.size(), bytes) == 0;
         upload.at += bytes.size();
@@ -178,7 +179,7 @@ void Run(Script script) {
         break;
       }
       case 6: {
-        if (const uint8_t choice = script.Byte(); choice < 32) {  // the daemon starts anew
+        if (const uint8_t choice = script.Byte(); choice < 32) {  // the daemon restarts
           store = nullptr;
           uploads.clear();
           if (!folder.empty() && choice < 16) {
@@ -215,7 +216,7 @@ void Run(Script script) {
       bytes += state.stored;
       const auto* const known = std::find(digests, digests + kContents, state.digest);
       if (known == digests + kContents) {
-        // Somebody's file, by whose name it is an asset: what it is shows when it is used.
+        // A foreign file that has an asset's name: its content is checked when it is used.
         EXPECT_THAT_HOLDS(damaged && state.digest == StrayDigest());
         continue;
       }

@@ -1,4 +1,4 @@
-// Recordings: read front to end, and put up. What comes of it a daemon decodes.
+// Recordings: read from front to end, and replayed. A daemon decodes the result.
 
 #include <sys/mman.h>
 #include <unistd.h>

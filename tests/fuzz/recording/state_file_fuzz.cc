@@ -1,4 +1,5 @@
-// The state file: whatever is there, the daemon has a file to use afterwards, or says why not; rows that are wrong are left out.
+// The state file: whatever the file contains, the daemon has a usable file afterwards, or reports
+// why not; wrong rows are left out.
 
 #include <unistd.h>
 
@@ -22,7 +23,7 @@ namespace {
 using namespace voxeld::daemon;         // NOLINT(google-build-using-namespace)
 using namespace voxeld::daemon::state;  // NOLINT(google-build-using-namespace)
 
-// In memory, and gone with the process.
+// Returns a folder in memory that disappears with the process.
 const std::string& Folder() {
   static const std::string& folder = *new std::string([] {
     char name[] = "/dev/shm/voxeld-fuzz-XXXXXX";
@@ -72,7 +73,7 @@ void Run(const uint8_t* data, size_t size) {
     found = found || (row == key && bytes == "bytes");
   });
   EXPECT_THAT_HOLDS(!read.ok() || found, "a row that was put is not there");
-  // It is nobody else's meanwhile.
+  // No other process can open it in the meantime.
   const auto other = StateFile::Open({.path = path, .vfs = "", .now = [&] { return ++second; }});
   EXPECT_THAT_HOLDS(absl::IsAlreadyExists(other.status()), other.status().ToString());
   for (const Change::What what :

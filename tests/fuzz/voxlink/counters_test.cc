@@ -1,5 +1,6 @@
-// Counters that wrap while volumes go by: numbers of packets and of events (32 bits), and the device's time (64). The device and the
-// decoder take packets from shortly before the wrap on, the driver such events and times, and nobody loses anything.
+// Tests counters that wrap while volumes are sent: numbers of packets and of events (32 bits), and
+// the device's time (64). The device and the decoder get packets from shortly before the wrap on,
+// the driver such events and times, and nothing is lost.
 
 #include <algorithm>
 #include <cstdint>
@@ -79,7 +80,7 @@ TEST_P(Counters, NothingIsLostWhereTheyWrap) {
   display::TransportRig rig(std::move(transport), clock, {[cable] { return cable->Pump(); }});
   rig.Start();
   display::FrameSource source(rig.display().info().layout, 1);
-  // Sweeps are known from here on; the first packet was one that the device had to take for a gap.
+  // From here on sweeps are known; the first packet was one that the device had to take for a gap.
   rig.RunFor(100 * kMillisecond);
   for (uint64_t volume = 1; volume <= 100; ++volume) {
     rig.display().Submit(source.Next(0.5));
@@ -102,7 +103,7 @@ INSTANTIATE_TEST_SUITE_P(Devices, Counters,
                          testing::Values(Case{"Emulated", Emulated}, Case{"Firmware", Firmware}),
                          [](const auto& info) { return std::string(info.param.name); });
 
-// Packets numbered from `first` on, one volume each.
+// Returns packets numbered from `first` on, for `count` volumes.
 std::vector<std::byte> Volumes(const display::FrameLayout& layout, int count, uint32_t first) {
   display::voxlink::PacketWriter writer;
   const std::vector<std::byte> picture(layout.bytes_per_slice(), std::byte{7});
@@ -130,7 +131,7 @@ std::vector<std::byte> Volumes(const display::FrameLayout& layout, int count, ui
 
 TEST(DecoderCounters, ItReadsOnWhereNumbersWrap) {
   constexpr display::FrameLayout kLayout{.slices = 3, .width = 4, .height = 2, .sub_frames = 1};
-  const size_t each = 5;  // packets a volume
+  const size_t each = 5;  // packets in a volume
   for (uint32_t before = 0; before <= 2 * each; ++before) {
     display::voxlink::VoxlinkDecoder decoder(kLayout, 64);
     const absl::Status status =
@@ -140,7 +141,7 @@ TEST(DecoderCounters, ItReadsOnWhereNumbersWrap) {
     ASSERT_TRUE(volume.has_value());
     EXPECT_EQ(volume->volume, 3u);
   }
-  // One that is missing at the wrap is missed.
+  // A packet that is missing at the wrap is detected.
   std::vector<std::byte> bytes = Volumes(kLayout, 1, 0u - 2);
   const size_t slice = sizeof(PacketHeader) + kLayout.bytes_per_slice();
   const size_t begin = sizeof(PacketHeader) + sizeof(display::voxlink::BeginPayload) + slice;

@@ -16,7 +16,7 @@ namespace voxlink = display::voxlink;
 
 namespace {
 
-constexpr size_t kMostPending = 64;  // URBs
+constexpr size_t kMostPending = 64;  // in URBs
 
 }  // namespace
 
@@ -46,7 +46,7 @@ void DeviceSession::Step(Script& script) {
       Request(type, request, value, length, BytesOf(script.Text()));
       break;
     }
-    case 1: {  // one of the protocol's, with what it carries
+    case 1: {  // one of the protocol's, with its data
       const auto request = static_cast<uint8_t>(1 + script.Byte() % 9);
       const auto value = static_cast<uint16_t>(script.Number(2));
       const std::string data = script.Text();
@@ -56,7 +56,7 @@ void DeviceSession::Step(Script& script) {
               in ? std::vector<std::byte>() : BytesOf(data));
       break;
     }
-    case 2: {  // set up: SET_CONFIGURATION, START
+    case 2: {  // set-up: SET_CONFIGURATION, START
       Request(0x00, 0x09, 1, 0, {});
       Request(voxlink::kRequestOut, static_cast<uint8_t>(voxlink::Request::kStart), 0, 0, {});
       writer_.Restart();
@@ -108,7 +108,7 @@ void DeviceSession::Step(Script& script) {
         case 2:
           model_.SetPlugged(true);
           break;
-        default: {  // an endpoint that is none, or a read of another length
+        default: {  // an endpoint that does not exist, or a read of another length
           Urb urb;
           urb.endpoint = script.Byte();
           urb.length = (urb.endpoint & 0x80) != 0 ? script.Byte() : 0;
@@ -169,8 +169,8 @@ void DeviceSession::CheckEvent(std::span<const std::byte> bytes) {
   const auto header = voxlink::Load<voxlink::EventHeader>(bytes);
   EXPECT_THAT_HOLDS(header.length == bytes.size());
   EXPECT_THAT_HOLDS(header.type >= 1 && header.type <= 13, int{header.type});
-  // Numbers of events that had no room stay unused. A session that begins numbers anew; what was left of the one before may have come
-  // after it was asked for.
+  // Numbers of events that had no room remain unused. A new session restarts its numbers; events of
+  // the previous one may have arrived after it was requested.
   const bool anew = header.type == static_cast<uint8_t>(voxlink::EventType::kReady);
   EXPECT_THAT_HOLDS(!numbered_ || anew || static_cast<int32_t>(header.sequence - next_event_) >= 0,
                     "an event's number does not ascend");

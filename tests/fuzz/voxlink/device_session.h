@@ -1,5 +1,5 @@
-// A host of voxlink that means harm, as a script says, at the cable's end of a device model: requests, packets, reads, time, and
-// the plug. What must hold of any device is asked after each step.
+// A malicious voxlink host, controlled by a script, at the end of a device model's cable: requests,
+// packets, reads, time, and the plug. After each step, the invariants of any device are checked.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,8 @@ namespace voxeld::fuzz {
 
 class DeviceSession {
  public:
-  // Both outlive it. `look` is called after each step; transfers are counted as `kind`.
+  // `model` and `clock` outlive it. `look` is called after each step; transfers are counted as
+  // `kind`.
   DeviceSession(display::UsbDeviceModel& model, sync::FakeClock& clock, ExchangeKind kind,
                 std::function<void()> look);
 
@@ -46,7 +47,7 @@ class DeviceSession {
   uint64_t next_id_ = 1;
   std::map<uint64_t, Pending> pending_;
   uint32_t next_event_ = 0;
-  bool numbered_ = false;  // events have come of this session
+  bool numbered_ = false;  // events of this session have arrived
 };
 
 }  // namespace voxeld::fuzz

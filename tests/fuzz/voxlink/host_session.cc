@@ -46,7 +46,7 @@ HostSession::HostSession(Script& script) : script_(script) {
 void HostSession::Run() {
   if (holding_) display_->SetHolding();
   EXPECT_THAT_HOLDS(display_->Start(&ledger_, [this] { woken_ = true; }).ok());
-  // As captures have it: the driver's own bytes never break the protocol.
+  // As for captures: the driver's own bytes never break the protocol.
   display_->Watch(
       [](const absl::StatusOr<display::DecodedVolume>& volume) { ExpectSays(volume.status()); });
   Pass(0);
@@ -59,7 +59,7 @@ void HostSession::Run() {
   (void)display_->SetBrightness(1);
   (void)display_->SetPowerLimit(0);
   Submit(script_.Byte());
-  // Beyond the longest back-off.
+  // Longer than the longest back-off.
   for (int i = 0; i < 120 && !ShowsTheNewest(); ++i) {
     Order(clock_.Now(), 0);
     Pass(100 * kMillisecond);

@@ -1,5 +1,6 @@
-// The voxlink driver over a cable to a device that lies, both as a script says: each volume has one outcome, and once the device
-// tells the truth the display shows the newest one. On a clock of its own; one thread.
+// The voxlink driver over a cable to a device that lies, both controlled by a script: each volume
+// has one outcome, and once the device tells the truth the display shows the newest one. On a clock
+// of its own; single-threaded.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +20,7 @@
 
 namespace voxeld::fuzz {
 
-// Outcomes of volumes.
+// Records the outcomes of volumes.
 struct Ledger final : display::Display::Listener {
   void OnOutcome(const display::VolumeOutcome& outcome) override {
     EXPECT_THAT_HOLDS(owed.erase(outcome.volume) == 1, "volume ", outcome.volume,
@@ -35,13 +36,14 @@ struct Ledger final : display::Display::Listener {
     if (!taken) held = volume;
   }
   std::set<uint64_t> owed;
-  uint64_t held = 0;  // by the device; 0: none
+  uint64_t held = 0;  // held by the device; 0: none
 };
 
 class HostSession {
  public:
-  // The script's first byte says how (its lowest two bits: a genlock's display, where they are 1; the next two: how rare lies are, the
-  // highest: numbers of packets and events, and the device's time, begin shortly before they wrap).
+  // The script's first byte selects the mode (its lowest two bits: a genlock's display, if they are
+  // 1; the next two: how rare lies are; the highest: numbers of packets and events, and the
+  // device's time, begin shortly before they wrap).
   explicit HostSession(Script& script);
   ~HostSession() { display_->Stop(); }
 
@@ -67,7 +69,7 @@ class HostSession {
   std::shared_ptr<display::SliceFrame> newest_;
   uint64_t volume_ = 0;
   bool holding_ = false;
-  bool rare_ = false;  // lies, darkness and unplugged cables
+  bool rare_ = false;  // of lies, darkness and unplugged cables
   bool woken_ = false;
   sync::TimeNs next_ = 0;
 };

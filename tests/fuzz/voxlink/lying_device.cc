@@ -16,7 +16,7 @@ namespace voxlink = display::voxlink;
 
 namespace {
 
-// Of 256 answers so many are true, by rarity.
+// How many of 256 answers are true, by rarity.
 constexpr std::array<uint8_t, 4> kTrueBelow = {0x80, 0xD0, 0xF0, 0xFC};
 constexpr size_t kMostLate = 32;
 
@@ -35,7 +35,7 @@ ExchangeKind KindOf(const Urb& urb) {
              : ExchangeKind::kCapabilities;
 }
 
-// Packets that lie whole in one transfer, which is how the driver sends them, with other numbers.
+// Renumbers packets that are whole in one transfer, which is how the driver sends them.
 void Renumber(std::vector<std::byte>& bytes, uint32_t shift) {
   size_t at = 0;
   while (bytes.size() - at >= sizeof(voxlink::PacketHeader)) {
@@ -209,7 +209,7 @@ ExchangeOutcome LyingDevice::Lie(uint64_t id, const Asked& asked, TransferStatus
     }
     lie |= 0x80;
   }
-  if (lie < 0x90) {  // it ends otherwise
+  if (lie < 0x90) {  // it ends with another status
     complete_(id, static_cast<TransferStatus>(script_.Byte() % 7), 0, {});
     return ExchangeOutcome::kFailed;
   }

@@ -1,5 +1,6 @@
-// A voxlink device that lies, as a script says: around a model, whose answers and reports it passes on, changes, holds back or says
-// again. Each answer is counted (tests/fuzz/exchanges.h). As its model: one thread.
+// A voxlink device that lies, controlled by a script: it wraps a model, whose answers and reports
+// it forwards, changes, holds back or repeats. Each answer is counted (tests/fuzz/exchanges.h).
+// Like its model, it is single-threaded.
 #pragma once
 
 #include <cstddef>
@@ -20,9 +21,9 @@ namespace voxeld::fuzz {
 class LyingDevice final : public display::UsbDeviceModel {
  public:
   struct Ways {
-    // 0: every other answer; 1 to 3: the more, the rarer, and then of more kinds.
+    // 0: every other answer is a lie; 1 to 3: lies are increasingly rare, and of more kinds.
     uint8_t rarity = 0;
-    // Added to the numbers of packets that come in and of events that go out, and to the device's time.
+    // Added to the numbers of incoming packets and of outgoing events, and to the device's time.
     uint32_t sequence_shift = 0;
     uint64_t time_shift = 0;
   };
@@ -31,7 +32,7 @@ class LyingDevice final : public display::UsbDeviceModel {
               const Ways& ways)
       : device_(std::move(device)), clock_(clock), script_(script), ways_(ways) {}
 
-  // From now on; the numbers stay shifted.
+  // Stops lying from now on; the numbers stay shifted.
   void TellTheTruth() { truthful_ = true; }
 
   void SetComplete(Complete complete) override;
@@ -49,7 +50,7 @@ class LyingDevice final : public display::UsbDeviceModel {
   struct Asked {
     size_t in = 0, out = 0;
     ExchangeKind kind = ExchangeKind::kWrite;
-    std::vector<std::byte> copy;  // of what the device gets in place of what was sent
+    std::vector<std::byte> copy;  // the bytes that the device gets in place of those that were sent
     bool damaged = false;
   };
   struct Late {
@@ -75,7 +76,7 @@ class LyingDevice final : public display::UsbDeviceModel {
   Complete complete_;
   std::map<uint64_t, Asked> asked_;
   std::deque<Late> late_;
-  std::map<ExchangeKind, std::vector<std::byte>> before_;  // answers to say again
+  std::map<ExchangeKind, std::vector<std::byte>> before_;  // answers to repeat
   bool truthful_ = false;
 };
 

@@ -1,5 +1,5 @@
-// Packets of voxlink as a script says them: sound ones with any contents, which sums of checking would hardly let a fuzzer find,
-// and bytes that are none.
+// Packets of voxlink according to a script: valid ones with any contents, since a fuzzer would
+// hardly find the checksums, and bytes that are not packets.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@ inline std::vector<std::byte> BytesOf(const std::string& text) {
   return {data, data + text.size()};
 }
 
-// Volumes mostly have small numbers, so that they meet.
+// Volumes mostly have small numbers, so that they coincide.
 inline uint64_t Volume(Script& script) {
   const uint8_t byte = script.Byte();
   return byte < 250 ? byte : script.Number(8);
@@ -43,7 +43,7 @@ inline void AppendPacket(Script& script, display::voxlink::PacketWriter& writer,
       writer.Slice(out, volume, slice, sub_frame, offset, BytesOf(script.Text()));
       break;
     }
-    case 2: {  // a picture of so many bytes, all alike
+    case 2: {  // a picture of that many bytes, all alike
       const uint64_t volume = Volume(script);
       const uint32_t slice = script.Byte();
       const uint16_t sub_frame = script.Byte();
@@ -74,7 +74,7 @@ inline void AppendPacket(Script& script, display::voxlink::PacketWriter& writer,
     case 7:
       writer.Restart();
       break;
-    case 8: {  // what was written is damaged, or cut
+    case 8: {  // what was written is damaged, or truncated
       if (out.empty()) break;
       const size_t at = script.Below(65536) % out.size();
       const auto change = static_cast<std::byte>(script.Byte());

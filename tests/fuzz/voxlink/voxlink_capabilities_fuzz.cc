@@ -1,4 +1,5 @@
-// What a device says of itself: refused with a reason, or a geometry that says itself again.
+// A device's description of itself: refused with a reason, or a geometry that is the same when it
+// is encoded and read again.
 
 #include <cstdint>
 #include <span>
@@ -13,7 +14,7 @@ namespace {
 
 namespace voxlink = display::voxlink;
 
-// Displays that are configured otherwise than the device is.
+// Checks displays that are configured differently from the device.
 void CheckOthers(const voxlink::DeviceCapabilities& device, display::Geometry geometry,
                  const display::FrameLayout& layout) {
   const auto refused = [&](const display::Geometry& other, const display::FrameLayout& with) {

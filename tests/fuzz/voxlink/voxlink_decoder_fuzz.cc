@@ -1,4 +1,5 @@
-// The strict reading of a driver's bytes, for captures: cut anywhere it says the same, and a fault stays.
+// The strict reading of a driver's bytes, for captures: divided anywhere it gives the same result,
+// and an error stays.
 
 #include <cstdint>
 #include <optional>
@@ -43,7 +44,7 @@ void Run(Script script) {
   std::vector<std::byte> all;
   std::optional<DecodedVolume> last;
   absl::Status status;
-  // Packets go to one endpoint.
+  // All packets go to one endpoint.
   VoxlinkDecoder other(layout, kMostPayload);
   ExpectSays(other.OnBytes(display::voxlink::kInterruptIn, {}, 0));
   while (!script.done() && all.size() < 64 << 10) {
@@ -65,7 +66,7 @@ void Run(Script script) {
     }
   }
   const absl::Status at_once = whole.OnBytes(display::voxlink::kBulkOut, all, 0);
-  // The text says between which pieces it was.
+  // The message says between which pieces the error was.
   EXPECT_THAT_HOLDS(at_once.code() == status.code(), at_once.ToString(), " or ", status.ToString());
   if (!status.ok()) return;
   const std::optional<DecodedVolume> newest = whole.TakeVolume();

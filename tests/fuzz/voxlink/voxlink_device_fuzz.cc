@@ -1,4 +1,4 @@
-// The model of a voxlink device, and a host that means harm.
+// The model of a voxlink device, and a malicious host.
 
 #include <cstdint>
 

@@ -1,4 +1,4 @@
-// The C99 device for microcontrollers, and a host that means harm.
+// The C99 device for microcontrollers, and a malicious host.
 
 #include <cstdint>
 

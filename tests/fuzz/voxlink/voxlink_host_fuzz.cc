@@ -1,4 +1,5 @@
-// The driver, and a device that lies: what it says of itself, its events, its statuses and how transfers end are what a script says.
+// The driver, and a device that lies: a script determines its description of itself, its events,
+// its statuses and how transfers end.
 
 #include <cstdint>
 

@@ -1,4 +1,4 @@
-// Rows of the state file: whoever wrote them. Refused with a reason, or what is kept of them again is the same.
+// Rows of the state file from any source: refused with a reason, or written again to the same row.
 
 #include <cstdint>
 #include <memory>
@@ -26,7 +26,7 @@ void Refused(const absl::Status& status) {
   CountExchange(ExchangeKind::kKeptRow, false);
 }
 
-// The row of the layer in a scene that it is put into; nothing if it is refused.
+// Returns the layer's row in a scene to which the operation is applied; nullopt if it is refused.
 std::optional<std::string> KeptWhenApplied(const Operation& operation, const Limits& limits) {
   SceneStore store(limits);
   Author author;

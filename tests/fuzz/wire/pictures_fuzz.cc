@@ -1,4 +1,4 @@
-// PNG and JPEG: a head that is believed only as far as it is checked, and rows.
+// PNG and JPEG: a head that is trusted only as far as it is checked, and rows.
 
 #include <cstdint>
 #include <vector>
@@ -17,7 +17,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   const auto [width, height] = file->size();
   EXPECT_THAT_HOLDS(width > 0 && height > 0);
-  // As the decoder does, which has a limit of its own.
+  // Like the decoder, which has a limit of its own.
   if (uint64_t{static_cast<uint32_t>(width)} * static_cast<uint32_t>(height) > 16 << 10) return 0;
   const absl::StatusOr<std::vector<uint32_t>> pixels = file->Read();
   if (!pixels.ok()) {

@@ -1,6 +1,6 @@
-// A client's bytes, decoded and applied: two clients send requests to one scene, and time passes. What was refused changes nothing and
-// says why; the scene's counts are those of what is in it; an engine is told of every change, and a watcher; what is kept of it can
-// be read again.
+// Bytes from clients, decoded and applied: two clients send requests to one scene, and time passes.
+// A refused operation changes nothing and has a reason; the scene's counts match its contents; an
+// engine receives every change, and so does a watcher; the persistent part can be read again.
 
 #include <algorithm>
 #include <cstdint>
@@ -57,7 +57,7 @@ Limits SmallLimits() {
   return limits;
 }
 
-// What a server may have that was configured anew.
+// Limits that a server may have after a reload.
 Limits TinyLimits() {
   Limits limits = SmallLimits();
   limits.max_vertices_per_entity = 2;
@@ -68,7 +68,7 @@ Limits TinyLimits() {
   return limits;
 }
 
-// What requests may name: memory 1, and the asset whose digest is of zeros alone.
+// The memory and assets that requests may name: memory 1, and the asset whose digest is all zeros.
 class Named final : public wire::MemorySource, public wire::AssetSource {
  public:
   absl::StatusOr<wire::MappedRange> Find(uint64_t memory, uint64_t offset,
@@ -92,7 +92,7 @@ class Named final : public wire::MemorySource, public wire::AssetSource {
   const std::shared_ptr<const std::string> bytes_ = std::make_shared<std::string>(1024, '\x3e');
 };
 
-// What an engine holds, by the deltas.
+// The contents of an engine, according to the deltas.
 class Engine final : public gpu::DeltaVisitor {
  public:
   void Follow(const SnapshotPtr& snapshot) {
@@ -144,7 +144,7 @@ class Engine final : public gpu::DeltaVisitor {
   std::map<uint64_t, Drawable> drawables_;
 };
 
-// What somebody who watches the scene knows of it.
+// The knowledge of a watcher of the scene.
 class Watcher final : public SceneChangeVisitor {
  public:
   void Follow(const SnapshotPtr& before, const SnapshotPtr& after) {
@@ -221,7 +221,7 @@ void CheckTallies(const Snapshot& snapshot) {
   EXPECT_THAT_HOLDS(bytes == snapshot.total.bytes);
 }
 
-// What is kept of an entity is the same when it is read again.
+// Checks that what is stored of an entity is the same when it is read again.
 void CheckKept(const Entity& entity, const OwnedName& layer, const std::string& id,
                sync::TimeNs now, const Limits& limits, text::Fonts* fonts) {
   const wire::TwoClocks clocks{.monotonic_ns = now, .unix_ns = 1'700'000'000'000'000'000};
@@ -279,7 +279,7 @@ class Session {
               [&](const OwnedName& key, const Layer&) { return key.owner == client.author.owner; },
               script.Flag());
           break;
-        case 2: {  // an operator's doing
+        case 2: {  // an operator's action
           const uint8_t choice = script.Byte();
           client.author.suppressed = (choice & 1) != 0;
           store_.Suppress(client.author.owner, client.author.suppressed);
@@ -290,7 +290,7 @@ class Session {
         case 3: {
           const std::string bytes = script.Text();
           const std::string_view slices[] = {bytes};
-          // An update brings no memory; a server may keep no assets, and have no fonts.
+          // An update has no memory; a server may keep no assets, and have no fonts.
           const bool bare = (what & 0x80) != 0;
           const wire::Sources sources = {.assets = bare ? nullptr : &named_, .budget = &budget_};
           Take(client,
@@ -320,7 +320,7 @@ class Session {
     const std::string_view whole[] = {bytes};
     wire::Decoded decoded =
         wire::DecodeStreamRequest(whole, limits_, client.sequence, nullptr, Sources(), Fonts());
-    // In pieces it is the same.
+    // Divided into pieces, it gives the same.
     const size_t cut = bytes.size() * script.Byte() / 256;
     const std::string first = bytes.substr(0, cut), rest = bytes.substr(cut);
     const std::string_view pieces[] = {first, "", rest};
@@ -422,7 +422,7 @@ class Session {
 
   const Limits limits_;
   const Limits tiny_ = TinyLimits();
-  Budget budget_{2000};  // for what is read of assets
+  Budget budget_{2000};  // for reading from assets
   SceneStore store_;
   Named named_;
   sync::TimeNs now_ = sync::kSecond;

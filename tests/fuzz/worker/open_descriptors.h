@@ -1,4 +1,4 @@
-// Whether descriptors were left open, and which.
+// Finds out whether descriptors were left open, and which.
 #pragma once
 
 #include <dirent.h>
@@ -9,7 +9,7 @@
 
 namespace voxeld::fuzz {
 
-// What the descriptors that are open are of.
+// Returns the files of the open descriptors.
 inline std::multiset<std::string> OpenDescriptors() {
   std::multiset<std::string> open;
   DIR* const folder = opendir("/proc/self/fd");

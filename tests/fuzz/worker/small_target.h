@@ -1,4 +1,4 @@
-// Displays as a script says them.
+// Displays according to a script.
 #pragma once
 
 #include <optional>
@@ -11,7 +11,7 @@
 
 namespace voxeld::fuzz {
 
-// A display that is worked out in no time.
+// Returns a display whose tables are computed quickly.
 inline gpu::Target SmallTarget(Script& script) {
   gpu::Target target;
   display::PlanarStack stack{.width_px = 4, .height_px = 4};

@@ -1,4 +1,4 @@
-// Deltas as a script says them: sound in their form, with any contents.
+// Deltas according to a script: valid in form, with any contents.
 #pragma once
 
 #include <bit>
@@ -13,7 +13,7 @@
 
 namespace voxeld::fuzz {
 
-// Mostly a small number, else any float's bits.
+// Returns mostly a small number, otherwise any bits of a float.
 inline float Coordinate(Script& script) {
   const uint8_t byte = script.Byte();
   if (byte < 250) return static_cast<float>(byte) / 32 - 2;
@@ -56,7 +56,7 @@ inline void PutGeometry(Script& script, gpu::DeltaWriter& writer) {
   for (float& position : positions) position = Coordinate(script);
   std::vector<uint32_t> indices(g.index_count);
   for (size_t i = 0; i < indices.size(); ++i) {
-    // Of points mostly; of programs and samples any words.
+    // Mostly points; programs and samples have arbitrary words.
     for (size_t byte = 0; byte < 4; ++byte) {
       indices[i] |= uint32_t{static_cast<uint8_t>(words[4 * i + byte])} << 8 * byte;
     }
@@ -65,7 +65,7 @@ inline void PutGeometry(Script& script, gpu::DeltaWriter& writer) {
     }
   }
   std::vector<uint32_t> colors;
-  // A texture's are many more.
+  // A texture has many more.
   const uint64_t colored = gpu::ColorCount(g);
   if (colored != 0) colors.assign(colored, script.Byte());
   writer.PutGeometry(g, positions, indices, colors);

@@ -1,5 +1,6 @@
-// An engine's owner, and a worker that means harm or is broken: what the owner asks for is answered rightly, wrongly, in another
-// order, or not at all. Each call ends once, a frame that is taken is what the worker drew, and no descriptor is left.
+// An engine's owner, and a malicious or broken worker: the owner's calls are answered rightly,
+// wrongly, in another order, or not at all. Each call ends once, an accepted frame is what the
+// worker drew, and no descriptor leaks.
 
 #include <poll.h>
 #include <sys/socket.h>
@@ -40,7 +41,7 @@ using namespace voxeld::gpu;  // NOLINT(google-build-using-namespace)
 constexpr int kMostSteps = 64;
 constexpr std::byte kUntouched{0xA5};
 
-// Where workers are reached, of this process for as long as it runs.
+// The address where workers are reached, in this process as long as it runs.
 class Door {
  public:
   Door()
@@ -68,7 +69,7 @@ class Door {
   const int listening_;
 };
 
-// What the owner's caller asks for, its buffer, and what the worker has drawn for it.
+// A request of the owner's caller, its buffer, and what the worker has drawn for it.
 struct Frame {
   FrameRequest request;
   display::FrameLayout layout;
@@ -113,7 +114,7 @@ class Worker {
  private:
   // ---- the owner's side
 
-  // What a call's end is told to, which may be in the worker's words.
+  // Returns a callback for the end of a call, whose error may be in the worker's words.
   std::function<void(const absl::Status&)> Call() {
     ended_.push_back(0);
     return [this, at = ended_.size() - 1](const absl::Status& /*status*/) {
@@ -182,7 +183,7 @@ class Worker {
       case 11:
         Say(MakeMessage(MessageType::kInvited, Owed(script).call, InvitedMessage{}));
         return;
-      case 12: {  // any message, with a descriptor or without; or what is none
+      case 12: {  // any message, with a descriptor or without; or what is not a message
         Message message;
         message.type = static_cast<MessageType>(script.Byte());
         message.call = script.Flag() ? Owed(script).call : script.Byte();
@@ -210,7 +211,7 @@ class Worker {
     }
   }
 
-  // `beyond`: so many bytes more than the block has.
+  // `beyond`: that many bytes more than the block has.
   void Apply(const std::vector<std::byte>& delta, size_t beyond, std::vector<BulkBlock> blocks) {
     auto block = engine_->AcquireStaging(std::max<size_t>(1, delta.size()));
     EXPECT_THAT_HOLDS(block.ok() || absl::IsResourceExhausted(block.status()));
@@ -221,7 +222,8 @@ class Worker {
     Hear();
   }
 
-  // A block of a pool that is shared, or of one that is not, which goes then or stays.
+  // Uses a block of a pool that is shared, or of one that is not; the pool is then destroyed or
+  // stays.
   void ApplyWithBulk(Script& script) {
     const uint8_t how = script.Byte();
     if (pools_.empty()) {
@@ -235,7 +237,7 @@ class Worker {
     Apply(SoundDelta(script), 0, {std::move(fresh->block)});
   }
 
-  // Up to as many calls as there is no room for, before the worker hears the first.
+  // Makes calls, possibly more than there is room for, before the worker receives the first.
   void AskMuch(Script& script) {
     const int calls = script.Byte() % 96;
     const auto told = [](const std::function<void(const absl::Status&)>& ended) {
@@ -264,7 +266,7 @@ class Worker {
 
   // ---- the worker's side
 
-  // What the owner sends for the call that was made last, or its end without that.
+  // Reads what the owner sends for the call that was made last, or that call's end without it.
   void Hear() {
     for (;;) {
       {
@@ -279,7 +281,7 @@ class Worker {
       poll(&waiting, 1, 1);
       if ((waiting.revents & POLLIN) == 0) continue;
       absl::StatusOr<Message> message = ReceiveMessage(connection_);
-      if (!message.ok()) continue;  // the owner has hung up, and will say so
+      if (!message.ok()) continue;  // the owner has disconnected, and will report it
       if (message->type == MessageType::kSegment) {
         const auto named = *message->As<SegmentMessage>();
         segments_[named.segment] = *Segment::Adopt(message->fd, named.size);
@@ -295,7 +297,7 @@ class Worker {
     }
   }
 
-  // A call that is to be answered; of another number if there is none.
+  // Returns an unanswered call, or one with another number if every call is answered.
   Message Owed(Script& script) {
     if (owed_.empty()) {
       Message none;
@@ -308,7 +310,7 @@ class Worker {
     return asked;
   }
 
-  // A frame in the segment that was named for it, rightly or wrongly told.
+  // Draws a frame in the segment that was named for it, and reports it rightly or wrongly.
   void Draw(Script& script) {
     const Message asked = Owed(script);
     const auto sent = asked.As<FrameMessage>().value_or(FrameMessage{});
@@ -333,7 +335,7 @@ class Worker {
     Say(MakeMessage(MessageType::kFrameDone, asked.call, done));
   }
 
-  // Sends it, or its first bytes, and waits until the owner has made something of it.
+  // Sends a message, or its first bytes, and waits until the owner has reacted to it.
   void Say(const Message& message, size_t most = SIZE_MAX) {
     int64_t told = 0;
     {
@@ -355,7 +357,8 @@ class Worker {
     while (lost_ == 0) told_more_.Wait(mutex_);
   }
 
-  // What is taken is what was drawn for that very call, and no more of the buffer is written.
+  // An accepted frame is what was drawn for that very call, and the rest of the buffer is not
+  // written.
   static void LookAt(const Frame& frame, const FrameResult& result) {
     EXPECT_THAT_HOLDS(result.frame == frame.request.frame);
     EXPECT_THAT_HOLDS(!frame.drawn_in.empty(), "a frame that nobody drew");
@@ -372,9 +375,9 @@ class Worker {
 
   sync::Mutex mutex_;
   sync::CondVar told_more_;
-  std::deque<int> ended_;  // of each call, how often
+  std::deque<int> ended_;  // for each call, how often it ended
   int lost_ = 0;
-  int64_t told_ = 0;  // ends of calls and of the engine
+  int64_t told_ = 0;  // counts the ends of calls and of the engine
   std::deque<Frame> frames_;
   std::deque<std::vector<uint32_t>> voxels_;
   std::vector<std::shared_ptr<BulkPool>> pools_;
@@ -391,7 +394,7 @@ class Worker {
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static const voxeld::fuzz::Door door;
-  // The first engine opens what stays open.
+  // The first engine opens descriptors that stay open.
   static const bool begun = [] {
     voxeld::fuzz::Worker(door).Run(voxeld::fuzz::Script(nullptr, 0));
     return true;

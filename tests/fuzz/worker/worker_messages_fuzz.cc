@@ -1,5 +1,6 @@
-// An engine's worker, and an owner that means harm or is broken: messages one after another, over a real socket, with real segments.
-// Each call has one answer, under its own number; no descriptor is left, and what a device was shown is taken from it while it is there.
+// An engine's worker, and a malicious or broken owner: a sequence of messages, over a real socket,
+// with real segments. Each call has one answer, under its own number; no descriptor leaks, and
+// memory that was pinned for a device is unpinned while it exists.
 
 #include <dirent.h>
 #include <fcntl.h>
@@ -46,7 +47,7 @@ bool IsSmall(const Target& target) {
          target.layout.sub_frames <= 4;
 }
 
-// An engine that is linked with others.
+// An engine that is linked with other ranks.
 class LinkedEngine final : public Engine, public RankLink {
  public:
   explicit LinkedEngine(std::unique_ptr<Engine> engine) : engine_(std::move(engine)) {}
@@ -109,12 +110,12 @@ class Owner {
       const auto it = pinned_.find(memory.data());
       EXPECT_THAT_HOLDS(it != pinned_.end() && it->second == memory.size(), "was never pinned");
       const volatile std::byte* const there = memory.data();
-      (void)*there;  // it is mapped still
+      (void)*there;  // it is still mapped
       pinned_.erase(it);
     };
     EXPECT_THAT_HOLDS(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends_) == 0);
     fcntl(ends_[0], F_SETFL, O_NONBLOCK);
-    const int least = 1;  // few messages have room
+    const int least = 1;  // room for few messages
     setsockopt(ends_[0], SOL_SOCKET, SO_SNDBUF, &least, sizeof(least));
     worker_ = NewWorkerConnection(ends_[1], hooks_);
   }
@@ -132,7 +133,7 @@ class Owner {
   }
 
  private:
-  // False: the worker has ended.
+  // Returns false if the worker has exited.
   bool Step(Script& script) {
     switch (script.Byte() % 11) {
       case 0: {
@@ -201,7 +202,7 @@ class Owner {
         const BulkSegmentMessage named{.segment = script.Byte() % 4u, .size = 0};
         return Send(MakeMessage(MessageType::kDropBulkSegment, 0, named), false);
       }
-      default: {  // any message, with a descriptor or without; or what is none
+      default: {  // any message, with a descriptor or without; or what is not a message
         Message message;
         message.type = static_cast<MessageType>(script.Byte());
         message.call = script.Byte();
@@ -218,7 +219,8 @@ class Owner {
     }
   }
 
-  // Too long, or too short to be a message. As for its end, a worker ends.
+  // Sends something too long, or too short, to be a message. A worker exits on it, as at the end of
+  // the connection.
   bool SendNone(Message message, const std::string& text) {
     if (text.empty()) {
       message.body.resize(4097);
@@ -231,7 +233,7 @@ class Owner {
     return false;
   }
 
-  // Gone before the answer.
+  // Disconnects before the answer.
   bool Leave(const Message& message) {
     EXPECT_THAT_HOLDS(SendMessage(ends_[0], message).ok());
     close(std::exchange(ends_[0], -1));
@@ -242,7 +244,7 @@ class Owner {
     return false;
   }
 
-  // The same until there is no room for it.
+  // Sends the same until it has no room left.
   bool SendMany(const Message& message) {
     int sent = 0;
     absl::Status status;
@@ -276,7 +278,7 @@ class Owner {
     return Send(message, false);
   }
 
-  // Bytes in a segment, by a message that says their sum.
+  // Puts bytes in a segment, and sends a message with their checksum.
   bool Bulk(Script& script, MessageType type, const std::vector<std::byte>& bytes) {
     const uint32_t id = script.Byte() % 4u;
     const auto it = segments_.find(id);
@@ -290,7 +292,7 @@ class Owner {
     return Send(MakeMessage(type, ++call_, message), true);
   }
 
-  // `answered`: whether it is a call; nothing: who knows.
+  // `answered`: whether it is a call; nullopt: unknown.
   bool Send(const Message& message, std::optional<bool> answered) {
     EXPECT_THAT_HOLDS(SendMessage(ends_[0], message).ok());
     absl::StatusOr<Message> received = ReceiveMessage(ends_[1]);
@@ -328,7 +330,7 @@ class Owner {
 }  // namespace voxeld::fuzz
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  // The first engine opens what stays open.
+  // The first engine opens descriptors that stay open.
   static const bool begun = [] {
     constexpr uint8_t kOpen[] = {0, 0, 0, 0};
     voxeld::fuzz::Owner().Run(voxeld::fuzz::Script(kOpen, sizeof(kOpen)));
