@@ -22,7 +22,7 @@ VoxelHalfSpace HalfSpaceOf(const ClipPlane& plane, const Affine& view = {}) {
   return clip.half_spaces[0];
 }
 
-constexpr int64_t kOne = int64_t{1} << 37;  // a normal's component of a power of two
+constexpr int64_t kOne = int64_t{1} << 37;  // a component of a normal that is a power of two
 
 TEST(Clip, NothingIsDrawnEverywhere) { EXPECT_EQ(MapClip({}, {}).count, 0u); }
 
@@ -32,7 +32,7 @@ TEST(Clip, HalfSpacesAreAsWorkedOutByHand) {
   EXPECT_EQ(HalfSpaceOf({8, 0, 0, -80}), axis);
   EXPECT_EQ(HalfSpaceOf({0x1p-900, 0, 0, -10 * 0x1p-900}), axis);
   EXPECT_EQ(HalfSpaceOf({1, -0.5, 0.25, 0}), (VoxelHalfSpace{{kOne, -kOne / 2, kOne / 4}, 0}));
-  // Three quarters of the greatest power of two below.
+  // Three quarters of the next lower power of two.
   EXPECT_EQ(HalfSpaceOf({0, 3, 0, -3}), (VoxelHalfSpace{{0, 3 * kOne / 2, 0}, -3 * kOne}));
   Affine view;  // scene x → voxel 2x + 5
   view.m[0] = view.m[5] = view.m[10] = 2;
@@ -67,7 +67,7 @@ TEST(Clip, WhatIsFarSaturates) {
   EXPECT_EQ(HalfSpaceOf({1, 0, 0, 1e300}).offset, kMaxClipOffset);
   EXPECT_EQ(HalfSpaceOf({1, 0, 0, -1e300}).offset, -kMaxClipOffset);
   EXPECT_EQ(HalfSpaceOf({0x1p-1070, 0, 0, -1e300}).offset, -kMaxClipOffset);
-  // Neither overflows anywhere in the greatest grid.
+  // Neither overflows anywhere in the largest grid.
   const VoxelHalfSpace far = HalfSpaceOf({1, 1, 1, 1e300}), near = HalfSpaceOf({-1, -1, -1, 1e300});
   for (int64_t at : {0, 16383, 1 << 18}) {
     EXPECT_TRUE(IsInside(far, at, at, at));
@@ -144,7 +144,8 @@ TEST_F(RandomClip, TheSideOfABoxIsThatOfAllItsVoxels) {
   for (int count : sides) EXPECT_GT(count, 1000);
 }
 
-// What is computed keeps order, so boxes that lie by a cylinder's side all the same are known.
+// Computed values keep their order, so the side of boxes that lie on one side of a cylinder is
+// always known.
 TEST_F(RandomClip, TheSideOfABoxIsThatOfAllItsVoxelsForCylindersToo) {
   int sides[3] = {};
   for (int i = 0; i < 20000; ++i) {
@@ -166,7 +167,8 @@ TEST_F(RandomClip, TheSideOfABoxIsThatOfAllItsVoxelsForCylindersToo) {
     }
     const ClipSide side = SideOf(clip.cylinders[0], box);
     ++sides[static_cast<int>(side)];
-    // Of boxes that touch it near a corner of its own the side is not known, only that they may be cut.
+    // For boxes that touch it near one of their corners, the side is not known, only that they may
+    // be clipped.
     if (side == ClipSide::kInside) {
       ASSERT_EQ(inside, all);
     } else if (side == ClipSide::kOutside) {
@@ -197,8 +199,8 @@ TEST(Clip, CylindersAreAsWorkedOutByHand) {
   EXPECT_EQ(SideOf(none.cylinders[0], {{0, 0, 0}, {16, 16, 16}}), ClipSide::kOutside);
 }
 
-// In the greatest grid, the error that clip.h states: centres at that distance and more are where
-// the plane itself has them.
+// In the largest grid, the error that clip.h states: centres at that distance or farther are on the
+// plane's true side.
 TEST_F(RandomClip, RoundingMovesAPlaneByNoMoreThanStated) {
   constexpr int32_t kCells = 16384;
   long double worst = 0;
@@ -208,7 +210,7 @@ TEST_F(RandomClip, RoundingMovesAPlaneByNoMoreThanStated) {
     long double value = 0;
     for (int a = 0; a < 3; ++a) value -= n[a] * (v[a] + 0.5L);
     const auto d = static_cast<double>(value);
-    value = d - value;  // what is left at the centre of v
+    value = d - value;  // the remainder at the centre of v
     const VoxelHalfSpace h = HalfSpaceOf({n[0], n[1], n[2], d});
     int major = 0;
     for (int a = 1; a < 3; ++a) {

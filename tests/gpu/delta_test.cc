@@ -31,7 +31,7 @@ struct Block {
   size_t size;
 };
 
-// Writes down what it is shown.
+// Records what it is shown.
 struct Recorder final : DeltaVisitor {
   absl::Status OnGeometry(const GeometryView& g) override {
     log.push_back("geometry " + std::to_string(g.record.id));
@@ -79,7 +79,7 @@ absl::Status Read(std::span<const std::byte> bytes) {
   return ReadDelta(bytes, recorder);
 }
 
-// A delta of one geometry, drawable or layer, changed by `change` before it is written.
+// Reads a delta of one geometry, drawable or layer, which `change` changes before it is written.
 absl::Status ReadGeometryWith(const std::function<void(GeometryRecord&)>& change) {
   GeometryRecord g = Mesh();
   const size_t size = DeltaWriter::SizeOf(g);
@@ -87,13 +87,13 @@ absl::Status ReadGeometryWith(const std::function<void(GeometryRecord&)>& change
   Block block(size);
   DeltaWriter writer(block.bytes());
   writer.PutGeometry(g, kPositions, kIndices, kColors);
-  // The header states what the changed record would need: as an honest reader sees it.
+  // The header states what the changed record would need, as an honest writer would.
   const uint64_t honest = size;
   std::memcpy(block.bytes().data() + offsetof(RecordHeader, size), &honest, sizeof(honest));
   return Read(block.bytes());
 }
 
-// A delta that refers to its one geometry's arrays.
+// A delta that refers to the arrays of its only geometry.
 struct BulkDelta {
   BulkDelta() : block(DeltaWriter::kSizeOfBulkGeometry) {
     GeometryArrays arrays = *GeometryArrays::Allocate(Mesh(), nullptr);
@@ -458,7 +458,7 @@ TEST(Delta, RefusesBadDrawablesAndLayers) {
   EXPECT_THAT(layer({.cylinder_count = 5}), HasSubstr("layer.cylinder_count is 5, must be 0 to 4"));
   EXPECT_THAT(layer({.has_region = 2}), HasSubstr("layer.has_region is 2, must be 0 to 1"));
   EXPECT_THAT(layer({.has_mask = 2}), HasSubstr("layer.has_mask is 2, must be 0 to 1"));
-  EXPECT_EQ(layer({.has_mask = 1, .mask = 77}), "");  // which need not be there
+  EXPECT_EQ(layer({.has_mask = 1, .mask = 77}), "");  // which need not exist
   LayerRecord clipped{.plane_count = 2};
   clipped.planes[0] = {0, 0, 1, -7};
   EXPECT_THAT(layer(clipped),

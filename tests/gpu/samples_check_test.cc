@@ -1,4 +1,4 @@
-// Grids of samples that are broken in one place each: refused in words that name it.
+// Tests grids of samples with one error each: they are refused with a message that names it.
 #include "gpu/samples_check.h"
 
 #include <gmock/gmock.h>
@@ -16,7 +16,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// Places in the head, as gpu/primitives/samples.h lays it out.
+// Places in the head, according to the layout in gpu/primitives/samples.h.
 enum Place : size_t { kSize = 0, kFormat = 3, kFilter, kByLevel, kLow, kScale, kLevel, kBricks };
 constexpr size_t kHead = 12, kTable = 256;
 

@@ -39,7 +39,7 @@ TEST(TextureLevels, OfOneRowOrColumnAreMeansOfTwo) {
   EXPECT_THAT(LevelsOf(1, 4, {2, 4, 8, 16}), ElementsAre(3, 12, 8));
 }
 
-// What is left over of an odd side has no part.
+// The remainder of an odd side is not used.
 TEST(TextureLevels, OfOddSidesAreOfWholePairs) {
   EXPECT_THAT(LevelsOf(5, 2, {1, 1, 2, 2, 99, 3, 3, 4, 4, 99}), ElementsAre(2, 3, 3));
   EXPECT_THAT(LevelsOf(1, 1, {7}), ElementsAre());

@@ -8,7 +8,7 @@
 namespace voxeld::gpu {
 namespace {
 
-// Both ways of sorting give rows in order that hold every item that the primitive names.
+// Both ways of sorting give ordered rows that contain every item that the primitive names.
 TEST(Bins, RowsHoldEachItemOfEachTileInOrder) {
   const TileGrid grid = TileGrid::Of(64, 48, 32);
   for (uint32_t count : {3u, 20000u}) {
@@ -46,8 +46,9 @@ TEST(Bins, RowsHoldEachItemOfEachTileInOrder) {
   }
 }
 
-// Walks and lines that are none, of which some are too long: the same rows from any number of threads, sorted or counted,
-// and each item where the definition has voxels of it.
+// Walks, and lines that are not walks, some of them because they are too long: the rows are the
+// same from any number of threads, sorted or counted, and contain each item where the definition
+// has voxels of it.
 TEST(Bins, SpansAreTheSameFromAnyNumberOfThreads) {
   const TileGrid grid = TileGrid::Of(64, 48, 32, 1);
   for (uint32_t count : {20u, 9001u}) {
@@ -75,7 +76,7 @@ TEST(Bins, SpansAreTheSameFromAnyNumberOfThreads) {
       EXPECT_NE(one.tiles[r], 3u);
       const std::span<const BinItem> a = one.row(r), b = three.row(r);
       ASSERT_TRUE(std::equal(a.begin(), a.end(), b.begin(), b.end())) << "tile " << one.tiles[r];
-      // Voxels of walks are counted by their spans.
+      // The voxels of walks are counted by their spans.
       std::vector<uint32_t> voxels(count), spanned(count);
       for (const BinItem& item : a) {
         spanned[item.item] += item.count();

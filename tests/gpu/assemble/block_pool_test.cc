@@ -47,7 +47,7 @@ TEST(BlockPool, WhatIsGivenIsTakenAgainAndTrimmingSparesWhatIsInUse) {
   std::vector<std::byte*> blocks;
   for (size_t i = 0; i < kMost; ++i) blocks.push_back(static_cast<std::byte*>(pool.Take()));
   pool.Settle();
-  // Every hundredth stays in use.
+  // Every hundredth block stays in use.
   std::set<void*> given;
   for (size_t i = 0; i < kMost; ++i) {
     std::memset(blocks[i], static_cast<int>(i % 251), kBytes);

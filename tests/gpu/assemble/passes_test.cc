@@ -1,4 +1,5 @@
-// What does not fit into the budget of the index: drawn as the oracle draws it, and never past the budget.
+// Tests scenes that do not fit into the budget of the index: they are drawn as the oracle draws
+// them, and the budget is never exceeded.
 #include "gpu/assemble/passes.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +33,8 @@ Target TargetOfSize() {
   return target;
 }
 
-// `items` of `corners` each, within `extent` voxels, or anywhere; of one colour each but every 50th.
+// Returns `items` items of `corners` corners each, within `extent` voxels, or anywhere; of one
+// colour each, except every 50th.
 ModelGeometry Items(uint64_t id, PrimitiveKind kind, size_t corners, size_t items, float extent) {
   std::mt19937_64 random(id);
   std::uniform_real_distribution<float> unit(0, 1);
@@ -65,7 +67,7 @@ ModelGeometry Mesh(uint64_t id, size_t count, float extent) {
   return Items(id, PrimitiveKind::kTriangles, 3, count, extent);
 }
 
-// All through the tile in the middle.
+// Returns items that all pass through the tile in the middle.
 ModelGeometry Sheaf(uint64_t id, size_t count) {
   ModelGeometry g = Lines(id, count);
   const float middle[3] = {56, 40, 40};
@@ -85,7 +87,7 @@ ModelGeometry SolidOf(uint64_t id, PrimitiveKind kind, Fill fill) {
   return g;
 }
 
-// Every geometry in a drawable and, in turns, one of two layers.
+// Returns a scene with every geometry in a drawable, in one of two layers in turn.
 SceneModel SceneOf(std::vector<ModelGeometry> geometries) {
   SceneModel scene;
   scene.layers[1].id = 1;
@@ -137,7 +139,8 @@ class PassesTest : public testing::Test {
     delta.Put(layer);
     Apply(delta);
   }
-  // As the oracle draws it; of its drawables so many in passes, if that is known.
+  // Checks that the scene is drawn as the oracle draws it, and, if `counted` is given, that this
+  // many of its drawables are drawn in passes.
   void ExpectDrawn(std::optional<size_t> counted) {
     volume_->Update(nullptr);
     if (counted.has_value()) {
@@ -171,7 +174,7 @@ TEST_F(PassesTest, PartOfTheSceneIsOverTheBudget) {
        SceneOf({Lines(1, 300), Lines(2, 9000), Mesh(3, 200, 8), Mesh(4, 3000, 20), Lines(5, 50)}));
   ExpectDrawn(2);
   EXPECT_LE(volume_->index_bytes(), uint64_t{1} << 19);
-  // The same scene anew, in a budget that it fits into.
+  // The same scene again, with a budget into which it fits.
   Make(0, scene_);
   ExpectDrawn(0);
 }
@@ -218,7 +221,7 @@ TEST_F(PassesTest, ChangesOfWhatIsCounted) {
   ExpectDrawn(2);
   layer.visible = 1;
   Put(layer);
-  // Few lines take the place of many, and fit.
+  // A few lines replace many, and fit.
   DeltaBuffer delta;
   scene_.drawables[1].geometry = 9;
   scene_.geometries[9] = Lines(9, 200);
@@ -233,7 +236,7 @@ TEST_F(PassesTest, ChangesOfWhatIsCounted) {
   drop.Drop(Op::kDropDrawable, 3);
   Apply(drop);
   ExpectDrawn(0);
-  // A new view draws all anew.
+  // With a new view, everything is drawn again.
   volume_->SetView(grid_, Affine(), std::vector<uint8_t>(grid_.count(), kOwned));
   ExpectDrawn(0);
 }
@@ -249,7 +252,7 @@ TEST_F(PassesTest, WhatWasCountedIsKeptWhenOthersHaveGone) {
   RemoveFirst(counted);
   ExpectDrawn(0);
   EXPECT_LE(volume_->index_bytes(), uint64_t{1} << 19);
-  // They are where they were.
+  // They move to where they were.
   for (const auto& [id, drawable] : std::map(scene_.drawables)) Move(id, 5.5);
   ExpectDrawn(0);
 }
@@ -361,7 +364,7 @@ TEST_F(PassesTest, UnlistedDrawablesAreListedAfterOthersAreRemoved) {
   RemoveFirst(unlisted);
   ExpectDrawn(0);
   EXPECT_EQ(volume_->unlisted_drawables(), 0u);
-  // They are where they were.
+  // They move to where they were.
   for (const auto& [id, drawable] : std::map(scene_.drawables)) Move(id, 5.5);
   ExpectDrawn(0);
 }
@@ -381,14 +384,15 @@ TEST_F(PassesTest, ListsStayWithinTheirShare) {
   EXPECT_LE(volume_->listed_bytes(), kShare);
   EXPECT_GT(volume_->listed_bytes(), kShare / 2);
   EXPECT_LT(volume_->unlisted_drawables(), 500u);
-  // Listing them all takes more than ten times the share.
+  // Listing all of them takes more than ten times the share.
   Make(0, scene, uint64_t{1} << 30);
   volume_->Update(nullptr);
   EXPECT_EQ(volume_->unlisted_drawables(), 0u);
   EXPECT_GT(volume_->listed_bytes(), 10 * kShare);
 }
 
-// Finding gives up before its memory exceeds the limit, and what fits is the same as without one.
+// Finding gives up before its memory exceeds the limit, and what fits is the same as without a
+// limit.
 TEST_F(PassesTest, FindingStaysWithinItsLimit) {
   Make(0,
        SceneOf({Lines(1, 8000), Mesh(2, 5000, 40), Items(3, PrimitiveKind::kPoints, 1, 20000, 0)}));
@@ -446,7 +450,7 @@ TEST(PlanPasses, RunsAreAsLongAsTheyFit) {
     return ends;
   };
   EXPECT_EQ(ends(uint64_t{1} << 40), (std::vector<size_t>{10}));
-  // Each tile with items by itself.
+  // Each tile with items, by itself.
   EXPECT_EQ(ends(0), (std::vector<size_t>{1, 2, 4, 5, 6, 7, 10}));
 }
 

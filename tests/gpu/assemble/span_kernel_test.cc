@@ -1,4 +1,4 @@
-// Walks, spans and small triangles against the definitions in gpu/primitives, tile by tile.
+// Compares walks, spans and small triangles with the definitions in gpu/primitives, tile by tile.
 #include "gpu/assemble/span_kernel.h"
 
 #include <gtest/gtest.h>
@@ -58,7 +58,7 @@ class Random {
   int64_t Int(int64_t low, int64_t high) {
     return std::uniform_int_distribution<int64_t>(low, high)(engine_);
   }
-  // Units near `voxel`: anywhere in it, or at one of its faces.
+  // Returns units near `voxel`: anywhere in it, or at one of its faces.
   int64_t In(int64_t voxel) {
     constexpr int64_t kPlaces[] = {0, 0, 1, 127, 128, 254, 255};
     return voxel * 256 + (Int(0, 1) == 0 ? Int(0, 255) : kPlaces[Int(0, 6)]);
@@ -68,7 +68,7 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-// What the definition draws of lines, in the whole volume.
+// Returns what the definition draws of a line, in the whole volume.
 Drawn Defined(const Line& line, const TileGrid& grid) {
   Drawn drawn;
   EmitLine(line, Whole(grid), [&](int32_t x, int32_t y, int32_t z, uint32_t) {
@@ -80,7 +80,7 @@ Drawn Defined(const Line& line, const TileGrid& grid) {
 Drawn BySpans(const LineWalk& walk, const TileGrid& grid) {
   FoundSpans found;
   FindSpans(&walk, 0, 1, WalkGrid(grid), nullptr, found);
-  // The same by tiles that are asked for, and nothing in others.
+  // The same from the tiles that are requested, and nothing in others.
   for (uint8_t odd : {0, 1}) {
     std::vector<uint8_t> half(grid.count());
     for (uint32_t tile = 0; tile < grid.count(); ++tile) half[tile] = (tile & 1) == odd;
@@ -141,11 +141,11 @@ TEST(Spans, LinesAnywhereEqualTheirDefinitionInAllVectors) {
       ExpectAsDefined(line, grid, &walks);
       if (testing::Test::HasFatalFailure()) return;
     }
-    EXPECT_GT(walks, 3900u);  // not those that are shorter than a step and lie in two voxels
+    EXPECT_GT(walks, 3900u);  // lines shorter than a step that lie in two voxels are not walks
   });
 }
 
-// Every N, down and up, with ends where positions come as close to the faces as they can.
+// Every N, downwards and upwards, with ends where positions are as close to faces as possible.
 TEST(Spans, LinesOfEveryLengthEqualTheirDefinition) {
   Random random(Seed());
   uint64_t walks = 0;
@@ -211,7 +211,7 @@ TEST(Spans, OtherLinesAreNoWalks) {
       LineWalk::Of({{{250, 0, 0}}, {{260, 0, 0}}, 1, 1, LineSampling::kEuclidean}, grid, walk));
 }
 
-// What the definition draws of a triangle, and what small triangles do.
+// Compares small triangles with what the definition draws of a triangle.
 void ExpectAsDefined(const Triangle& t, const TileGrid& grid, uint64_t* small, uint64_t* lit) {
   SmallTriangles fast;
   const WalkGrid axes(grid);
@@ -256,7 +256,7 @@ TEST(SmallTriangles, EqualTheirDefinitionInAllVectors) {
         const int64_t from = random.Int(-extent, grid.voxels[a]);
         for (Int3& v : t.v) {
           v[a] = random.In(from + random.Int(0, extent));
-          if (random.Int(0, 7) == 0) v[a] = t.v[0][a];  // in a plane of voxels, or a line
+          if (random.Int(0, 7) == 0) v[a] = t.v[0][a];  // in a plane of voxels, or on a line
         }
       }
       ExpectAsDefined(t, grid, &small, &lit);
@@ -270,8 +270,8 @@ TEST(SmallTriangles, EqualTheirDefinitionInAllVectors) {
   });
 }
 
-// Corners on corners, centres and quarters of voxels, where depths are whole numbers and edges run through centres; and
-// planes that rise as fast along two axes or three.
+// Corners on corners, centres and quarters of voxels, where depths are integers and edges run
+// through centres; and planes that rise equally along two axes or three.
 TEST(SmallTriangles, OfRoundPlacesEqualTheirDefinition) {
   const uint64_t seed = Seed();
   ForEachVectorTarget(TriangleTarget, [&] {
@@ -307,7 +307,7 @@ TEST(SmallTriangles, OfRoundPlacesEqualTheirDefinition) {
   });
 }
 
-// Among many with nothing but their vertices, whose words wait together, some that cover more.
+// Some triangles that cover more, among many with only their vertices, whose words wait together.
 TEST(SmallTriangles, ManyInATileEqualTheirDefinitions) {
   const uint64_t seed = Seed();
   ForEachVectorTarget(TriangleTarget, [&] {
@@ -321,7 +321,7 @@ TEST(SmallTriangles, ManyInATileEqualTheirDefinitions) {
     Words want, got;
     for (uint32_t i = 0; i < 3000; ++i) {
       Triangle t;
-      const int64_t extent = i % 500 == 499 ? 2000 : 20;  // units
+      const int64_t extent = i % 500 == 499 ? 2000 : 20;  // in units
       for (int a = 0; a < 3; ++a) {
         const int64_t from = random.Int(0, 16 * 256 - extent - 1);
         for (Int3& v : t.v) v[a] = from + random.Int(0, extent);
@@ -344,7 +344,7 @@ TEST(SmallTriangles, ManyInATileEqualTheirDefinitions) {
   });
 }
 
-// Large and small ones made at once, some of two or three faces, in all tiles of a volume.
+// Large and small ones made at once, some with two or three faces, in all tiles of a volume.
 TEST(SmallTriangles, SeveralAtOnceEqualTheirDefinitions) {
   const uint64_t seed = Seed();
   ForEachVectorTarget(TriangleTarget, [&] {

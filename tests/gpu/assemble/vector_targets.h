@@ -1,4 +1,4 @@
-// Kernels in every instruction set that is compiled for and that this processor has.
+// Runs kernels in every instruction set that is compiled and that this processor supports.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -10,14 +10,14 @@
 
 namespace voxeld::gpu {
 
-// Calls f() under each; `target()` says which one is in use. At least two are expected.
+// Calls f() with each; `target()` returns the one in use. At least two are expected.
 template <typename Target, typename F>
 void ForEachVectorTarget(const Target& target, const F& f) {
   int targets = 0;
   for (int64_t left = hwy::SupportedTargets(); left != 0; left &= left - 1) {
     hwy::SetSupportedTargetsForTest(left & -left);
     hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    // Not all that the processor has are compiled for.
+    // Not all that the processor supports are compiled.
     if (target() == hwy::TargetName(left & -left)) {
       ++targets;
       SCOPED_TRACE(target());

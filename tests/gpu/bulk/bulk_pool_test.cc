@@ -62,7 +62,7 @@ TEST(BulkPool, PlacesAreUsedAgainAndNeighboursJoined) {
   blocks[12] = {};
   blocks[40] = {};
   EXPECT_EQ(blocks[41].bytes()[0], std::byte{41});
-  // The three side by side are one place; the single one is the better fit for less.
+  // The three adjacent ones are one hole; the single one fits better for less.
   EXPECT_NE(Filled(*pool, 1000, 1).bytes().data(), hole);
   EXPECT_EQ(Filled(*pool, 3072, 1).bytes().data(), hole);
   EXPECT_FALSE(pool->Allocate(3073).ok());
@@ -76,7 +76,7 @@ TEST(BulkPool, ExhaustionSaysWhatThereIs) {
   EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
   EXPECT_THAT(std::string(refused.message()), HasSubstr("2048 bytes asked for, 65536 used"));
   EXPECT_THAT(std::string(refused.message()), HasSubstr("limit 66536"));
-  EXPECT_TRUE(pool->Allocate(900).ok());  // a segment as small as is left
+  EXPECT_TRUE(pool->Allocate(900).ok());  // a segment as small as the rest of the limit
   EXPECT_FALSE(pool->Allocate(SIZE_MAX).ok());
   EXPECT_FALSE(pool->Allocate(SIZE_MAX / 2).ok());
   all = {};
@@ -102,7 +102,7 @@ TEST(BulkPool, UnusedSegmentsAreKeptAsFarAsAskedForButNeverInTheWay) {
   EXPECT_EQ(pool->held_bytes(), 3 * kSegment);
   blocks.clear();
   EXPECT_EQ(pool->held_bytes(), 2 * kSegment);
-  // What is kept makes room for what does not fit it.
+  // Retained memory is freed for what does not fit into it.
   EXPECT_TRUE(pool->Allocate(3 * kSegment).ok());
 }
 
@@ -179,7 +179,7 @@ TEST(BlockSource, FindsWhatCameAlongInAnyOrder) {
   EXPECT_FALSE(BlockSource({}).Find(RefOf(other)).ok());
 }
 
-// Blocks that wander between threads: nobody's content changes while it is held.
+// Blocks that are passed between threads: the content of a held block does not change.
 TEST(BulkPool, ThreadsShareIt) {
   const auto pool = Small(8 * kSegment, kSegment);
   struct Held {

@@ -49,7 +49,7 @@ TEST(Executor, EveryKindRunsEachIndexOnce) {
   }
 }
 
-#ifndef VOXELD_SANITIZED  // whose own memory is beyond any limit
+#ifndef VOXELD_SANITIZED  // their own memory exceeds any limit
 void AskForMoreThreadsThanThereAre() {
   uint64_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;
@@ -75,7 +75,7 @@ TEST(Executor, WhatABodyThrowsComesOutOnceNoneRuns) {
       std::unique_ptr<Executor> executor =
           own ? MakeThreadExecutor(threads) : MakeExecutor(threads);
       std::atomic<int> running{0};
-      // Whoever it comes to, the caller or another.
+      // Whichever thread runs it, the caller or another.
       for (size_t at : {size_t{0}, size_t{499}, size_t{999}}) {
         EXPECT_THROW(executor->For(1000, 1,
                                    [&](size_t i, int) {
@@ -147,7 +147,7 @@ TEST(CallQueue, InlineRunsBeforePostReturns) {
   EXPECT_EQ(calls, 1);
 }
 
-// Each call is answered once and in order; from the first that is cancelled on, all are.
+// Each call is answered once and in order; from the first that is cancelled on, all are cancelled.
 TEST(CallQueue, DestructionCancelsWhatHasNotBegun) {
   sync::Mutex mutex;
   sync::CondVar changed;

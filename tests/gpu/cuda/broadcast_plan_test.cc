@@ -52,7 +52,7 @@ TEST(BroadcastSteps, BringWhatThePlanSaysToEveryRank) {
   for (uint32_t seed = 0; seed < 200; ++seed) {
     const Planned planned(seed);
     for (const size_t most : {64, 100, 4096, 1 << 20}) {
-      // The first rank has what came from the host so far; the other what was broadcast.
+      // The first rank has what has arrived from the host so far; the other what was broadcast.
       std::vector<std::byte> first(planned.plan.size()), other(planned.plan.size());
       size_t end = 0;
       for (const BroadcastStep& step : BroadcastSteps(planned.plan, most)) {

@@ -1,5 +1,5 @@
-// Formulas that are compiled while the engine works, on a GPU: when, for which programs, and that they are
-// taken.
+// Tests formulas that are compiled while the engine works, on a GPU: when, for which programs, and
+// that they are used.
 #include "gpu/cuda/compiled_formulas.h"
 
 #include <gmock/gmock.h>
@@ -14,7 +14,7 @@
 namespace voxeld::gpu::cuda {
 namespace {
 
-// sin(x)·cos(y)·… − shift, with so many more waves.
+// Returns sin(x)·cos(y)·… − shift, with `more` further waves.
 std::vector<uint32_t> Waves(double shift, int more) {
   implicit::Graph graph;
   implicit::Graph::Node sum = graph.Constant(shift);
@@ -32,7 +32,7 @@ std::vector<uint32_t> Waves(double shift, int more) {
 class CompiledFormulasTest : public ::testing::Test {
  protected:
   CompiledFormulasTest() : api_(*Api::Open(0)) {}
-  // All of these need it: without it they fail, and say so.
+  // All of these tests need the compiler: without it they fail, and say so.
   void SetUp() override {
     const auto nvrtc = Nvrtc::OpenFor(9, 0);
     ASSERT_TRUE(nvrtc.ok()) << nvrtc.status();
@@ -88,7 +88,7 @@ TEST_F(CompiledFormulasTest, WhatWasAskedForTheLongestAgoGoes) {
   Find(formulas, Waves(0.5, 1));
   formulas.BeginFrame();
   EXPECT_EQ(Find(formulas, Waves(0.5, 0)), first);
-  EXPECT_NE(Find(formulas, Waves(0.5, 2)), nullptr);  // in place of the second
+  EXPECT_NE(Find(formulas, Waves(0.5, 2)), nullptr);  // replaces the second
   EXPECT_EQ(formulas.kept(), 2u);
   EXPECT_EQ(formulas.compiled(), 3u);
   EXPECT_EQ(Find(formulas, Waves(0.5, 0)), first);
@@ -104,7 +104,7 @@ TEST_F(CompiledFormulasTest, WhatAFrameHasFoundStaysForIt) {
   EXPECT_EQ(formulas.kept(), 3u);
   formulas.BeginFrame();
   Find(formulas, Waves(0.5, 3));
-  EXPECT_EQ(formulas.kept(), 3u);  // one has gone
+  EXPECT_EQ(formulas.kept(), 3u);  // one has been removed
 }
 
 TEST_F(CompiledFormulasTest, MayGoWhileItCompiles) {

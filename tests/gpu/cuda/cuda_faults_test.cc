@@ -1,8 +1,8 @@
-// What gpu/engine.h promises about errors, with each of the CUDA engine's calls of CUDA failing in
-// its turn.
+// Tests the promises of gpu/engine.h about errors, with each of the CUDA engine's calls of CUDA
+// failing in turn.
 //
-// VOXELD_FAULTS_EVERY: with every so many-th (default 1, in passes 11; where a CPU plays the GPU 127 and
-// 254), from one on that VOXELD_SEED draws.
+// VOXELD_FAULTS_EVERY: fails only every n-th call (default 1, in passes 11; where a CPU plays the
+// GPU 127 and 254), starting at one that VOXELD_SEED draws.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -36,7 +36,7 @@ uint64_t Number(const char* name, uint64_t otherwise) {
   return text != nullptr ? std::strtoull(text, nullptr, 10) : otherwise;
 }
 
-// The CUDA engine playing the scenario, and what it calls CUDA through.
+// The CUDA engine playing the scenario, and the interface through which it calls CUDA.
 class CudaPlayer {
  public:
   CudaPlayer(const cuda::FaultPlan& faults, const cuda::Tuning& tuning)
@@ -64,17 +64,17 @@ class CudaPlayer {
   }
 
   const uint64_t fails_at_;
-  cuda::Api* api_ = nullptr;  // before the player, whose making sets it
+  cuda::Api* api_ = nullptr;  // declared before the player, whose construction sets it
   FaultPlayer player_;
 };
 
-// Which way the engine goes: the short one, or with hardly any room for lists, so that batches are put
-// off, merged and drawn in passes. And through what.
+// How the engine draws: in the short way, or with hardly any room for lists, so that batches are
+// deferred, merged and drawn in passes; and with which tuning.
 struct Way {
   std::string name;
-  uint64_t every;  // of its calls fails, one after the other, at least
+  uint64_t every;  // at least every n-th of its calls fails, in turn
   cuda::Tuning tuning;
-  uint64_t scene = 0;  // 0: what FaultScenario has; else the seed of a RandomFaultScenario
+  uint64_t scene = 0;  // 0: that of FaultScenario; otherwise the seed of a RandomFaultScenario
 };
 void PrintTo(const Way& way, std::ostream* out) { *out << way.name; }
 const Way kWays[] = {
@@ -89,15 +89,15 @@ const Way kWays[] = {
       .index_bytes = 1 << 16,
       .compile_formulas = cuda::CompileFormulas::kNever}},
 #if !defined(VOXELD_TEST_SIMT)
-    // With formulas that are compiled: fewer faults, as each run compiles them anew.
+    // With formulas that are compiled: fewer faults, since each run compiles them again.
     {"formulas", 29, {.compile_formulas = cuda::CompileFormulas::kAtOnce}},
 #endif
-    // Layers of solids are moved by the device, however few.
+    // The device moves layers of solids, however few.
     {"crowds",
      kEvery == 1 ? 7 : 2 * kEvery,
      {.least_crowd = 2, .compile_formulas = cuda::CompileFormulas::kNever}}};
 
-// Nine scenarios by chance beside the one that is written out; one where a CPU plays the GPU.
+// Nine random scenarios beside the one that is written out; one where a CPU plays the GPU.
 std::vector<Way> ByChance() {
   std::vector<Way> ways;
   for (const uint64_t seed : kFaultSeeds) {
@@ -112,8 +112,8 @@ std::vector<Way> ByChance() {
 
 class CudaFaults : public ::testing::TestWithParam<Way> {
  protected:
-  // What the CPU engine leaves after each step, and how many calls the CUDA engine makes of CUDA
-  // when none fails.
+  // Records what the CPU engine leaves after each step, and how many calls of CUDA the CUDA engine
+  // makes when none fails.
   void SetUp() override {
     FaultPlayer cpu(conformance::CaseOf("cpu", EngineKind::kCpu, false));
     for (const FaultStep& step : steps_) {
@@ -146,10 +146,10 @@ class CudaFaults : public ::testing::TestWithParam<Way> {
     }
   }
 
-  // How many calls there are differs by a few from run to run: of the last none is owed.
+  // The number of calls differs by a few from run to run: the last few need not occur.
   bool Must(const CudaPlayer& cuda) const { return cuda.fails_at() + 4 <= calls_; }
 
-  // Runs `play` with each call failing in its turn, until a test has failed.
+  // Runs `play` with each call failing in turn, until a test has failed.
   void ForEachCall(const cuda::FaultPlan& plan, const std::function<void(CudaPlayer&)>& play) {
     const uint64_t first = 1 + Number("VOXELD_SEED", 0) % every_;
     for (uint64_t call = first; call <= calls_ && !HasFailure(); call += every_) {
@@ -161,7 +161,7 @@ class CudaFaults : public ::testing::TestWithParam<Way> {
     }
   }
 
-  // The last scene, from nothing, in an engine of whatever past.
+  // Draws the last scene, from nothing, in an engine with any history.
   void ExpectUsable(CudaPlayer& cuda) const {
     FaultStep target = steps_.back(), whole = steps_.back();
     target.kind = FaultStep::Kind::kTarget;
@@ -207,7 +207,7 @@ TEST_P(CudaFaults, WantOfMemoryRefusesACallThatSucceedsWhenItIsMadeAgain) {
   EXPECT_GT(static_cast<uint64_t>(refused) * every_, calls_ / 9);
 }
 
-// A frame that is refused is left out; what it would have shown comes with the next.
+// A refused frame is left out; what it would have shown is in the next one.
 TEST_P(CudaFaults, WantOfMemoryCostsAFrameNotTheNext) {
   int left_out = 0;
   ForEachCall(kNoMemoryOnce, [&](CudaPlayer& cuda) {
@@ -236,7 +236,7 @@ TEST_P(CudaFaults, WantOfMemoryThatLastsRefusesAndEndsWithIt) {
       const absl::Status status = cuda.Do(step);
       if (status.ok()) continue;
       ++refused;
-      // After a delta or a target that was refused, later steps may not fit the scene.
+      // After a refused delta or target, later steps may not fit the scene.
       EXPECT_TRUE(
           absl::IsResourceExhausted(status) ||
           (refused > 1 && (absl::IsInvalidArgument(status) || absl::IsFailedPrecondition(status))))

@@ -1,7 +1,7 @@
-// A library in NCCL's place, for tests without a GPU: it does what a rank alone would see, counts its
-// calls, and fails when it is told to.
+// A replacement for NCCL, for tests without a GPU: it does what a single rank would see, counts its
+// calls, and fails on request.
 //
-//   VOXELD_FAKE_NCCL_FAILS=name   that function answers ncclSystemError
+//   VOXELD_FAKE_NCCL_FAILS=name   that function returns ncclSystemError
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
@@ -34,7 +34,7 @@ int Called(const char* name, const std::string& with = "") {
 
 extern "C" {
 
-// What has been called since this was last asked.
+// Returns the calls since the last query.
 const char* FakeNcclLog() {
   static std::string told;
   told = std::move(Log());
@@ -71,7 +71,7 @@ int ncclCommAbort(Comm* comm) {
   return Called("ncclCommAbort");
 }
 
-// What has failed is told as an error of the work under way.
+// A failure is reported as an error of the work under way.
 int ncclCommGetAsyncError(Comm*, int* error) {
   *error = Called("ncclCommGetAsyncError");
   return kSuccess;

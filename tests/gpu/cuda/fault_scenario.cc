@@ -14,7 +14,7 @@ using conformance::DeltaBuffer;
 using conformance::ModelGeometry;
 
 constexpr int32_t kSize = 48, kDepth = 32;
-// More than an engine keeps of what has gone (cuda_volume.cc's kSpareItems).
+// More than the removed items that an engine keeps (cuda_volume.cc's kSpareItems).
 constexpr uint32_t kCloud = 80'000;
 constexpr uint32_t kLines = 3000;  // more than the smallest pass (pair_index.cc's kLeastPass)
 
@@ -60,7 +60,8 @@ ModelGeometry Ball(uint64_t id, float x, float y, float z, float radius, uint32_
   return g;
 }
 
-// The lower half of a ball's shell, by an expression and its bound: all of them by one program.
+// Returns the lower half of a ball's shell, by an expression and its bound: all of them share one
+// program.
 ModelGeometry Bowl(uint64_t id, double x, double y, double z, double radius) {
   implicit::Graph graph;
   const double center[3] = {x, y, z};
@@ -148,7 +149,7 @@ std::vector<FaultStep> FaultScenario() {
   script.Apply("first scene");
   script.Frame("first frame");
 
-  script.DropGeometry(1);  // its drawable stays, and has the new one
+  script.DropGeometry(1);  // its drawable stays, and uses the new one
   script.PutGeometry(Vertices(1, PrimitiveKind::kSegments, 2 * kLines, 3));
   script.Drop(2);
   for (uint64_t i = 0; i < 60; ++i) {
@@ -157,7 +158,7 @@ std::vector<FaultStep> FaultScenario() {
                i % 7 == 0 ? 1 : 0);
   }
   DrawableRecord flat = script.drawable(130);
-  flat.transform.m[0] = 0;  // no inverse: draws nothing, and is counted
+  flat.transform.m[0] = 0;  // without an inverse: draws nothing, but is counted
   script.Put(flat);
   script.Apply("more drawables than the table holds, one replaced, one dropped");
   script.Frame("after growth");
@@ -194,7 +195,7 @@ std::vector<FaultStep> FaultScenario() {
   script.Apply("a ball in a new layer");
   script.Frame("under the second target");
 
-  // Many solids and nothing else: they move, look otherwise, are hidden, and mask.
+  // Many solids and nothing else: they move, change style, are hidden, and mask.
   LayerRecord crowd{.id = 4, .order = 1, .opacity = 210};
   script.Put(crowd);
   script.PutGeometry(Ball(600, 0, 0, 0, 2, 0xFFC040));

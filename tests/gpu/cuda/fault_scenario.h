@@ -1,4 +1,4 @@
-// A short life of an engine in which every kind of its work happens, and what each step leaves.
+// A short life of an engine in which every kind of its work occurs, and the result of each step.
 #pragma once
 
 #include <cstdint>
@@ -17,22 +17,22 @@ struct FaultStep {
   Kind kind = Kind::kFrame;
   std::string name;
   Target target;                   // the one in force
-  conformance::DeltaBuffer delta;  // of kApply
+  conformance::DeltaBuffer delta;  // for kApply
   conformance::SceneModel scene;   // after the step
 };
 
-// Every kind of work: targets, among them one of the same layout; lines that the CPU draws; a crowd that moves; deltas
-// that add, replace, drop, hide, and outgrow tables; more that goes than an index keeps; frames
-// between; voxels read. Ends in a frame.
+// Returns every kind of work: targets, including one with the same layout; lines that the CPU
+// draws; a crowd that moves; deltas that add, replace, drop, hide, and outgrow tables; more
+// removals than an index keeps; frames in between; reading voxels. Ends with a frame.
 std::vector<FaultStep> FaultScenario();
 
-// Another, by chance: a scene of every kind of drawable under one target and then another, which changes from
-// frame to frame. The same for a seed. Ends in a frame.
+// Returns a random scenario: a scene of every kind of drawable under one target and then another,
+// which changes from frame to frame. The same for the same seed. Ends with a frame.
 std::vector<FaultStep> RandomFaultScenario(uint64_t seed);
-// Nine of which much is lit, with displays of every kind among them.
+// Nine seeds with many lit voxels and displays of every kind.
 inline constexpr uint64_t kFaultSeeds[] = {5, 13, 16, 18, 26, 28, 36, 42, 56};
 
-// What can be seen of an engine after a step.
+// The observable state of an engine after a step.
 struct Seen {
   std::vector<std::byte> pictures;
   std::vector<uint64_t> changed_in;

@@ -1,4 +1,4 @@
-// The scenarios in which CUDA's calls are made to fail, played by the CPU engine.
+// Tests the scenarios in which CUDA's calls are made to fail, played by the CPU engine.
 #include "tests/gpu/cuda/fault_scenario.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,8 @@
 namespace voxeld::gpu {
 namespace {
 
-// Does the step; what is seen then is what the oracle draws. True: it was a frame.
+// Runs the step, and checks that the result is what the oracle draws. Returns true if it was a
+// frame.
 bool DrawsWhatItSays(FaultPlayer& player, const FaultStep& step) {
   const absl::Status status = player.Do(step);
   EXPECT_TRUE(status.ok()) << status;
@@ -46,7 +47,7 @@ TEST(FaultScenario, DrawsWhatItSaysAndSomethingNewWithEveryFrame) {
 }
 
 TEST(FaultScenario, DrawsByChanceWhatItSays) {
-#ifdef VOXELD_SANITIZED  // which makes them long
+#ifdef VOXELD_SANITIZED  // which makes them slow
   const absl::Span<const uint64_t> seeds = absl::MakeConstSpan(kFaultSeeds).first(2);
 #else
   const absl::Span<const uint64_t> seeds = kFaultSeeds;

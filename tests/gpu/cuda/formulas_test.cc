@@ -1,4 +1,4 @@
-// CUDA's compiler as it is found, and what it makes of formulas, for a device that need not be there.
+// Tests finding CUDA's compiler, and compiling formulas with it, for a device that need not exist.
 #include <gmock/gmock.h>
 
 #include <map>

@@ -1,5 +1,5 @@
-// A kernel that really writes where it must not: what the engine's owner sees, and that the next
-// worker is as good as new.
+// Tests a kernel that really writes to an illegal address: what the engine's owner sees, and that
+// the next worker is unaffected.
 #include <gmock/gmock.h>
 
 #include <string>
@@ -91,7 +91,7 @@ TEST_F(IllegalAccess, OfOneGeometryLosesEveryEngineThatHasIt) {
   ExpectDraws(without);
 }
 
-// One GPU, two processes: the other one's engine draws on.
+// One GPU, two processes: the engine of the other one continues to draw.
 TEST_F(IllegalAccess, LeavesOtherWorkersAlone) {
   conformance::EngineDriver good = Make({}), bad = Make({.frame = "1"});
   GiveScene(good);

@@ -1,4 +1,4 @@
-// NCCL's library as it is found and called; a library of the tests' own stands for it.
+// Tests finding and calling NCCL's library, with a library of the tests in its place.
 #include "gpu/cuda/nccl.h"
 
 #include <dlfcn.h>
@@ -41,7 +41,7 @@ class NcclTest : public ::testing::Test {
     unsetenv("VOXELD_FAKE_NCCL_FAILS");
     dlclose(library_);
   }
-  // Since it was last asked.
+  // Returns the calls since the last query.
   std::string Log() const {
     return reinterpret_cast<const char* (*)()>(dlsym(library_, "FakeNcclLog"))();
   }
@@ -96,7 +96,7 @@ TEST_F(NcclTest, ARankMeetsBroadcastsAgreesAndLeavesWithoutWaiting) {
     EXPECT_TRUE((*comm)->Least(&value, nullptr).ok());
     EXPECT_TRUE((*comm)->Check().ok());
   }
-  // By nccl.h: ncclUint8 is 1, ncclInt32 2, ncclMin 3.
+  // According to nccl.h: ncclUint8 is 1, ncclInt32 2, ncclMin 3.
   EXPECT_EQ(Log(),
             "ncclGetUniqueId() ncclCommInitRank(1 of 3) "
             "ncclBroadcast(100 of type 1 from 0, in place) "

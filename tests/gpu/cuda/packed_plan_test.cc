@@ -1,4 +1,4 @@
-// Which displays are packed as they are drawn, and what their packing goes by.
+// Tests which displays are packed while they are drawn, and by which tables.
 #include "gpu/cuda/packed_plan.h"
 
 #include <gtest/gtest.h>
@@ -43,7 +43,7 @@ TEST(PackedPlan, TakesAStackOfTheGridsOwnResolution) {
   ASSERT_TRUE(plan);
   ASSERT_EQ(plan->slice_of_z.size(), 8u);
   for (int32_t z = 0; z < 8; ++z) EXPECT_EQ(plan->slice_of_z[static_cast<size_t>(z)], z);
-  // Each pixel's voxel, by the table that every engine goes by.
+  // Each pixel's voxel, by the table that every engine uses.
   const display::FootprintTable table =
       display::BuildFootprints(display.geometry, display.tone.sampling);
   for (int32_t v = 0; v < 24; ++v) {
@@ -117,7 +117,7 @@ TEST(PackedPlan, LeavesEverythingElseToSlicing) {
   Display bent(16, 16, 8);
   for (display::Tone::Curve& curve : bent.tone.lut) std::swap(curve[10], curve[200]);
   EXPECT_FALSE(bent.Plan(0, 8));
-  bent.layout.format = display::PixelFormat::kRgb332;  // where any tone will do
+  bent.layout.format = display::PixelFormat::kRgb332;  // where any tone is possible
   EXPECT_TRUE(bent.Plan(0, 8));
 }
 

@@ -25,7 +25,7 @@ GeometryRecord Record(uint32_t vertices, uint32_t indices, bool colored) {
   return record;
 }
 
-// Geometries in bulk memory, filled by chance, and their views.
+// Random geometries in bulk memory, and their views.
 struct Scene {
   void Add(BulkPool& pool, const GeometryRecord& record) {
     GeometryArrays arrays = *GeometryArrays::Allocate(record, &pool);
@@ -47,7 +47,7 @@ struct Scene {
   std::vector<GeometryArrays> kept;
 };
 
-// Carries the copies out, and compares what came to lie where.
+// Carries out the copies, and compares the results with the geometries.
 void ExpectAllThere(const UploadPlan& plan, const Scene& scene, const std::vector<size_t>& places) {
   std::vector<std::byte> device(plan.size());
   for (const UploadPlan::Copy& copy : plan.copies()) {
@@ -96,7 +96,7 @@ TEST(UploadPlan, WhatLiesInTheDeltaComesFirst) {
   const auto pool = BulkPool::Create();
   Scene scene;
   for (int i = 0; i < 3; ++i) scene.Add(*pool, Record(100, 0, true));
-  // As if the second lay in a delta: it goes over by itself, with the third.
+  // As if the second were in a delta: it is copied by itself, with the third.
   UploadPlan plan;
   plan.AddInline(scene.views[1]);
   plan.AddInline(scene.views[2]);

@@ -1,5 +1,6 @@
-// Curves and patches cut into straight pieces: how far these are from the true ones, worked out from
-// Bernstein's polynomials at many places; that ends meet; what is not cut finely.
+// Tests dividing curves and patches into straight pieces: their distance from the true ones,
+// computed with Bernstein polynomials at many places; that ends meet; and what is not divided
+// finely.
 #include "gpu/curves/cut.h"
 
 #include <algorithm>
@@ -14,7 +15,7 @@ namespace voxeld::gpu {
 namespace {
 
 constexpr int32_t kSize = 256;
-constexpr double kSnapped = 0.0034;  // half a unit along each axis, voxels
+constexpr double kSnapped = 0.0034;  // half a unit along each axis, in voxels
 
 using P = std::array<double, 3>;
 
@@ -244,7 +245,7 @@ TEST(CutPatches, TrianglesStayWithinTheStatedErrorAndNeighboursMeet) {
   EXPECT_GT(worst, kPatchError / 20) << "finer than anyone needs";
 }
 
-// Any turn, stretch and shear that leaves what is within 1 of the origin within the volume.
+// Returns any rotation, stretch and shear that keeps places within 1 of the origin in the volume.
 Affine RandomMap(std::mt19937& random) {
   std::uniform_real_distribution<double> number(-1, 1);
   const double scale = std::pow(2, 3 + 2 * number(random));

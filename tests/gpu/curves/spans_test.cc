@@ -1,4 +1,5 @@
-// Béziers in place of arcs, helices and splines: how far they are from what they stand for, in closed form.
+// Tests Béziers that represent arcs, helices and splines: their distance from those, in closed
+// form.
 #include "gpu/curves/spans.h"
 
 #include <algorithm>
@@ -62,7 +63,8 @@ TEST(Spans, AHelixWindsAround) {
       for (size_t i = 0; i < spans.size(); ++i) {
         for (int k = 0; k <= 32; ++k) {
           const Vector p = On(spans, i, k / 32.0);
-          // Where along the axis it is tells all else: each place of the helix has a height of its own.
+          // The position along the axis determines everything else: each place of the helix has a
+          // height of its own.
           const double share = (p.z - 1) / 8, angle = 2 * std::numbers::pi * turns * share;
           const double radius = 2 + (end_radius - 2) * share;
           worst = std::max(

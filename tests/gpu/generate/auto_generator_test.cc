@@ -1,4 +1,4 @@
-// Which generator is chosen, what it costs, and where that is kept.
+// Tests which generator is chosen, its cost, and where the choice is stored.
 #include "gpu/generate/auto_generator.h"
 
 #include <gmock/gmock.h>
@@ -10,7 +10,7 @@
 namespace voxeld::gpu::generate {
 namespace {
 
-// A generator that makes nothing and counts its calls.
+// A generator that produces nothing and counts its calls.
 class Counting final : public Generator {
  public:
   explicit Counting(int* calls) : calls_(calls) {}
@@ -32,7 +32,7 @@ class Counting final : public Generator {
   const std::unique_ptr<Executor> executor_ = MakeSerialExecutor();
 };
 
-// A quick start and 1 ns a voxel; a slow one and a tenth.
+// One starts quickly and takes 1 ns a voxel; the other starts slowly and takes a tenth of that.
 CostCurve Near() { return {{{1000, 1e-6}, {1'000'000, 1e-3}}, 10e-9}; }
 CostCurve Far() { return {{{1000, 50e-6}, {1'000'000, 150e-6}}, 1e-9}; }
 

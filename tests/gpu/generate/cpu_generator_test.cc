@@ -1,4 +1,4 @@
-// The CPU's generator against the definition in rational numbers, and what it refuses.
+// Compares the CPU's generator with the definition in rational numbers, and tests what it refuses.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -98,9 +98,10 @@ TEST_P(CpuGenerator, FarOutSegmentsAreExact) {
   ExpectExact(segments);
 }
 
-// Single voxels of segments so long that 64 fraction bits do not decide: there the definition is asked.
+// Single voxels of segments that are so long that 64 fraction bits do not decide: there the
+// definition is used.
 TEST_P(CpuGenerator, VoxelsOfTheLongestSegmentsAreExact) {
-  if (GetParam() == Sampling::kCover) return;  // its own case below
+  if (GetParam() == Sampling::kCover) return;  // tested by its own case below
   constexpr int32_t kFar = 1 << 29;
   const std::vector<SegmentD> segments = {
       {{-kFar + 20000.25, 3, -7}, {kFar - 1, 4 - 1.0 / 65536, 5'000'000.5}},
@@ -180,13 +181,13 @@ TEST_P(CpuGenerator, TheOtherFormsHoldTheSameVoxels) {
   }
 }
 
-// Every instruction set that is compiled for and this processor has.
+// Every instruction set that is compiled and that this processor supports.
 TEST_P(CpuGenerator, AllVectorsGiveTheSameBytes) {
   auto segments = RandomSegments(11, 600, 150, false);
   const auto adversarial = Adversarial(3, 300), longer = RandomSegments(12, 40, 3000, false);
   segments.insert(segments.end(), adversarial.begin(), adversarial.end());
   segments.insert(segments.end(), longer.begin(), longer.end());
-  for (SegmentD& g : segments) {  // where every form holds them
+  for (SegmentD& g : segments) {  // moved to where every form can hold them
     for (auto* p : {&g.start, &g.end}) {
       for (double& v : *p) v = std::min(std::abs(v), 1023.75);
     }
@@ -199,7 +200,7 @@ TEST_P(CpuGenerator, AllVectorsGiveTheSameBytes) {
       const int64_t target = left & -left;
       hwy::SetSupportedTargetsForTest(target);
       hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-      // Not all that the processor has are compiled for.
+      // Not all that the processor supports are compiled.
       if (VectorTarget() == hwy::TargetName(target)) {
         ++targets;
         EXPECT_TRUE(Generated(*generator_, segments, format) == expected)
@@ -212,7 +213,8 @@ TEST_P(CpuGenerator, AllVectorsGiveTheSameBytes) {
   }
 }
 
-// Large outputs go past the caches, threads share them, chunks cut them: the bytes are the same.
+// Large outputs bypass the caches, threads share them, and chunks divide them: the bytes are the
+// same.
 TEST_P(CpuGenerator, ThreadsChunksAndPlacesInMemoryChangeNothing) {
   auto segments = RandomSegments(9, 1500, 1000, false);
   for (SegmentD& g : segments) {

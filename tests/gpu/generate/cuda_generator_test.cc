@@ -1,7 +1,8 @@
-// The generator on a GPU: the CPU's bytes, for every sampling and form; and what it refuses.
+// Tests the generator on a GPU: it gives the CPU's bytes, for every sampling and form; and what it
+// refuses.
 //
-// VOXELD_SEGMENTS: how many random ones (default 200,000, where a CPU plays the GPU 5,000);
-// VOXELD_SEED: of them.
+// VOXELD_SEGMENTS: how many random ones (default 200,000; where a CPU plays the GPU 5,000);
+// VOXELD_SEED: the seed for them.
 #include "gpu/cuda/cuda_generator.h"
 
 #include <gmock/gmock.h>
@@ -51,14 +52,14 @@ class CudaGeneratorTest : public ::testing::TestWithParam<std::tuple<Sampling, O
 
   Format format() const { return {std::get<0>(GetParam()), std::get<1>(GetParam())}; }
 
-  // Chunk by chunk, as both stream them.
+  // Compares chunk by chunk, since both stream them.
   void ExpectEqual(const Batch& batch) {
     const auto plan = cpu_->Prepare(batch, format());
     ASSERT_TRUE(plan.ok()) << plan.status();
     uint64_t compared = 0, wrong = 0;
     const auto placed = cuda_->Place(batch, *plan);
     ASSERT_TRUE(placed.ok()) << placed.status();
-    // The GPU's chunks are compared with what the CPU makes of the same range.
+    // The GPU's chunks are compared with the CPU's result for the same range.
     std::vector<std::byte> all(plan->voxels() * BytesOf(format().output));
     ASSERT_TRUE(cpu_->Generate(batch, *plan, format(), all).ok());
     const absl::Status status =
@@ -76,7 +77,7 @@ class CudaGeneratorTest : public ::testing::TestWithParam<std::tuple<Sampling, O
     EXPECT_EQ(wrong, 0u) << "bytes of " << compared;
   }
 
-  // Moved to where every form holds them.
+  // Returns segments moved to where every form can hold them.
   static std::vector<SegmentD> Held(std::vector<SegmentD> segments) {
     for (SegmentD& g : segments) {
       for (auto* p : {&g.start, &g.end}) {
@@ -102,7 +103,7 @@ INSTANTIATE_TEST_SUITE_P(Forms, CudaGeneratorTest,
                                             ::testing::ValuesIn(kOutputs)),
                          NameOf);
 
-// What only the widest form holds.
+// Segments that only the widest form can hold.
 class CudaGeneratorFar : public CudaGeneratorTest {};
 INSTANTIATE_TEST_SUITE_P(Forms, CudaGeneratorFar,
                          ::testing::Combine(::testing::ValuesIn(kSamplings),
@@ -111,7 +112,7 @@ INSTANTIATE_TEST_SUITE_P(Forms, CudaGeneratorFar,
 
 TEST_P(CudaGeneratorTest, ManyRandomSegmentsAreTheCpusBytes) {
   const uint64_t seed = Number("VOXELD_SEED", 1), count = Number("VOXELD_SEGMENTS", kSegments);
-  // Short ones, nine in ten, and longer ones; on whole voxels, two in ten.
+  // Nine in ten are short, the others longer; two in ten are on whole voxels.
   std::vector<SegmentD> segments = RandomSegments(seed, count, 12, false);
   const auto whole = RandomSegments(seed + 1, count / 5 + 1, 12, true);
   const auto longer = RandomSegments(seed + 2, count / 100 + 1, 480, false);
@@ -120,7 +121,8 @@ TEST_P(CudaGeneratorTest, ManyRandomSegmentsAreTheCpusBytes) {
   ExpectEqual(Held(std::move(segments)));
 }
 
-// A few hundred voxels each: warps go from one to the next, some with many short ones among them.
+// A few hundred voxels each: warps go from one segment to the next, some of them with many short
+// ones in between.
 TEST_P(CudaGeneratorTest, LongerSegmentsAndMixedLengthsAreTheCpusBytes) {
   const uint64_t seed = Number("VOXELD_SEED", 1),
                  count = Number("VOXELD_SEGMENTS", kSegments) / 10 * 13;

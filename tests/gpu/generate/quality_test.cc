@@ -1,5 +1,6 @@
-// What the generator's voxels are like: neighbours, duplicates, gaps, distance, the way back; beside the paper's
-// own definition, by its seven-neighbour search. `--gtest_filter=Quality.*` prints the figures of docs/results/fidelity.md.
+// Measures the generator's voxels: neighbours, duplicates, gaps, distance, the reverse direction;
+// beside the paper's own definition, by its seven-neighbour search. `--gtest_filter=Quality.*`
+// prints the numbers of docs/results/fidelity.md.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -42,7 +43,7 @@ int32_t Apart(const Cell& a, const Cell& b) {
   return most;
 }
 
-// Of the cell's centre to the segment; plain double arithmetic.
+// Returns the distance of the cell's centre from the segment, in plain double arithmetic.
 double Distance(const Cell& cell, const SegmentD& g) {
   double dd = 0, pd = 0;
   std::array<double, 3> d = {}, p = {};
@@ -58,8 +59,8 @@ double Distance(const Cell& cell, const SegmentD& g) {
   return std::sqrt(sum);
 }
 
-// The paper's reference: of the seven neighbours in the direction of travel always the one whose centre is nearest
-// to the line, from S's voxel to E's.
+// The paper's reference: of the seven neighbours in the direction of travel, always the one whose
+// centre is nearest to the line, from S's voxel to E's.
 Cells SevenNeighbours(const SegmentD& g) {
   Cell at, last;
   std::array<int32_t, 3> way;
@@ -118,7 +119,7 @@ Figures Measure(const std::vector<SegmentD>& segments, Sampling sampling, bool b
       gap |= apart > 1;
     }
     f.lines_with_gaps += gap;
-    // Neighbours among the set's cells, which lie near each other in the list.
+    // Neighbours among the set's cells, which are near each other in the list.
     const Cells unique = [&] {
       Cells u;
       for (const Cell& c : cells) {
@@ -164,7 +165,7 @@ void Print(const char* what, const char* sampling, const Figures& f) {
       f.paper > 0 ? 100.0 * static_cast<double>(f.in_paper) / static_cast<double>(f.paper) : 0.0);
 }
 
-// In 512×512×256.
+// Returns segments in 512×512×256.
 std::vector<SegmentD> InVolume(uint64_t seed, size_t count, bool whole) {
   std::mt19937_64 random(seed);
   std::vector<SegmentD> out(count);
@@ -173,7 +174,7 @@ std::vector<SegmentD> InVolume(uint64_t seed, size_t count, bool whole) {
       for (size_t a = 0; a < 3; ++a) {
         const double v =
             std::uniform_real_distribution<double>(0, a == 2 ? 255.99 : 511.99)(random);
-        // As the batch counts them, so that distances are to what is generated.
+        // Rounded as in the batch, so that distances are to the segment that is generated.
         (*p)[a] = whole ? std::floor(v) : std::floor(v * 65536) / 65536;
       }
     }
@@ -181,8 +182,8 @@ std::vector<SegmentD> InVolume(uint64_t seed, size_t count, bool whole) {
   return out;
 }
 
-// The centres of voxels are half a voxel from whole end points: a segment between centres is what integers mean
-// when distances are measured.
+// The centres of voxels are half a voxel away from integer end points: integers mean a segment
+// between centres when distances are measured.
 std::vector<SegmentD> ToCentres(std::vector<SegmentD> segments) {
   for (SegmentD& g : segments) {
     for (auto* p : {&g.start, &g.end}) {
@@ -213,7 +214,7 @@ TEST(Quality, RandomSegmentsBetweenRealEndPoints) {
   Print("real end points", "EUCLIDEAN", euclidean);
   EXPECT_EQ(euclidean.backwards_differs, 0u);
   EXPECT_LE(euclidean.most, kFarthest);
-  // The paper's N breaks its own definition, by this much and no more.
+  // The paper's N violates its own definition, by this much and no more.
   EXPECT_GT(euclidean.duplicates, euclidean.voxels / 50);
   EXPECT_LT(euclidean.duplicates, euclidean.voxels / 10);
   EXPECT_LT(euclidean.lines_with_gaps, euclidean.segments / 50);
@@ -235,7 +236,7 @@ TEST(Quality, RandomSegmentsBetweenCentresOfVoxels) {
   EXPECT_EQ(euclidean.gaps, 0u);
   EXPECT_EQ(euclidean.backwards_differs, 0u);
   EXPECT_GT(euclidean.duplicates, euclidean.voxels / 50);
-  // The paper's definition, each centre at the least distance: THIN keeps to it.
+  // The paper's definition, each centre at the least distance: THIN satisfies it.
   EXPECT_GT(thin.in_paper * 100, thin.paper * 80);
 }
 
@@ -253,7 +254,7 @@ TEST(Quality, AdversarialSegments) {
   }
 }
 
-// 6-connected, and every cell that the segment passes through the inside of.
+// 6-connected, and includes every cell whose inside the segment passes through.
 TEST(Quality, CoverMovesOverOneFaceAtATime) {
   for (const Cells& cells : VoxelsOf(InVolume(3, 500, false), Sampling::kCover)) {
     for (size_t k = 0; k + 1 < cells.size(); ++k) {

@@ -1,5 +1,5 @@
-// The generator's definition in rational numbers of any size, one voxel after the other: slow, plain, and
-// nothing of it shared with what is tested.
+// The generator's definition in rational numbers of any size, one voxel after the other: slow,
+// plain, and independent of the tested code.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,7 @@ inline Integer Floor(const Rational& r) {
   return q;
 }
 
-// To the nearest 1/65536, halves up.
+// Rounds to the nearest 1/65536, halves up.
 inline Rational Snapped(double v) {
   return Rational(Floor(Rational(v) * 65536 + Rational(1, 2)), 65536);
 }
@@ -54,7 +54,7 @@ inline Cell CellAt(const ReferenceSegment& g, const Integer& k, const Integer& n
 inline Integer EuclideanSteps(const ReferenceSegment& g) {
   Rational sum = 0;
   for (size_t a = 0; a < 3; ++a) sum += (g.e[a] - g.s[a]) * (g.e[a] - g.s[a]);
-  // The greatest n with n² ≤ sum.
+  // Returns the greatest n with n² ≤ sum.
   return sqrt(Floor(sum));
 }
 
@@ -77,7 +77,7 @@ inline std::vector<Cell> Steps(const ReferenceSegment& g, const Integer& n) {
   return cells;
 }
 
-// Every crossing of a face, sorted.
+// Returns every crossing of a face, sorted.
 inline std::vector<Cell> Crossed(ReferenceSegment g) {
   if (std::lexicographical_compare(g.e.begin(), g.e.end(), g.s.begin(), g.s.end()))
     std::swap(g.s, g.e);

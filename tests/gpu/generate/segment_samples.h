@@ -1,4 +1,4 @@
-// Segments to try a generator with: random ones, and those that are likely to go wrong.
+// Segments for testing a generator: random ones, and those that are likely to fail.
 #pragma once
 
 #include <cmath>
@@ -14,8 +14,8 @@ using SegmentI = Segment<int32_t>;
 using SegmentF = Segment<float>;
 using SegmentD = Segment<double>;
 
-// Axis-parallel, diagonal, of no length and of length 1, on halves, in both directions, with slopes whose
-// voxels meet faces exactly, just below and just above whole numbers, around `origin`.
+// Axis-parallel, diagonal, of length 0 and 1, on halves, in both directions, with slopes whose
+// voxels meet faces exactly, just below and just above integers, around `origin`.
 inline std::vector<SegmentD> Adversarial(double origin, double length) {
   std::vector<SegmentD> out;
   constexpr double kUnit = 1.0 / 65536;
@@ -42,7 +42,7 @@ inline std::vector<SegmentD> Adversarial(double origin, double length) {
   add(kUnit, 0, 0, length, 1, kUnit);
   add(0, 1 - kUnit, 0.5, length, -1, kUnit);
   add(0, 0, 0, length, length - 1, 1);
-  // Half a unit, and what is just below it.
+  // Half a unit, and the value just below it.
   const double half = kUnit / 2;
   for (const double at : {half, std::nextafter(half, 0.0), -half, std::nextafter(-half, -1.0)}) {
     out.push_back({{at, at, at}, {length + at, at, -at}});

@@ -1,5 +1,5 @@
-// Programs as text: compiled, they give bit by bit what running them gives, for numbers side by side and for
-// numbers with gradients.
+// Tests programs as text: compiled, they give bit by bit what running them gives, for numbers side
+// by side and for numbers with gradients.
 #include "gpu/implicit/formula_text.h"
 
 #include <dlfcn.h>
@@ -27,8 +27,8 @@ using ::testing::Not;
 
 constexpr size_t kLanes = 6;
 
-// What a formula asks for, in lanes: hoisted[value][lane] as value and gradient; alike in all lanes unless the
-// value is the first axis'.
+// The values that a formula uses, in lanes: hoisted[value][lane] as value and gradient; the same in
+// all lanes unless the value depends on the first axis.
 struct Asked {
   float hoisted[kMostHoisted][kLanes][4];
   float coordinates[3][kLanes];
@@ -36,7 +36,7 @@ struct Asked {
   float voxel;
 };
 
-// The text's surroundings: what compiled formulas are called by.
+// The surroundings of the text: the interface through which compiled formulas are called.
 constexpr const char* kBefore = R"(#include "gpu/implicit/row.h"
 using namespace voxeld::gpu::implicit;
 constexpr unsigned kLanes = 6;
@@ -98,7 +98,7 @@ void Duals(const Asked& asked, const uint32_t* words, float* out) {
 
 using Compiled = void(const Asked&, const uint32_t*, float*);
 
-// Formulas in a library that the compiler has made of their texts.
+// Formulas in a library that the compiler has made from their texts.
 class Library {
  public:
   explicit Library(const std::vector<std::vector<uint32_t>>& programs)
@@ -188,7 +188,7 @@ TEST(FormulaText, GivesWhatRunningTheProgramGives) {
   for (size_t i = 0; i < kPrograms; ++i) {
     conformance::ModelGeometry g;
     conformance::AddProgram(scenes, 30, g);
-    // Along the axes, or turned about one of them, or about all.
+    // Along the axes, turned about one of them, or turned about all.
     const uint32_t depends[3][3] = {{1, 2, 4}, {3, 3, 4}, {7, 7, 7}};
     programs.push_back(Hoist({g.indices.data()}, depends[i % 3]));
   }

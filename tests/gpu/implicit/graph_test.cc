@@ -58,7 +58,7 @@ TEST(Graph, AChainAsLongAsThereAreInstructionsIsFine) {
   EXPECT_EQ(Compile(g, {.surface = chain}).status().code(), absl::StatusCode::kResourceExhausted);
 }
 
-// Every word of a program spoilt: refused, or still safe to run.
+// Every word of a program is changed: the program is refused, or still safe to run.
 TEST(Program, SpoiltOnesAreRefusedOrHarmless) {
   uint64_t refused = 0, run = 0;
   for (uint64_t seed = 0; seed < 300; ++seed) {

@@ -1,5 +1,5 @@
-// Intervals hold what single precision computes: random programs at random points of random boxes,
-// with their gradients.
+// Intervals contain the results of single precision: random programs at random points of random
+// boxes, with their gradients.
 #include "gpu/implicit/interval.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// The functions of expressions against double precision.
+// Compares the functions of expressions with double precision.
 #include "gpu/implicit/number.h"
 
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kError = 0x1p-21;
 
-// Over all magnitudes, and in the middle of it.
+// Numbers of all magnitudes, and from the middle of the range.
 class Samples {
  public:
   float Next() {
@@ -56,7 +56,7 @@ TEST(Number, ExponentialsAndLogarithmsAreWithinTheirError) {
     const float x = samples.Within(-87, 88.7);
     ExpectRelative(Exp(x), std::exp(double{x}), x);
     const float y = Abs(samples.Next());
-    // Absolute where the logarithm is small, as its argument was rounded already.
+    // Absolute where the logarithm is small, since its argument was already rounded.
     ASSERT_LE(std::fabs(Log(y) - std::log(double{y})),
               kError * std::max(1e-3, std::fabs(std::log(double{y}))))
         << "at " << y;

@@ -1,4 +1,4 @@
-// Formulas that are wrong in one place each: what is said, and of which place.
+// Tests formulas with one error each: the message, and the place that it names.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -30,7 +30,7 @@ std::string Number(const std::string& text, const Parameters& parameters = {}) {
   return std::string(ParseValue(text, parameters, {}, graph).status().message());
 }
 
-// Instead of whichever token, in whatever part of a formula: the first of what is wrong is told.
+// In place of any token, in any part of a formula: the first error is reported.
 TEST(ParseRefusals, ACharacterThatIsNoneIsFoundWhereverItStands) {
   for (const std::string text :
        {"x ^ 2 + - y * 3 / z - 1 = 0 where not x <= 1 and ( y <= 1 or z >= 2 ) and pi <= 4 ",
@@ -171,11 +171,11 @@ TEST(ParseRefusals, NamesAreToldAsFarAsThereIsRoom) {
   EXPECT_THAT(Number("none", many), HasSubstr("p9 and 2 more, and functions"));
 }
 
-// A construct that nests, as deep as a number says.
+// A construct that nests to a given depth.
 struct Construct {
   const char* name;
   std::function<std::string(int depth)> text;
-  bool is_flat = false;  // it only gets longer, and equal parts of it are one node
+  bool is_flat = false;  // it only becomes longer, and equal parts of it are one node
 };
 
 std::string Times(const std::string& text, int count) {

@@ -8,7 +8,7 @@
 namespace voxeld::gpu::implicit {
 namespace {
 
-// The value of a node at a point.
+// Returns the value of a node at a point.
 double ValueOf(const Graph& graph, Graph::Node node, double x, double y, double z) {
   const absl::StatusOr<std::vector<uint32_t>> words = Compile(graph, {.surface = node});
   EXPECT_TRUE(words.ok()) << words.status();

@@ -1,4 +1,4 @@
-// Programs that are broken in one place each: refused in words that name it.
+// Tests programs with one error each: they are refused with a message that names it.
 #include "gpu/implicit/program_check.h"
 
 #include <gmock/gmock.h>
@@ -16,7 +16,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// As gpu/implicit/program.h lays one out, written down a second time.
+// The layout of gpu/implicit/program.h, implemented a second time.
 struct Program {
   uint32_t color_by = 0, surface_slot = 0, bound_slot = 0, color_slots[3] = {}, ring_axis = 0;
   std::vector<Instruction> surface, bound, color;
@@ -48,7 +48,8 @@ Instruction Make(Op op, uint32_t to, uint32_t a = 0, uint32_t b = 0, uint32_t im
   return Instruction::Of(op, to, a, b, immediate);
 }
 
-// All that there is: x² + y in slot 2, bounded by z, a colour by channels, three positions in two rings.
+// Returns a program that has everything: x² + y in slot 2, bounded by z, a colour by channels,
+// three positions in two rings.
 Program Good() {
   Program program;
   program.surface = {Make(Op::kX, 0), Make(Op::kPowI, 1, 0, 0, 2), Make(Op::kY, 0),
@@ -72,7 +73,7 @@ TEST(ProgramCheck, WhatIsRightIsTaken) {
   EXPECT_EQ(Why(Good()), "");
   Program program = Good();
   program.color_by = 2;
-  program.color_slots[1] = program.color_slots[2] = 99;  // of a table's only the first counts
+  program.color_slots[1] = program.color_slots[2] = 99;  // with a table, only the first counts
   program.table.resize(256);
   EXPECT_EQ(Why(program), "");
   program.surface[1].immediate = 1024;
@@ -127,7 +128,7 @@ TEST(ProgramCheck, EachFaultIsNamed) {
       {[](Program& p) { p.surface[1].immediate = 0x80000000; }, "exponent is -2147483648"},
       {[](Program& p) { p.surface_slot = 3; }, "surface, slot of the result is 3"},
       {[](Program& p) { p.bound_slot = 24; }, "bound, slot of the result is 24"},
-      // Each of the three begins with nothing written.
+      // Each of the three begins with empty slots.
       {[](Program& p) { p.bound_slot = 0; }, "bound, slot of the result is 0"},
       {[](Program& p) { p.color_slots[2] = 0xFFFFFFFF; },
        "color, slot of the result is 4294967295"},

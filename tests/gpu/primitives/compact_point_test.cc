@@ -1,4 +1,4 @@
-// Points' voxels in 32 bits against those in 64.
+// Compares the voxels of points in 32 bits with those in 64.
 #include "gpu/primitives/compact_point.h"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ TEST(VoxelNear, IsTheVoxelThatAPositionSnapsTo) {
     expect(std::uniform_real_distribution<double>(-kMostNear, kMostNear)(random));
     expect(std::uniform_real_distribution<double>(-3, 3)(random));
   }
-  // On and beside all that is rounded, and the faces of voxels.
+  // On and beside every place where rounding changes, and the faces of voxels.
   for (const double middle : {-kMostNear, -513.0, -1.0, 0.0, 1.0, 512.0, kMostNear - 1}) {
     for (int half = -1; half <= 513; ++half) {
       const double at = middle + half / 512.0;

@@ -1,4 +1,4 @@
-// Compact triangles against the definition: voxels and colours, region by region.
+// Compares compact triangles with the definition: voxels and colours, region by region.
 #include "gpu/primitives/compact_triangle.h"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ constexpr int32_t kRegion[3] = {32, 32, 16};
 
 using Colored = std::map<Voxel, std::set<uint32_t>>;
 
-// All voxels of the regions that the triangle's bounds touch, and one more around.
+// Returns all voxels of the regions that the triangle's bounds touch, and one more around them.
 Box3 Around(const Triangle& t) {
   Box3 box = BoundsOf(t);
   for (int a = 0; a < 3; ++a) {
@@ -98,8 +98,8 @@ void ExpectAsDefined(const Triangle& t) {
 
 class CompactTriangles : public testing::TestWithParam<SurfaceRule> {
  protected:
-  // Vertices within `extent` of a place at most `far` units away, of which `snap` as a rule divides
-  // the coordinates.
+  // Returns a triangle with vertices within `extent` of a place that is at most `far` units away;
+  // `snap` usually divides the coordinates.
   Triangle Random(int64_t extent, int64_t far, int64_t snap) {
     Triangle t;
     t.rule = GetParam();
@@ -113,7 +113,7 @@ class CompactTriangles : public testing::TestWithParam<SurfaceRule> {
         if (i > 0 && Uniform(0, 9) == 0) t.v[i][a] = t.v[i - 1][a];
       }
     }
-    if (Uniform(0, 3) == 0) {  // in a plane across an axis, so that no other has an area
+    if (Uniform(0, 3) == 0) {  // in a plane across an axis, so that the other shadows have no area
       const int64_t a = Uniform(0, 2);
       t.v[2][static_cast<int>(a)] = t.v[1][static_cast<int>(a)] = t.v[0][static_cast<int>(a)];
     }
@@ -148,7 +148,7 @@ TEST_P(CompactTriangles, FarAwayAreAsDefined) {
   }
 }
 
-// Vertices on one line, on one point, and all but.
+// Vertices on one line, on one point, and nearly so.
 TEST_P(CompactTriangles, FlatAndNearlySoAreAsDefined) {
   for (int i = 0; i < 1500; ++i) {
     Triangle t = Random(i % 2 == 0 ? 8000 : 900, 1 << 15, i % 3 == 0 ? 256 : 1);
@@ -163,7 +163,7 @@ TEST_P(CompactTriangles, FlatAndNearlySoAreAsDefined) {
   }
 }
 
-// Corners of the greatest extents, where all bounds are met.
+// Corners at the greatest extents, where all bounds are reached.
 TEST_P(CompactTriangles, OfTheGreatestExtentAreAsDefined) {
   constexpr int64_t kExtent = CompactTriangle::kMostExtent;
   for (int i = 0; i < 150; ++i) {
@@ -193,7 +193,7 @@ TEST_P(CompactTriangles, LargerOrFurtherAreNone) {
   EXPECT_TRUE(IsCompact(t));
 }
 
-// What AreCompact says of positions holds of vertices, which are snapped to units.
+// AreCompact applies to positions and holds for vertices, which are snapped to units.
 TEST_P(CompactTriangles, BoundsOfPositionsTell) {
   constexpr double kLo[3] = {-16382, 0, 0}, kHi[3] = {0, 16382, 62.5};
   constexpr double kExtent[3] = {62.8, 62.8, 62.5};

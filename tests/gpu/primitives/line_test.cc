@@ -1,4 +1,4 @@
-// Properties of lines that the definition promises.
+// Tests properties of lines that the definition promises.
 #include "gpu/primitives/line.h"
 
 #include <gtest/gtest.h>
@@ -96,7 +96,7 @@ TEST(CoverLine, EachVoxelSharesAFaceWithTheNext) {
   }
 }
 
-// Through corners: x before y before z from the smaller end, each cell between included.
+// Through corners: x before y before z from the smaller end, including each cell in between.
 TEST(CoverLine, CrossesCornersAxisByAxis) {
   const Line line{
       {{128, 128, 128}}, {{128 + 512, 128 + 512, 128 + 512}}, 0, 0, LineSampling::kCover};
@@ -154,7 +154,7 @@ TEST(Line, OfNoLengthGivesItsEndsInTheirColours) {
   }
 }
 
-// A ball of diameter 3 about a voxel's centre: the centre, 6 at distance 1 and 12 at √2.
+// A ball of diameter 3 around a voxel's centre: the centre, 6 at distance 1 and 12 at √2.
 TEST(Capsule, OfNoLengthIsABall) {
   const Line point{{{128, 128, 128}}, {{128, 128, 128}}};
   VoxelSet ball;

@@ -1,5 +1,5 @@
-// Surfaces keep what is inside in: no path of face steps crosses a THIN one,
-// no path at all a COVER one.
+// Surfaces separate inside from outside: no path of face steps crosses a THIN one, and no path at
+// all a COVER one.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -23,7 +23,7 @@ struct Mesh {
   std::vector<uint32_t> indices;
 };
 
-// A sphere of radius 1 about 0: an icosahedron, its faces divided `times`.
+// Returns a sphere of radius 1 around 0: an icosahedron whose faces are divided `times` times.
 Mesh Icosphere(int times) {
   const double t = std::numbers::phi;
   Mesh m;
@@ -59,7 +59,7 @@ Mesh Icosphere(int times) {
   return m;
 }
 
-// The mesh, stretched and moved, as triangles in units.
+// Returns the voxels of the mesh, stretched and moved, as triangles in units.
 VoxelSet Drawn(const Mesh& m, const Affine& map, SurfaceRule rule) {
   std::vector<Int3> at;
   for (size_t i = 0; i < m.positions.size(); i += 3) {
@@ -107,7 +107,7 @@ TEST(Surface, ClosedMeshesAreNotCrossed) {
   }
 }
 
-// Corners on voxel centres and faces, sides along the axes: the ties.
+// Corners on voxel centres and faces, sides along the axes: these cause ties.
 TEST(Surface, BoxesOfTrianglesOnCentresAndFacesAreNotCrossed) {
   Mesh cube;
   for (int i = 0; i < 8; ++i) {
@@ -131,7 +131,7 @@ TEST(Surface, BoxesOfTrianglesOnCentresAndFacesAreNotCrossed) {
   }
 }
 
-// A cube from -1 to 1, each face cut into so many strips of two triangles.
+// Returns a cube from -1 to 1, each face divided into that many strips of two triangles.
 Mesh CubeOfStrips(int strips) {
   Mesh m;
   for (int axis = 0; axis < 3; ++axis) {
@@ -169,7 +169,8 @@ TEST(Surface, CubesOfSliversAreNotCrossed) {
   }
 }
 
-// Sides along the axes, through no centre and no face of a voxel: the outermost voxels of a block, in whatever triangles.
+// Sides along the axes, through no centre and no face of a voxel: the outermost voxels of a block,
+// however it is divided into triangles.
 TEST(Surface, ACubeAlongTheAxesIsOneVoxelThick) {
   for (const int strips : {1, 3, 100}) {
     for (const double half : {5.7, 6.2}) {
@@ -209,7 +210,7 @@ VoxelSet DrawnSolid(const Affine& map, SurfaceRule rule, Fill fill) {
   VoxelSet set;
   EXPECT_EQ(Primitive::Count(source), 1u);
   Primitive::EmitVoxels(source, 0, kBox, Into(set));
-  // What is hollow is empty in the middle.
+  // A hollow shape is empty in the middle.
   EXPECT_EQ(set.contains(MiddleOf(map)), fill == Fill::kSolid);
   return set;
 }
@@ -273,8 +274,8 @@ TYPED_TEST(SolidSurface, HasItsVolumeAtRadius20) {
   EXPECT_NEAR(static_cast<double>(set.size()), want, want * 0.01);
 }
 
-// Squeezed to nothing it is still there, one voxel thick and without holes: every column of voxels
-// across it has one.
+// Flattened completely, it is still there, one voxel thick and without holes: every column of
+// voxels across it has one.
 TYPED_TEST(SolidSurface, ThinnerThanAVoxelIsOneVoxelThick) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> place(25, 30);
@@ -325,7 +326,7 @@ TEST(Triangle, ThinVoxelsAreAsCountedByHand) {
   VoxelSet set;
   EmitTriangle({{{{1536, 0, 0}}, {{0, 1536, 0}}, {{0, 0, 1536}}}, {}, SurfaceRule::kThin}, kBox,
                Into(set));
-  VoxelSet want = {{6, 0, 0}, {0, 6, 0}, {0, 0, 6}};  // its vertices'
+  VoxelSet want = {{6, 0, 0}, {0, 6, 0}, {0, 0, 6}};  // those of its vertices
   for (int32_t i = 0; i <= 5; ++i) {
     for (int32_t j = 0; i + j <= 5; ++j) want.insert({i, j, 5 - i - j});
   }

@@ -1,4 +1,5 @@
-// Thin lines against the definition: each coordinate of each voxel as a quotient of 128-bit numbers.
+// Compares thin lines with the definition: each coordinate of each voxel as a quotient of 128-bit
+// numbers.
 #include "gpu/primitives/thin_line.h"
 
 #include <gtest/gtest.h>
@@ -40,7 +41,7 @@ std::vector<Voxel> Defined(const Line& line) {
   return voxels;
 }
 
-// The voxels of a span, and that it lies in its box.
+// Adds the voxels of a span, and checks that it is in its box.
 void AddSpan(const ThinLine& line, const int32_t box[3], int32_t begin, int32_t end,
              std::vector<Voxel>& voxels) {
   ASSERT_LT(begin, end);
@@ -68,7 +69,7 @@ std::vector<Voxel> Walked(const Line& line) {
   return voxels;
 }
 
-// By way of boxes four times as large, as lines that are sorted in two goes.
+// By way of boxes four times as large, as for lines that are sorted in two steps.
 std::vector<Voxel> WalkedTwice(const Line& line) {
   const ThinLine thin = MakeThin(line, 1);
   std::vector<Voxel> voxels;
@@ -123,7 +124,7 @@ TEST_P(ThinLines, AreTheDefinedVoxelsForRandomEnds) {
 }
 
 // Ends on faces and centres of voxels and of boxes, and a unit beside them; equal and opposite
-// slopes, so that faces are met together.
+// slopes, so that faces are met at the same time.
 TEST_P(ThinLines, AreTheDefinedVoxelsForEndsOnFaces) {
   std::mt19937_64 random(99);
   const int64_t grains[] = {1, 128, 256, 4096, 8192, 32768};
@@ -142,7 +143,7 @@ TEST_P(ThinLines, AreTheDefinedVoxelsForEndsOnFaces) {
   }
 }
 
-// The longest there may be, where a step's error adds up most.
+// The greatest possible length, at which the error of a step accumulates most.
 TEST_P(ThinLines, AreTheDefinedVoxelsAtTheGreatestLength) {
   std::mt19937_64 random(5);
   for (int i = 0; i < 300; ++i) {

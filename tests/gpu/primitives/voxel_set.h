@@ -1,4 +1,4 @@
-// Sets of voxels and what flows around them, for tests of primitives.
+// Sets of voxels, and paths around them, for tests of primitives.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ namespace voxeld::gpu {
 using Voxel = std::array<int32_t, 3>;
 using VoxelSet = std::set<Voxel>;
 
-// An emit function that collects.
+// Returns an emit function that collects voxels.
 inline auto Into(VoxelSet& set) {
   return [&set](int32_t x, int32_t y, int32_t z, uint32_t) { set.insert({x, y, z}); };
 }
@@ -28,7 +28,8 @@ inline VoxelSet Shifted(const VoxelSet& set, const Voxel& by) {
   return result;
 }
 
-// Steps to the neighbours that share a face, an edge too, or a corner too: 6, 18 or 26.
+// Returns the steps to the neighbours that share a face, also those that share an edge, or also
+// those that share a corner: 6, 18 or 26.
 inline std::vector<Voxel> Neighbours(int count) {
   const int reach = count == 6 ? 1 : count == 18 ? 2 : 3;
   std::vector<Voxel> steps;
@@ -43,7 +44,7 @@ inline std::vector<Voxel> Neighbours(int count) {
   return steps;
 }
 
-// Whether a path of steps between free voxels of `box` leads from one to the other.
+// Returns whether a path of steps between free voxels of `box` leads from one to the other.
 inline bool Connected(const VoxelSet& walls, const Box3& box, const Voxel& from, const Voxel& to,
                       int neighbours) {
   const int32_t nx = box.hi[0] - box.lo[0], ny = box.hi[1] - box.lo[1], nz = box.hi[2] - box.lo[2];
@@ -51,7 +52,7 @@ inline bool Connected(const VoxelSet& walls, const Box3& box, const Voxel& from,
     return static_cast<size_t>(((v[2] - box.lo[2]) * ny + v[1] - box.lo[1]) * nx + v[0] -
                                box.lo[0]);
   };
-  std::vector<uint8_t> closed(static_cast<size_t>(nx * ny * nz));  // a wall, or seen
+  std::vector<uint8_t> closed(static_cast<size_t>(nx * ny * nz));  // a wall, or already visited
   for (const Voxel& v : walls) closed[index(v)] = 1;
   std::vector<Voxel> next = {from};
   closed[index(from)] = 1;

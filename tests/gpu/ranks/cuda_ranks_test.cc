@@ -1,6 +1,6 @@
-// One display over two GPUs of this machine, linked by NCCL (VOXELD_NCCL says where, if the loader does
-// not): the bytes of one GPU and of the CPU; and what becomes of it when one of them is lost, or has no
-// memory left.
+// Tests one display over two GPUs of this machine, linked by NCCL (VOXELD_NCCL says where it is, if
+// the loader does not find it): it gives the bytes of one GPU and of the CPU; and what happens when
+// one of them is lost, or is out of memory.
 #include <cuda_runtime_api.h>
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -64,7 +64,7 @@ Target Cube(int32_t n) {
   return target;
 }
 
-// `count` lines anywhere in n³ voxels, colours along them: 32 bytes a line.
+// Inserts `count` lines anywhere in n³ voxels, with colours along them: 32 bytes a line.
 void PutLines(DeltaBuffer& delta, uint64_t id, uint32_t count, int32_t n, uint32_t seed) {
   std::mt19937 random(seed);
   conformance::ModelGeometry lines;
@@ -100,7 +100,7 @@ class CudaRanks : public ::testing::Test {
                                 .string();
 };
 
-// What the engines show of the same, frame by frame.
+// Compares what the engines show for the same scene, frame by frame.
 void ExpectSame(EngineDriver& ranks, std::vector<EngineDriver*> others) {
   const absl::StatusOr<FrameResult> got = ranks.Frame();
   ASSERT_TRUE(got.ok()) << got.status();
@@ -144,7 +144,7 @@ TEST_F(CudaRanks, ShowWhatOneGpuAndTheCpuShow) {
   }
 }
 
-// Deltas on both sides of the size from which they are broadcast, and of several pieces.
+// Deltas above and below the size from which they are broadcast, and of several pieces.
 TEST_F(CudaRanks, LargeDeltasReachBoth) {
   constexpr int32_t kCube = 128;
   EngineDriver ranks = TwoGpus();
@@ -173,7 +173,7 @@ TEST_F(CudaRanks, LargeDeltasReachBoth) {
   }
 }
 
-// All but a little of the second GPU's memory is somebody else's.
+// Another process holds all but a little of the second GPU's memory.
 TEST_F(CudaRanks, WithoutMemoryOnOneGpuADeltaIsRefusedByBoth) {
   constexpr int32_t kCube = 64;
   constexpr uint32_t kManyLines = 20'000'000;  // 640 MB
@@ -229,7 +229,7 @@ TEST_F(CudaRanks, ALostOneTakesTheOtherAlongAndTheNextDrawTheSame) {
   }
 }
 
-// The processes that this one has started, and which have not ended.
+// Returns the processes that this one has started, and which have not exited.
 std::vector<pid_t> Children() {
   std::vector<pid_t> children;
   for (const auto& entry : std::filesystem::directory_iterator("/proc")) {

@@ -1,4 +1,4 @@
-// A rank that is lost, and ranks that come to differ.
+// Tests a rank that is lost, and ranks whose results begin to differ.
 #include <gmock/gmock.h>
 #include <unistd.h>
 
@@ -46,12 +46,12 @@ class LostRank : public ::testing::Test {
     };
     return options;
   }
-  // The next frame of whichever rank is first to look.
+  // Makes the next frame of the rank that checks first fail.
   void FailOneRank(const std::string& kind) {
     std::ofstream(file_ + ".next") << kind;
     std::filesystem::rename(file_ + ".next", file_);
   }
-  // The loss that is told after `before` others.
+  // Waits for the loss that is reported after `before` others.
   absl::Status AwaitLoss(size_t before = 0) {
     sync::MutexLock lock(mutex_);
     while (losses_.size() <= before) lost_.Wait(mutex_);
@@ -123,7 +123,7 @@ TEST_F(LostRank, ThatWasNotAskedForAnythingIsToldToo) {
   EXPECT_EQ(answer.get_future().get().code(), absl::StatusCode::kDataLoss);
 }
 
-// One rank alone has no memory left for a frame that the others have drawn.
+// Only one rank is out of memory for a frame that the others have drawn.
 TEST_F(LostRank, RanksThatDifferAreLost) {
   EngineDriver engine = Drive(Options(2));
   ASSERT_TRUE(engine.SetTarget(target_).ok());
@@ -160,7 +160,7 @@ TEST_F(LostRank, WhatAllRefuseLosesNobody) {
   EXPECT_EQ(losses(), 0u);
 }
 
-// After a loss the owner makes a new one, with ranks and a link of its own.
+// After a loss the owner makes a new engine, with its own ranks and link.
 TEST_F(LostRank, AnEngineAfterItDrawsTheSame) {
   SceneGenerator generator(13);
   const conformance::SceneModel scene = generator.RandomScene(24);

@@ -1,4 +1,5 @@
-// Ranked engines of a program that needs no GPU: asked for CUDA, it is the CPU engine by another name.
+// Ranked engines of a program that needs no GPU: when CUDA is requested, it is the CPU engine under
+// another name.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,5 @@
-// One display by several engines, each in a process of its own: to its owner it is one engine.
+// Tests one display drawn by several engines, each in a process of its own: for its owner they are
+// one engine.
 #include "gpu/ranks/ranked_engine.h"
 
 #include <gmock/gmock.h>
@@ -44,7 +45,7 @@ TEST(SlicePart, IsCutIntoRunsThatJoinToTheWhole) {
   EXPECT_EQ(run.end, 20);
 }
 
-// Scenes that change, in displays of every kind: bytes, numbers of changes, voxels and counts.
+// Changing scenes, in displays of every kind: bytes, numbers of changes, voxels and counts.
 TEST(RankedEngine, EqualsOneEngineWithAnyNumberOfRanks) {
   uint64_t lit = 0;
   for (const int ranks : {1, 2, 5}) {
@@ -147,7 +148,7 @@ TEST(RankedEngine, WhereTheCpuDrawsInThisProcessHasNoRanks) {
               AllOf(HasSubstr("CPU, 1 thread"), Not(HasSubstr("rank"))));
 }
 
-// As the pipeline makes one that is to come back: what is asked waits until it is there.
+// As the pipeline makes an engine that is to return: calls wait until it is ready.
 TEST(RankedEngine, ThatIsNotWaitedForAnswersWhenItIsThere) {
   const Target target = SceneGenerator(5).RandomTarget();
   EngineOptions options = RankOptions(2);

@@ -1,4 +1,4 @@
-// With a CPU for a GPU. No device takes what would be compiled.
+// With a CPU in place of a GPU. No device can run compiled formulas.
 #include "tests/conformance/cuda_cases.h"
 
 namespace voxeld::gpu::conformance {

@@ -1,4 +1,5 @@
-// With a CPU for a GPU: not each of the engine's ways by itself. No device takes what would be compiled.
+// With a CPU in place of a GPU: not each of the engine's ways by itself. No device can run compiled
+// formulas.
 #include "tests/conformance/cuda_cases.h"
 
 namespace voxeld::gpu::conformance {

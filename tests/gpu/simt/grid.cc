@@ -25,7 +25,7 @@ constexpr size_t kStack = size_t{256} << 10;
   std::abort();
 }
 
-// Stacks that are used again: a grid has a fiber for each of its threads.
+// Stacks that are reused: a grid has a fiber for each of its threads.
 struct Stacks {
   boost::context::stack_context allocate() {
     boost::context::stack_context stack;
@@ -45,7 +45,7 @@ struct Stacks {
   std::vector<std::unique_ptr<std::byte[]>> free_;
 };
 
-// Those that no grid runs on now.
+// Stacks that no grid is using.
 class StackStore {
  public:
   std::unique_ptr<Stacks> Take() {
@@ -79,7 +79,7 @@ struct Thread {
   Place place;
   uint32_t number = 0;
   Waits waits = Waits::kNot;
-  uint32_t mask = 0;  // of the lanes waited for
+  uint32_t mask = 0;  // the lanes for which it waits
   uint64_t value = 0;
   std::array<uint64_t, kWarp> seen;
   std::vector<std::function<void()>> later;
@@ -173,7 +173,8 @@ class Block {
 
   static void Suspend(Thread& self) { self.caller = std::move(self.caller).resume(); }
 
-  // Threads that have ended are not waited for. True if the caller, who has come, goes on.
+  // Does not wait for threads that have ended. Returns true if the calling thread, which has
+  // arrived, may continue.
   bool EndBarrier() {
     if (arrived_ == 0 || arrived_ < left_) return false;
     for (Thread& thread : threads_) {
@@ -191,7 +192,7 @@ class Block {
     for (uint32_t lane = 0; lane < kWarp; ++lane) {
       if ((self.mask >> lane & 1) == 0) continue;
       if (first + lane >= count_) {
-        // A warp that is not full: nobody is there, and nobody asks.
+        // In a warp that is not full, missing lanes are not waited for.
         continue;
       }
       const Thread& other = threads_[first + lane];

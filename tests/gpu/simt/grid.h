@@ -1,15 +1,15 @@
-// Grids of CUDA threads on the CPU: a kernel, compiled as C++ (translate.py, kernel.h), is run with
-// CUDA's rules for threads that wait for each other, and with none of the habits of real devices that
-// a kernel must not lean on.
+// Runs grids of CUDA threads on the CPU: a kernel, compiled as C++ (translate.py, kernel.h), runs
+// with CUDA's rules for threads that wait for each other, and without the habits of real devices on
+// which a kernel must not rely.
 //
-// A thread of the grid is a fiber, and goes on until it has to wait: for its block, or for lanes of its
-// warp. Which one goes on next is drawn by lot, so that what is not ordered by a barrier comes in any
-// order. Blocks run side by side on two threads of the processor. Shared memory is not cleared
-// between blocks, device memory not at all.
+// A thread of the grid is a fiber, and runs until it has to wait: for its block, or for lanes of
+// its warp. The next one is chosen at random, so that everything that is not ordered by a barrier
+// happens in any order. Blocks run side by side on two threads of the processor. Shared memory is
+// not cleared between blocks, and device memory is not cleared at all.
 //
-// What CUDA leaves undefined ends the program with a message: a barrier that some threads of a block
-// never reach, lanes that wait for lanes that have ended or for others than these wait for, a value
-// asked of a lane that does not take part.
+// Behaviour that CUDA leaves undefined terminates the program with a message: a barrier that some
+// threads of a block never reach, lanes that wait for lanes that have ended or that wait for other
+// lanes, a value requested from a lane that does not take part.
 #pragma once
 
 #include <cstddef>
@@ -23,20 +23,21 @@
 
 namespace voxeld::simt {
 
-// Where the thread that runs is.
+// The position of the running thread.
 struct Place {
   dim3 thread, block, block_size, grid_size;
 };
 const Place& Here();
 
-// For the kernels' part (kernel.h).
+// For use by kernels (kernel.h).
 uint32_t Lane();
 void* DynamicShared();
-// What every thread of the block gives, or-ed, once all have come.
+// Returns the values of all threads of the block, or-ed, once all have arrived.
 bool WaitForBlock(bool value);
-// What the lanes of `mask` give: of the others nothing is said. All of them call it with one mask.
+// Returns the values of the lanes of `mask`; those of others are unspecified. All of them must call
+// it with the same mask.
 const uint64_t* Exchange(uint32_t mask, uint64_t value);
-// Work that is done when the thread waits for it (or never).
+// Defers work until the thread waits for it (possibly never).
 void Later(std::function<void()> work);
 void DoLater();
 
@@ -45,7 +46,8 @@ struct Grid {
   size_t shared = 0;
   const void* kernel = nullptr;
 };
-// Runs body() in each thread of the grid, if that can be; else the next cudaGetLastError() tells.
+// Runs body() in each thread of the grid, if that is possible; otherwise the next
+// cudaGetLastError() reports the error.
 void Run(const Grid& grid, const std::function<void()>& body);
 
 // kernel<<<blocks, threads, shared, stream>>>(…)

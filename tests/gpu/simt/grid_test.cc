@@ -1,5 +1,5 @@
-// The GPU that the CPU plays: threads that wait get what CUDA promises, and what CUDA leaves undefined
-// is found.
+// Tests the GPU that is played by the CPU: waiting threads get what CUDA promises, and behaviour
+// that CUDA leaves undefined is detected.
 #include "tests/gpu/simt/grid.h"
 
 #include <gmock/gmock.h>
@@ -31,7 +31,7 @@ TEST(SimtGrid, EveryThreadOfEveryBlockRunsOnce) {
   EXPECT_THAT(out, Each(1u));
 }
 
-// Each thread reads what another wrote before the barrier, round after round.
+// Each thread reads what another wrote before the barrier, in several rounds.
 void PassRound(uint32_t rounds, uint32_t* out) {
   uint32_t* const places = static_cast<uint32_t*>(DynamicShared());
   const uint32_t self = threadIdx.x, count = blockDim.x;
@@ -65,7 +65,7 @@ TEST(SimtGrid, NothingButBarriersOrdersThreads) {
   EXPECT_THAT(orders, SizeIs(8));
 }
 
-// Those of odd number leave before the barrier.
+// Threads with an odd number leave before the barrier.
 void LeaveEarly(uint32_t* any) {
   if (threadIdx.x % 2 != 0) return;
   any[threadIdx.x] = static_cast<uint32_t>(__syncthreads_or(threadIdx.x == 6 ? 1 : 0));
@@ -113,7 +113,7 @@ TEST(SimtGrid, LanesTellEachOther) {
   }
 }
 
-// The halves of a warp go ways of their own.
+// The two halves of a warp take different branches.
 void AskInHalves(uint32_t* out) {
   const uint32_t lane = threadIdx.x;
   const uint32_t half = lane < 16 ? 0x0000FFFFu : 0xFFFF0000u;
@@ -161,7 +161,7 @@ TEST(SimtGrid, LaunchesAreLimitedAsADevicesAre) {
             cudaErrorInvalidValue);
 }
 
-// ------------------------------------------------------------------------- what CUDA does not define
+// ------------------------------------------------------------------------- undefined behaviour
 
 void WaitUnlessFirst(uint32_t*) {
   if (threadIdx.x / 32 == 0) {

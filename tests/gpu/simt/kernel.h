@@ -1,5 +1,5 @@
-// What CUDA's language has beyond C++, for kernels that grid.h runs: included before each of their
-// sources. The rest, launches and dynamic shared memory, translate.py writes in C++.
+// The extensions of CUDA's language to C++, for kernels that grid.h runs: included before each of
+// their sources. translate.py rewrites the rest, launches and dynamic shared memory, in C++.
 #pragma once
 
 #include <algorithm>
@@ -31,10 +31,10 @@ using std::min;
 
 inline void __syncthreads() { voxeld::simt::WaitForBlock(false); }
 inline int __syncthreads_or(int value) { return voxeld::simt::WaitForBlock(value != 0) ? 1 : 0; }
-// Whoever sees what atomicAdd has left sees all that was before it.
+// A thread that sees the result of an atomicAdd also sees everything that happened before it.
 inline void __threadfence() {}
 inline void __syncwarp(uint32_t mask = 0xFFFFFFFFu) { voxeld::simt::Exchange(mask, 0); }
-// A set of lanes that happen to be together: at least the one that asks.
+// Returns a set of lanes that happen to be together: at least the calling one.
 inline uint32_t __activemask() { return 1u << voxeld::simt::Lane(); }
 
 inline uint32_t __ballot_sync(uint32_t mask, int value) {
@@ -152,8 +152,8 @@ inline uint32_t __vimin3_u32(uint32_t a, uint32_t b, uint32_t c) { return min(mi
 inline uint32_t __float_as_uint(float x) { return std::bit_cast<uint32_t>(x); }
 inline int __float_as_int(float x) { return std::bit_cast<int>(x); }
 inline float __int2float_rn(int x) { return static_cast<float>(x); }
-// Of addends whose exponents are not too far apart the sum in double is exact; of others it lies on
-// the right side.
+// If the exponents of the addends are not too far apart, the sum in double is exact; otherwise it
+// is on the right side.
 inline float __fadd_rd(float a, float b) {
   const double sum = static_cast<double>(a) + static_cast<double>(b);
   const float near = static_cast<float>(sum);

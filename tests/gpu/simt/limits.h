@@ -1,4 +1,4 @@
-// What a grid may have, as CUDA's devices limit it.
+// The limits of a grid, like those of CUDA's devices.
 #pragma once
 
 #include <cstdint>
@@ -7,9 +7,9 @@
 
 namespace voxeld::simt {
 
-// If not, the next cudaGetLastError() says so.
+// Returns whether the grid is allowed. If not, the next cudaGetLastError() says so.
 bool IsAllowed(const Grid& grid);
-// VOXELD_SEED, or the same as ever.
+// Returns VOXELD_SEED, or a constant.
 uint64_t Seed();
 
 }  // namespace voxeld::simt

@@ -12,7 +12,7 @@
 #include "cuda_runtime_api.h"
 #include "tests/gpu/simt/limits.h"
 
-// Moments, counted: whatever was recorded in a stream before it was waited for has happened.
+// Counts moments: whatever was recorded in a stream before it was waited for has happened.
 static std::atomic<uint64_t> moments{0};
 struct CUstream_st {
   std::atomic<uint64_t> waited{0};
@@ -38,7 +38,7 @@ cudaError_t Told(cudaError_t error) {
   return error;
 }
 
-// What kernels were given of shared memory beyond what each may have.
+// The shared memory that kernels were given beyond the default limit.
 struct SharedLimits {
   std::mutex mutex;
   std::map<const void*, size_t> bytes;
@@ -183,7 +183,7 @@ cudaError_t cudaEventSynchronize(cudaEvent_t event) {
   event->waited = true;
   return cudaSuccess;
 }
-// On a GPU it may not have come to an event that nobody has waited for.
+// On a GPU, an event for which nothing has waited may not have happened yet.
 cudaError_t cudaEventElapsedTime(float* ms, cudaEvent_t from, cudaEvent_t to) {
   const bool waited = to->waited || (to->stream != nullptr && to->stream->waited > to->at);
   if (!waited) return Told(cudaErrorNotReady);

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Writes a CUDA source as the C++ that tests/gpu/simt/grid.h runs.
+"""Translates a CUDA source to the C++ that tests/gpu/simt/grid.h runs.
 
     translate.py SOURCE OUTPUT
 
-Launches and dynamic shared memory are what macros cannot write; all else kernel.h defines.
+It rewrites launches and dynamic shared memory, which macros cannot express; kernel.h defines everything else.
 """
 
 import re

@@ -27,7 +27,7 @@ inline uint4 make_uint4(uint32_t x, uint32_t y, uint32_t z, uint32_t w) { return
 
 struct dim3 {
   uint32_t x = 1, y = 1, z = 1;
-  // As CUDA has it: a number is one.
+  // As in CUDA, a number converts to it implicitly.
   // NOLINTNEXTLINE(google-explicit-constructor)
   constexpr dim3(uint32_t vx = 1, uint32_t vy = 1, uint32_t vz = 1) : x(vx), y(vy), z(vz) {}
 };

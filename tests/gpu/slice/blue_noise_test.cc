@@ -24,8 +24,8 @@ TEST(BlueNoise, HasEachRankOnce) {
   for (size_t i = 0; i < ranks.size(); ++i) ASSERT_EQ(ranks[i], i);
 }
 
-// Power of the picture of those pixels for which `lit` holds, by whole periods along x and y, over what the same number of
-// pixels at random would have: 1 is white.
+// The power of the picture of the pixels for which `lit` holds, by whole periods along x and y,
+// relative to the same number of random pixels: 1 is white noise.
 class Spectrum {
  public:
   template <typename Lit>
@@ -49,7 +49,8 @@ class Spectrum {
     }
   }
 
-  // The mean over all directions at from `low` to `high` periods, the highest power there by `most`.
+  // Returns the mean over all directions from `low` to `high` periods, and in `most` the highest
+  // power there.
   double Mean(double low, double high, double* most = nullptr) const {
     double sum = 0, greatest = 0;
     int64_t count = 0;
@@ -75,8 +76,8 @@ class Spectrum {
   std::vector<double> power_;
 };
 
-// Nothing coarse, and no direction that stands out: what one would see as worms. At any share of lit pixels, and where the
-// slice's number turns the ranks.
+// No low frequencies, and no dominant direction, which would be visible as worms; at any share of
+// lit pixels, and for every shift of the ranks by the slice's number.
 TEST(BlueNoise, HasNoLowFrequencies) {
   const std::array<uint16_t, kNoiseRanks>& ranks = BlueNoise();
   for (const uint32_t slice : {0u, 1u, 7u, 100u}) {
@@ -84,7 +85,7 @@ TEST(BlueNoise, HasNoLowFrequencies) {
       const Spectrum spectrum([&](size_t at) {
         return (ranks[at] + slice * kNoiseTurn) % kNoiseRanks >= kNoiseRanks - lit;
       });
-      // The mean distance of the rarer is so many periods.
+      // The period that corresponds to the mean distance of the rarer pixels.
       const double principal = std::sqrt(std::min(lit, kNoiseRanks - lit));
       double most = 0;
       const double low = spectrum.Mean(1, std::min(principal, double{kSide} / 2) / 3, &most);
@@ -96,7 +97,7 @@ TEST(BlueNoise, HasNoLowFrequencies) {
   }
 }
 
-// One bit: of a ramp of 256 levels the mean over 16³ pixels is within a level.
+// With one bit, the mean of a ramp of 256 levels over 16³ pixels is within a level.
 TEST(BlueNoise, RampOfOneBitIsWithinALevel) {
   const std::array<uint16_t, kNoiseRanks>& ranks = BlueNoise();
   double worst = 0, sum = 0;

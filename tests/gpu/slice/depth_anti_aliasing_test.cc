@@ -1,4 +1,4 @@
-// Depth anti-aliasing: between two slices, light stands where it belongs.
+// Tests depth anti-aliasing: between two slices, light is at its correct depth.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,7 +15,7 @@
 namespace voxeld::gpu {
 namespace {
 
-constexpr double kMostError = 0.1;  // of the distance of slices: what is promised
+constexpr double kMostError = 0.1;  // the promised error, relative to the distance of slices
 
 // The DepthCube's 20 planes, with fewer pixels.
 display::Geometry DepthCube() {
@@ -30,8 +30,9 @@ display::Geometry DepthCube() {
   return info->geometry;
 }
 
-// A plane tilted against the slices, a voxel thick: in each column the voxel that it crosses is white. Per pixel, the centre of
-// all slices' light is compared with where the plane is.
+// A plane tilted relative to the slices, one voxel thick: in each column, the voxel that it crosses
+// is white. For each pixel, the centre of the light of all slices is compared with the position of
+// the plane.
 TEST(DepthAntiAliasing, ATiltedPlaneStandsWhereItIs) {
   const display::Geometry geometry = DepthCube();
   const display::VoxelGrid& grid = geometry.grid;

@@ -1,5 +1,6 @@
-// Every display that is shipped: a solid of one colour is evenly bright, at as much light as can be had evenly, and each voxel
-// lights a pixel by itself. What is measured is printed: docs/results/fidelity.md has it.
+// For every display profile that is shipped, a solid of one colour is evenly bright, with as much
+// light as is possible evenly, and each voxel alone lights a pixel. The measurements are printed:
+// docs/results/fidelity.md lists them.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -13,7 +14,7 @@
 namespace voxeld::gpu {
 namespace {
 
-// The figures that are promised.
+// The promised bounds.
 constexpr double kVariationAtFourBits = 0.05, kVariationBelow = 0.1;
 constexpr double kLightKept = 0.9;
 

@@ -1,5 +1,5 @@
-// Columns as levels: against the definitions of sampling, tone, dither and packing, pixel by pixel, on every
-// instruction set of this processor.
+// Compares columns as levels with the definitions of sampling, tone, dither and packing, pixel by
+// pixel, on every instruction set of this processor.
 #include "gpu/slice/level_columns.h"
 
 #include <gtest/gtest.h>
@@ -60,7 +60,7 @@ TEST(LevelTables, AreTheLevelsOfEveryChannelUnderEveryThreshold) {
   }
 }
 
-// Runs `body` on each instruction set that is both compiled and here.
+// Runs `body` on each instruction set that is both compiled and supported.
 void OnEveryTarget(const std::function<void()>& body) {
   int ran = 0;
   for (int64_t left = hwy::SupportedTargets(); left != 0; left &= left - 1) {
@@ -126,7 +126,7 @@ struct Scene {
     for (uint32_t tile = 0; tile < grid.count(); ++tile) all.push_back(tile);
   }
 
-  // Fills a tile: one in `sparse` voxels is lit.
+  // Fills a tile so that one in `sparse` voxels is lit.
   void Fill(uint32_t tile, std::mt19937& random, uint32_t sparse) {
     std::vector<uint32_t> colors(kTileVoxels, 0);
     const Box3 box = grid.VoxelsOf(tile);
@@ -150,7 +150,7 @@ struct Scene {
   }
 };
 
-// `at`: x, y, z → interleaved colour.
+// `at` maps x, y, z to the interleaved colour.
 template <class At>
 uint8_t PixelOf(const At& at, const display::FootprintTable& table, const display::Tone& tone,
                 int32_t slice, int32_t u, int32_t v, uint32_t sub, uint32_t sub_frames) {
@@ -223,7 +223,7 @@ TEST(LevelColumns, DrawWhatTheFootprintsSay) {
                                 .format = display::PixelFormat::kRgb332},
                                tone, c.begin, end);
       ASSERT_TRUE(columns) << c.name;
-      // Dense, then thinned out, then a tile that changes, goes dark and comes back.
+      // Dense, then sparse, then a tile that changes, goes dark and is lit again.
       for (const uint32_t sparse : {1u, 9u}) {
         for (uint32_t tile : scene.all) scene.Fill(tile, random, sparse);
         columns->Update(scene.tiles, scene.all, *executor);
@@ -276,7 +276,7 @@ TEST(LevelColumns, AreForSharedListsOfOneRowAVoxelInRgb332Alone) {
   EXPECT_FALSE(create(fine, PixelFormat::kRgb332, Sampling::kMax)) << "two voxels a row";
 }
 
-// A whole engine whose pictures are drawn so: bytes, and the frames in which they changed.
+// A whole engine whose pictures are drawn in this way: bytes, and the frames in which they changed.
 class RotorEngine {
  public:
   explicit RotorEngine(const Target& target)
@@ -298,7 +298,7 @@ class RotorEngine {
                    [](const absl::Status& status) { ASSERT_TRUE(status.ok()) << status; });
   }
 
-  // Draws a frame and looks at all of it.
+  // Draws a frame and checks all of it.
   void ExpectFrame() {
     const std::vector<std::byte> before = bytes_;
     const std::vector<uint64_t> changed_before = changed_in_;
@@ -361,7 +361,7 @@ TEST(LevelColumns, AWholeEngineShowsThemAndTellsWhatChanged) {
                                    target.layout, target.tone, 0, target.layout.slices))
       << "else it is not these that are looked at";
   RotorEngine engine(target);
-  engine.ExpectFrame();  // nothing there
+  engine.ExpectFrame();  // nothing is drawn
   const auto put = [&](uint64_t geometry, uint64_t drawable, int lines) {
     std::vector<float> positions;
     for (int i = 0; i < lines * 2; ++i) {
@@ -384,7 +384,7 @@ TEST(LevelColumns, AWholeEngineShowsThemAndTellsWhatChanged) {
   put(2, 2, 60);
   engine.ExpectFrame();
   engine.ExpectFrame();  // as before
-  put(3, 1, 2);          // in place of the first
+  put(3, 1, 2);          // replaces the first
   engine.ExpectFrame();
   engine.Apply([](DeltaWriter& w) { w.Drop(Op::kDropDrawable, 2); });
   engine.ExpectFrame();

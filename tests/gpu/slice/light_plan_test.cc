@@ -24,7 +24,7 @@ class LightPlannerTest : public testing::Test {
     tone_.density = display::Density::kEven;
     layout_ = {.slices = 60, .width = 24, .height = 8};
   }
-  // What the planner says, which must be what a plan made afresh is.
+  // Returns the planner's plan, which must equal a newly made one.
   LightPlan Plan() {
     const display::FootprintTable table = display::BuildFootprints(geometry_, tone_.sampling);
     const std::shared_ptr<const LightPlan> plan = planner_.Of(table, geometry_, layout_, tone_);
@@ -57,7 +57,8 @@ TEST_F(LightPlannerTest, PlansAreThoseOfTheirTargets) {
   EXPECT_FALSE(Plan().noise.empty());
 }
 
-// However far a display is dimmed, its rows keep their shares: crowded ones do not stand out again.
+// However far a display is dimmed, its rows keep their proportions: crowded ones do not become
+// brighter again.
 TEST_F(LightPlannerTest, DimmedIsAsEven) {
   layout_.format = display::PixelFormat::kRgb332;
   const LightPlan full = Plan();

@@ -28,7 +28,7 @@ using display::FootprintEntry;
 using display::PixelFormat;
 using display::Sampling;
 
-// How a sampled pixel becomes bytes.
+// How a sampled pixel is converted to bytes.
 struct Finish {
   PixelFormat format;
   Dither dither;
@@ -56,7 +56,8 @@ std::string NameOf(const Finish& finish) {
 
 constexpr uint32_t kPeriod = 8;  // of thresholds across pixels
 
-// Is a bit of some sub-frame's picture set, of pixel (u, v) with the colour `rgb`?
+// Returns whether a bit of the picture of some sub-frame is set, for pixel (u, v) with the colour
+// `rgb`.
 bool Lights(const Finish& finish, uint32_t rgb, uint32_t u, uint32_t v) {
   const auto light = [&](uint32_t c) {
     return static_cast<uint32_t>(std::lround(65535 * std::pow(c / 255.0, finish.gamma)));
@@ -75,8 +76,8 @@ bool Lights(const Finish& finish, uint32_t rgb, uint32_t u, uint32_t v) {
   return std::any_of(picture.begin(), picture.end(), [](uint8_t byte) { return byte != 0; });
 }
 
-// Of a white voxel, bit n for the nth finish, by its weight in the pixel's footprint and the
-// pixel's place in the period.
+// For a white voxel: bit n is for the nth finish, by the voxel's weight in the pixel's footprint
+// and the pixel's place in the period.
 class LitBy {
  public:
   explicit LitBy(Sampling sampling) {
@@ -101,7 +102,8 @@ class LitBy {
   std::array<std::array<uint32_t, kPeriod * kPeriod>, 256> masks_{};
 };
 
-// Of every voxel (x fastest) the finishes under which some pixel lights up, if it alone is lit.
+// Returns, for every voxel (x fastest), the finishes with which some pixel is lit if only that
+// voxel is lit.
 std::vector<uint32_t> LitVoxels(const display::FootprintTable& table, const LitBy& lit_by,
                                 const display::VoxelGrid& grid) {
   const size_t nx = static_cast<size_t>(grid.nx), ny = static_cast<size_t>(grid.ny);

@@ -31,13 +31,13 @@ struct Window {
   bool has(int64_t i) const { return i >= begin && i < end; }
 };
 
-// In the middle of so many.
+// Returns the middle part, at most `most` of `count`.
 Window MiddleOf(int32_t count, int32_t most) {
   const int32_t wide = std::min(count, most), begin = (count - wide) / 2 / kCube * kCube;
   return {begin, begin + wide};
 }
 
-// Which pixels are looked at, and which voxels these alone light.
+// The pixels that are examined, and the voxels that light only these.
 struct Part {
   Window u, v;
   Window x, y, z;
@@ -66,7 +66,8 @@ Part PartOf(const Geometry& geometry) {
   return part;
 }
 
-// Calls `put` with places at which a pixel's light is, evenly in time, and those at its corners.
+// Calls `put` with the places of a pixel's light, evenly spaced in time, and with those at its
+// corners.
 using Put = std::function<void(const Vec3&)>;
 
 class Places {
@@ -89,7 +90,8 @@ class Places {
   }
 
  private:
-  // Odd, so that the way's end at the rim is cut into pieces shorter than two thirds of a pixel.
+  // Odd, so that the way's end at the rim is divided into pieces shorter than two thirds of a
+  // pixel.
   static int32_t StepsOf(int32_t width, int32_t slices) {
     return static_cast<int32_t>(std::ceil(3.1416 * width / slices / 0.66)) / 2 * 2 + 1;
   }
@@ -145,10 +147,10 @@ class Places {
 
   const Geometry& geometry_;
   Geometry fine_;
-  int32_t steps_ = 1, columns_ = 1;  // into which a pixel's way, and its width, are cut
+  int32_t steps_ = 1, columns_ = 1;  // pieces of a pixel's way, and of its width
 };
 
-// Where in the solid that all pixels sweep a place is.
+// Where a place is in the solid that all pixels sweep.
 class Reach {
  public:
   explicit Reach(const Geometry& geometry) {
@@ -177,7 +179,8 @@ bool Turns(const Geometry& geometry) {
          std::holds_alternative<Helix>(geometry.shape);
 }
 
-// White in every pixel: its light over all sub-frames, in shares of full (the mean of the channels); 0 where no voxel is.
+// The light of a white pixel over all sub-frames, relative to full light (the mean of the
+// channels); 0 outside every voxel.
 class White {
  public:
   explicit White(const DisplayUnderTest& display)

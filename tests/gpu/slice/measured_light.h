@@ -1,5 +1,5 @@
-// How evenly a display lights a solid of one colour, as measured in space: where the light of its pixels is in truth, by
-// positions in closed form, not by footprints.
+// Measures in space how evenly a display lights a solid of one colour: the true places of the light
+// of its pixels are computed in closed form, not from footprints.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,8 @@
 
 namespace voxeld::gpu {
 
-// Of cubes of 4 pitches wholly within reach and beyond 2 pitches from a turning display's axis, in one volume.
+// For cubes of 4 pitches that are completely within reach and more than 2 pitches from the axis of
+// a rotating display, in one volume.
 struct MeasuredLight {
   int64_t cubes = 0;
   double mean = 0, least = 0, most = 0;  // light of a cube, in pixels at full light
@@ -22,12 +23,12 @@ struct DisplayUnderTest {
   display::Tone tone;
 };
 
-// A solid of white that fills the display. Where rows and columns of pixels are alike, 64 of them (the period of dither) are
-// looked at.
+// Measures a white solid that fills the display. If rows and columns of pixels are alike, 64 of
+// them (the period of dither) are examined.
 MeasuredLight MeasureLight(const DisplayUnderTest& display);
 
-// Voxels within reach that, lit alone in white, light no pixel in any sub-frame; and how many are within reach. Of the same
-// rows of pixels.
+// Voxels within reach that, lit alone in white, light no pixel in any sub-frame; and the number of
+// voxels within reach. For the same rows of pixels.
 struct DarkVoxels {
   int64_t dark = 0, reachable = 0;
 };

@@ -1,5 +1,6 @@
-// Pictures packed as the volume is drawn: a whole engine, pixel by pixel against the definitions of tone, dither and
-// packing over the voxels that it says there are, and when each picture changed.
+// Tests pictures that are packed while the volume is drawn: a whole engine is compared, pixel by
+// pixel, with the definitions of tone, dither and packing for the voxels that it reports; and when
+// each picture changed.
 #include "gpu/slice/plane_packer.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +20,7 @@
 namespace voxeld::gpu {
 namespace {
 
-constexpr int32_t kWidth = 37, kHeight = 45, kSlices = 20;  // in all three the last tile is cut
+constexpr int32_t kWidth = 37, kHeight = 45, kSlices = 20;  // the last tile is incomplete in each
 
 Target StackTarget(int32_t sub_frames, display::Dither dither) {
   display::PlanarStack stack;
@@ -67,7 +68,7 @@ class StackEngine {
                    [](const absl::Status& status) { ASSERT_TRUE(status.ok()) << status; });
   }
 
-  // Lines as drawable `id`.
+  // Inserts lines as drawable `id`.
   void PutLines(uint64_t id, uint32_t seed, int lines) {
     std::mt19937 random(seed);
     std::vector<float> positions;
@@ -89,7 +90,7 @@ class StackEngine {
     });
   }
 
-  // A box as drawable `id`, from the corner of the volume on.
+  // Inserts a box as drawable `id`, from the corner of the volume on.
   void PutBox(uint64_t id, uint32_t rgb, std::array<float, 3> size) {
     Apply([&](DeltaWriter& w) {
       GeometryRecord g;
@@ -114,7 +115,7 @@ class StackEngine {
     return voxels;
   }
 
-  // The pictures of a stack whose pixels are voxels.
+  // Returns the pictures of a stack whose pixels are voxels.
   std::vector<std::byte> Expected(const std::vector<uint32_t>& voxels) const {
     const display::FrameLayout& layout = target_.layout;
     std::vector<std::byte> out(layout.bytes());
@@ -137,7 +138,7 @@ class StackEngine {
     return out;
   }
 
-  // Draws a frame and looks at all of it. Returns how many pictures changed.
+  // Draws a frame and checks all of it. Returns how many pictures changed.
   int ExpectFrame() {
     const std::vector<std::byte> before = bytes_;
     const std::vector<uint64_t> changed_before = changed_in_;
@@ -176,7 +177,7 @@ TEST(PlanePacker, ShowsTheVolumeAndTellsWhatChanged) {
        {std::pair(1, display::Dither::kOrdered), std::pair(3, display::Dither::kOrdered),
         std::pair(1, display::Dither::kNone)}) {
     StackEngine engine(StackTarget(sub_frames, dither));
-    engine.ExpectFrame();  // nothing there
+    engine.ExpectFrame();  // nothing is drawn
     engine.PutLines(1, 1, 3);
     EXPECT_GT(engine.ExpectFrame(), 0);
     engine.PutLines(2, 2, 300);
@@ -184,7 +185,7 @@ TEST(PlanePacker, ShowsTheVolumeAndTellsWhatChanged) {
     EXPECT_EQ(engine.ExpectFrame(), 0);
     engine.PutLines(2, 3, 200);
     engine.ExpectFrame();
-    engine.PutLines(3, 3, 200);  // over those that are there
+    engine.PutLines(3, 3, 200);  // over the existing ones
     EXPECT_EQ(engine.ExpectFrame(), 0);
     engine.Apply([](DeltaWriter& w) { w.Drop(Op::kDropDrawable, 2); });
     EXPECT_EQ(engine.ExpectFrame(), 0) << "the same lines are still there";
@@ -246,7 +247,7 @@ TEST(PlanePacker, ANewPlanKeepsThePicturesThatComeOutAlike) {
   engine.SetTarget(target);
   EXPECT_GT(engine.ExpectFrame(), 0);
   engine.Apply([](DeltaWriter& w) { w.Drop(Op::kDropDrawable, 1); });
-  engine.SetTarget(target);  // nothing is drawn under this plan
+  engine.SetTarget(target);  // nothing is drawn with this plan
   EXPECT_GT(engine.ExpectFrame(), 0) << "dark again";
 }
 

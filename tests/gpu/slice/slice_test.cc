@@ -48,7 +48,7 @@ TEST(Quantize, FullIsFullAndDarkIsDarkUnderEveryThreshold) {
   }
 }
 
-// Without dither, to the nearest: of two levels the step is at 32768; of 256, at half of 257.
+// Without dither, to the nearest: with two levels the step is at 32768; with 256, at half of 257.
 TEST(Quantize, WithoutDitherRoundsToTheNearest) {
   const uint32_t t = Threshold(display::Dither::kNone, 5, 6, 1, 2);
   EXPECT_EQ(t, 32767u);
@@ -58,7 +58,7 @@ TEST(Quantize, WithoutDitherRoundsToTheNearest) {
   EXPECT_EQ(Quantize(129, 256, t), 1u);
 }
 
-// B = 0: 65535/128 = 511; one sub-frame of two on: B = 32: 65·65535/128 = 33279.
+// B = 0: 65535/128 = 511; one sub-frame of two later: B = 32: 65·65535/128 = 33279.
 TEST(Quantize, ThresholdsAreAsCountedByHand) {
   EXPECT_EQ(Threshold(display::Dither::kOrdered, 0, 0, 0, 2), 511u);
   EXPECT_EQ(Threshold(display::Dither::kOrdered, 0, 0, 1, 2), 33279u);
@@ -149,7 +149,8 @@ TEST(Finish, DimsLightByTheRowsFactor) {
   EXPECT_EQ(finish.LightAt(0xFFFFFF, 1).b, 0u);
 }
 
-// Eight parts of each sub-frame run through evenly spread thresholds: of light n/16 the bits of two sub-frames are n.
+// Eight parts of each sub-frame go through evenly spread thresholds: for light n/16, n bits of two
+// sub-frames are set.
 TEST(Finish, PartsOfPlanes24AreDitheredOverTime) {
   std::vector<uint16_t> curves(768);
   Finish finish;
@@ -170,7 +171,7 @@ TEST(Finish, PartsOfPlanes24AreDitheredOverTime) {
   }
 }
 
-// The factor that promises light: a step below it there is a pixel that stays dark.
+// The factor that guarantees light: a step below it, some pixel stays dark.
 TEST(LeastFactor, LightsEveryPixelAndNoLessDoes) {
   const std::array<uint16_t, kNoiseRanks>& noise = BlueNoise();
   for (const display::PixelFormat format :
@@ -220,8 +221,8 @@ TEST(Weight, RoundsAsTheDefinitionSays) {
   EXPECT_EQ(RaiseWeighted(0x10FF00, 128, 0xFF0002), 0x80FF01u);
 }
 
-// One slice, two pixels wide, two high. Pixel (0, ·) sees x = 1 and 17 (in the next tile),
-// pixel (1, ·) nothing lit; rows see z = 0 alone, and z = 0 and 1.
+// One slice, two pixels wide, two high. Pixel (0, ·) sees x = 1 and 17 (in the next tile), pixel
+// (1, ·) nothing lit; rows see z = 0 alone, and z = 0 and 1.
 display::FootprintTable HandTable() {
   display::FootprintTable table;
   table.slices = 1;
@@ -248,7 +249,7 @@ TileStore HandTiles(uint32_t at_1, uint32_t at_17, uint32_t at_17_above) {
   return tiles;
 }
 
-// The colours of all pixels, row by row.
+// Returns the colours of all pixels, row by row.
 std::vector<uint32_t> Sampled(const TileStore& tiles, display::Sampling sampling) {
   const display::FootprintTable table = HandTable();
   absl::StatusOr<Sampler> sampler = Sampler::Create(table, tiles.grid(), sampling);
@@ -268,7 +269,7 @@ std::vector<uint32_t> Sampled(const TileStore& tiles, display::Sampling sampling
 TEST(Sampler, MaxTakesTheGreatestWordOfTheFootprint) {
   const std::vector<uint32_t> pixels =
       Sampled(HandTiles(0xFF0000, 0x00FF00, 0x808080), display::Sampling::kMax);
-  // Grey's word is greater than green's: the highest bits are equal, then red's decides.
+  // Grey's word is greater than green's: the highest bits are equal, then the bit of red decides.
   EXPECT_EQ(pixels, (std::vector<uint32_t>{0x00FF00, 0, 0x808080, 0}));
   const std::vector<uint32_t> other =
       Sampled(HandTiles(0xFF0000, 0x000001, 0x808080), display::Sampling::kMax);
@@ -283,7 +284,8 @@ TEST(Sampler, WeightedTakesTheGreatestOfEachChannel) {
   EXPECT_EQ(pixels, (std::vector<uint32_t>{0xFF8000, 0, 0xFF8010, 0}));
 }
 
-// Rows of lights, one voxel each: neighbours in memory along x, with gaps, back to front, up to a tile's end.
+// Rows of lights, one voxel each: adjacent in memory along x, with gaps, backwards, up to a tile's
+// end.
 TEST(Sampler, RowsOfLightsTakeTheirOwnVoxels) {
   std::mt19937 random(7);
   TileStore tiles;
@@ -317,7 +319,7 @@ TEST(Sampler, RowsOfLightsTakeTheirOwnVoxels) {
   const auto voxel = [](int32_t slice, int32_t u) -> std::optional<std::array<int32_t, 3>> {
     if (slice == 1 && u % 7 == 3) return std::nullopt;          // gaps
     if (slice == 2) return std::array{39 - u, 3, 4};            // against the order of memory
-    if (slice == 3) return std::array{(u * 3) % 40, u % 6, 1};  // not neighbours
+    if (slice == 3) return std::array{(u * 3) % 40, u % 6, 1};  // not adjacent
     return std::array{u, 5, slice};
   };
   for (int32_t slice = 0; slice < table.slices; ++slice) {

@@ -1,4 +1,4 @@
-// What crosses the boundary: segments and targets.
+// Tests the data that crosses the boundary between processes: segments and targets.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/mman.h>
@@ -90,14 +90,15 @@ TEST(TargetCodec, RefusesALatticeOfMoreLightsThanBytes) {
     EXPECT_FALSE(DecodeTarget(bytes).ok()) << hostile;
   }
   auto bytes = good;
-  bytes[kCount + sizeof(count)] = std::byte{2};  // neither a light nor none
+  bytes[kCount + sizeof(count)] = std::byte{2};  // neither a light nor the lack of one
   EXPECT_FALSE(DecodeTarget(bytes).ok());
   bytes = good;
   bytes[0] = std::byte{3};  // the kind of shape
   EXPECT_FALSE(DecodeTarget(bytes).ok());
 }
 
-// Of every kind of shape, with a table of displacements and one homography for each panel.
+// Returns targets with every kind of shape, with a table of displacements and one homography for
+// each panel.
 std::vector<Target> TargetsOfAllShapes() {
   std::vector<Target> targets(4);
   display::PlanarStack stack{.width_px = 3, .height_px = 5, .mirror_v = true};
@@ -129,7 +130,8 @@ TEST(TargetCodec, EveryCutAndEveryByteMoreIsRefused) {
   }
 }
 
-// Whatever stands in a byte: what is taken is what comes out again, and yes and no are 1 and 0.
+// For any value of a byte: what is accepted is encoded again to the same bytes, and booleans are 1
+// and 0.
 TEST(TargetCodec, WhatIsTakenHasNoOtherMeaning) {
   for (const Target& target : TargetsOfAllShapes()) {
     const auto good = EncodeTarget(target);
@@ -144,7 +146,7 @@ TEST(TargetCodec, WhatIsTakenHasNoOtherMeaning) {
       }
     }
   }
-  // The last byte of a stack's own is mirror_v; the grid follows.
+  // The last byte of a stack's own fields is mirror_v; the grid follows.
   auto bytes = EncodeTarget(TargetsOfAllShapes()[0]);
   constexpr size_t kMirrorV = 8 + 1 + 2 * 4 + 2 * 8 + 8 + 2 * 8 + 4 + 8 + 1;
   ASSERT_EQ(bytes[kMirrorV], std::byte{1});

@@ -1,4 +1,4 @@
-// A conversation of which the test plays the other end.
+// Tests a conversation in which the test is the peer.
 #include "gpu/worker/call_channel.h"
 
 #include <fcntl.h>
@@ -103,7 +103,7 @@ TEST_F(CallChannelTest, WhatTheWorkerSaidLastComesBeforeItsEnd) {
   const absl::Status end = lost.get().status();
   EXPECT_EQ(end,
             absl::DataLossError("the worker was lost: the other process is gone: Broken pipe"));
-  worked.get_future().get();  // what was to be done behind it is done all the same
+  worked.get_future().get();  // the work queued behind it is done all the same
   EXPECT_EQ(lost_.get_future().get(), end);
   EXPECT_TRUE(process_->lost());
 }

@@ -1,4 +1,4 @@
-// What a faulty worker is told (faults.h, liar.h), for as long as this lives.
+// Sets the environment of a faulty worker (faults.h, liar.h) as long as this lives.
 #pragma once
 
 #include <cstdlib>

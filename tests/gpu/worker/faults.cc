@@ -14,7 +14,7 @@
 namespace voxeld::gpu {
 namespace {
 
-// Follows which geometries of a colour there are.
+// Keeps track of the geometries that have a colour.
 class ColorWatch final : public DeltaVisitor {
  public:
   explicit ColorWatch(uint32_t color) : color_(color) {}
@@ -91,7 +91,7 @@ class FaultyEngine final : public Engine {
   }
   void Apply(StagingBlock block, size_t size, Done done) override {
     std::optional<ColorWatch> next = watch_;
-    // What is malformed is for the engine to refuse.
+    // The engine itself refuses malformed deltas.
     if (next && size <= block.bytes().size()) {
       BlockSource referred(block.referred());
       (void)ReadDelta(block.bytes().first(size), *next,
@@ -116,7 +116,7 @@ class FaultyEngine final : public Engine {
   RankLink* link() override { return link_ != nullptr ? link_.get() : engine_->link(); }
 
  private:
-  // Whether the file was there, for this engine.
+  // Returns whether the file existed, for this engine.
   bool TakeFile(std::string& kind) const {
     if (trigger_.file.empty()) return false;
     std::ifstream in(trigger_.file);

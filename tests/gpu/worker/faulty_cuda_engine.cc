@@ -1,6 +1,6 @@
-// voxeld-engine with the real CUDA engine, whose GPU really faults when faults.h says so: what CUDA
-// then reports goes the way of any error of the device. VOXELD_FAULT_KIND: illegal (the default), or
-// as faulty_engine's.
+// voxeld-engine with the real CUDA engine, whose GPU really faults when faults.h says so: the error
+// that CUDA then reports is handled like any error of the device. VOXELD_FAULT_KIND: illegal (the
+// default), or one of faulty_engine's.
 #include <string>
 #include <utility>
 

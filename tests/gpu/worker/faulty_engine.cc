@@ -1,6 +1,6 @@
-// A stand-in for voxeld-engine that fails when faults.h says so, without a GPU: asked for CUDA, it
-// is the CPU engine by another name. VOXELD_FAULT_KIND: crash (the default), exit, hang, dataloss, exhausted. And one that lies when
-// liar.h says so.
+// A stand-in for voxeld-engine that fails when faults.h says so, without a GPU: when CUDA is
+// requested, it is the CPU engine under another name. VOXELD_FAULT_KIND: crash (the default), exit,
+// hang, dataloss, exhausted. It also lies when liar.h says so.
 #include <cstdlib>
 #include <string>
 #include <utility>

@@ -1,4 +1,4 @@
-// The stand-in for voxeld-engine fails when it is told to, and only then.
+// The stand-in for voxeld-engine fails on request, and only then.
 #include <gmock/gmock.h>
 
 #include <string>
@@ -93,7 +93,7 @@ TEST_F(FaultyEngineProgram, DrawsOnOnceTheColourHasGone) {
   reset.Reset();
   ASSERT_TRUE(engine.Apply(reset).ok());
   ASSERT_TRUE(engine.Frame().ok());
-  // What was refused is not in the scene.
+  // A refused geometry is not in the scene.
   conformance::DeltaBuffer refused = Poison();
   refused.Drop(Op::kDropDrawable, 77);
   EXPECT_EQ(engine.Apply(refused).code(), absl::StatusCode::kInvalidArgument);

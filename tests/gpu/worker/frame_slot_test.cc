@@ -1,4 +1,4 @@
-// Frames on their way from a worker: what is copied, and that damage shows.
+// Tests frames that a worker passes: what is copied, and that damage is detected.
 #include "gpu/worker/frame_slot.h"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,8 @@ void Fill(FrameBuffer buffer, uint64_t newest, uint32_t seed) {
 
 class FrameSlotOf : public ::testing::TestWithParam<display::FrameLayout> {};
 
-// Small pictures of odd sizes, and so much that it is copied past the caches, by several threads.
+// Small pictures of odd sizes, and pictures so large that they are copied past the caches, by
+// several threads.
 INSTANTIATE_TEST_SUITE_P(
     Layouts, FrameSlotOf,
     ::testing::Values(display::FrameLayout{.slices = 30, .width = 7, .height = 5, .sub_frames = 3},

@@ -1,5 +1,5 @@
-// A worker that the test plays by hand, behind a socket in a program's place: it hears what its owner sends, and says what it is told
-// to, on the test's own thread.
+// A worker that the test plays by hand, behind a socket in place of a program: it receives what its
+// owner sends, and sends what the test specifies, in the test's own thread.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -45,7 +45,7 @@ class HandPlayedWorker {
 
   std::string program() const { return "unix:" + path(); }
 
-  // The connection of the engine that has been made, in place of the one before.
+  // Takes the connection of the engine that has been made, in place of the previous one.
   void Take() {
     HangUp();
     control_ = accept4(listening_, nullptr, nullptr, SOCK_CLOEXEC);
@@ -57,7 +57,7 @@ class HandPlayedWorker {
     setsockopt(connection_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
   }
 
-  // What comes next but for segments, which are kept.
+  // Returns the next message; segments are kept and skipped.
   Message Hear() {
     for (;;) {
       absl::StatusOr<Message> message = ReceiveMessage(connection_);

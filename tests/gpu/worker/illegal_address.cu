@@ -15,7 +15,7 @@ void WriteToAnIllegalAddress() {
   cudaStream_t stream = nullptr;
   if (cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking) != cudaSuccess) return;
   Write<<<1, 1, 0, stream>>>(16);
-  cudaStreamSynchronize(stream);  // its error stays, for whoever calls next
+  cudaStreamSynchronize(stream);  // its error stays, for the next caller
 }
 
 }  // namespace voxeld::gpu

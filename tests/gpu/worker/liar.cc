@@ -29,7 +29,7 @@ void Tell(Message& answer, const std::string& lie) {
   if (lie == "done") answer = MakeDone(answer.call, absl::OkStatus());
 }
 
-// Passes one message on; false at the end of either.
+// Forwards one message; returns false when either side ends.
 template <typename Change>
 bool PassOn(int from, int to, Change change) {
   absl::StatusOr<Message> message = ReceiveMessage(from);

@@ -1,4 +1,4 @@
-// What passes between an owner and its worker, and what else may come over their sockets.
+// Tests the messages between an owner and its worker, and what else may arrive over their sockets.
 #include "gpu/worker/message.h"
 
 #include <fcntl.h>
@@ -23,7 +23,7 @@
 namespace voxeld::gpu {
 namespace {
 
-// As it has been since kWorkerProtocol 1: type, nothing, call.
+// Unchanged since kWorkerProtocol 1: type, zero, call.
 constexpr size_t kHeaderBytes = 16;
 constexpr size_t kMostBody = 4096;
 
@@ -37,7 +37,7 @@ class MessageTest : public ::testing::Test {
     for (const int end : ends_) close(end);
   }
 
-  // As bytes, with descriptors.
+  // Sends bytes, with descriptors.
   void SendBytes(const std::string& bytes, const std::vector<int>& descriptors) {
     iovec part{const_cast<char*>(bytes.data()), bytes.size()};
     msghdr out = {};
@@ -110,7 +110,7 @@ TEST_F(MessageTest, BytesAreHeaderThenBody) {
 TEST_F(MessageTest, ADescriptorMayHaveAnyNumber) {
   const int standard_input = fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3);
   ASSERT_GE(standard_input, 0);
-  close(STDIN_FILENO);  // the next to be given is 0
+  close(STDIN_FILENO);  // the next one to be opened is 0
   SendBytes(Header(MessageType::kSegment, 1), {ends_[0]});
   const absl::StatusOr<Message> got = ReceiveMessage(ends_[1]);
   EXPECT_TRUE(got.ok() && got->fd == STDIN_FILENO);
@@ -159,7 +159,7 @@ TEST_F(MessageTest, HasABodyOfUpToTheMost) {
   }
 }
 
-// What else a socket may tell beside its bytes: who sent them.
+// A socket may report other things beside its bytes: their sender.
 TEST_F(MessageTest, OtherThingsToldBesideAreNoDescriptor) {
   const int yes = 1;
   ASSERT_EQ(setsockopt(ends_[1], SOL_SOCKET, SO_PASSCRED, &yes, sizeof(yes)), 0);
@@ -185,7 +185,7 @@ TEST_F(MessageTest, TheEndIsToldAtBothEnds) {
   EXPECT_TRUE(absl::IsUnavailable(ReceiveMessage(ends_[0]).status()));
 }
 
-// Sleeps in a system call until a signal comes, whose handler has run then, and sleeps again: twice.
+// Sleeps in a system call until a signal arrives and its handler has run, and sleeps again: twice.
 class Interrupted {
  public:
   explicit Interrupted(std::function<void()> calls) {
@@ -212,7 +212,7 @@ class Interrupted {
   Interrupted& operator=(const Interrupted&) = delete;
 
  private:
-  // Until the thread sleeps in a call, or has ended, which it should not have done yet.
+  // Waits until the thread sleeps in a call, or has ended, which it should not have done yet.
   void AwaitSleep() {
     while (id_ == 0) std::this_thread::yield();
     for (char state = 'R'; state == 'R';) {

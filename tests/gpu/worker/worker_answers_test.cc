@@ -1,4 +1,5 @@
-// What an owner makes of each answer of its worker, and what it does without what it wants of the system.
+// Tests how an owner handles each answer of its worker, and the failures of system calls that it
+// needs.
 #include <dirent.h>
 #include <gmock/gmock.h>
 
@@ -21,8 +22,9 @@ namespace {
 using ::testing::Each;
 using ::testing::HasSubstr;
 
-// A copy that shares nothing with a status of another thread. Abseil's own code counts who shares it and is not instrumented, so
-// ThreadSanitizer does not see that the last one frees it after the others have read it.
+// Returns a copy that shares nothing with a status of another thread. Abseil's own code counts the
+// owners and is not instrumented, so ThreadSanitizer does not see that the last one frees it after
+// the others have read it.
 absl::Status Unshared(const absl::Status& status) {
   return absl::Status(status.code(), status.message());
 }
@@ -32,7 +34,7 @@ absl::StatusOr<V> Unshared(absl::StatusOr<V> value) {
   return Unshared(value.status());
 }
 
-// What a call comes to.
+// Collects the result of a call.
 template <typename T>
 class Told {
  public:
@@ -60,7 +62,7 @@ class WorkerAnswers : public ::testing::Test {
     target_.layout = {.slices = 4, .width = 4, .height = 4};
   }
 
-  // Makes an engine, and hears what it opens.
+  // Makes an engine, and receives the message that opens it.
   Message Open() {
     engine_.reset();
     auto engine =
@@ -71,7 +73,7 @@ class WorkerAnswers : public ::testing::Test {
     worker_.Take();
     return worker_.Hear();
   }
-  // The same with an engine that is there, and has the target.
+  // The same with an engine that exists, and has the target.
   void Ready() {
     const Message open = Open();
     worker_.Say(MakeMessage(MessageType::kReady, open.call, ReadyMessage{}));
@@ -86,7 +88,8 @@ class WorkerAnswers : public ::testing::Test {
   }
   void Submit(uint64_t frame, ToldFrame& told) { Submit(frame, told, {bytes_, numbers_}); }
 
-  // What the worker is asked for; it has drawn all of the frame, each byte `value`.
+  // Returns the answer to a request for a frame, of which the worker has drawn every byte as
+  // `value`.
   FrameMessage Draw(std::byte value, const Message& asked) {
     EXPECT_EQ(asked.type, MessageType::kFrame);
     const auto sent = *asked.As<FrameMessage>();
@@ -102,7 +105,8 @@ class WorkerAnswers : public ::testing::Test {
   }
   FrameMessage Draw(std::byte value) { return Draw(value, worker_.Hear()); }
 
-  // All is over: the owner was told, and every later call has the same end.
+  // Checks that the engine is lost: the owner was notified, and every later call has the same
+  // error.
   void ExpectGone(const std::string& why) {
     EXPECT_THAT(lost_.get_future().get().message(), HasSubstr(why));
     ToldStatus later;
@@ -158,7 +162,7 @@ TEST_F(WorkerAnswers, AnEngineIsNotThereUnlessItSaysSo) {
   }
 }
 
-// ---- answers that are a status
+// ---- answers with a status
 
 TEST_F(WorkerAnswers, OfAnotherTypeAreTheEnd) {
   std::vector<uint32_t> voxels(64);
@@ -334,7 +338,7 @@ TEST_F(WorkerAnswers, AFrameBeforeThereIsATargetIsNotBelieved) {
   EXPECT_EQ(told.get().status(), absl::DataLossError("the worker's answer to a frame is none"));
 }
 
-// ---- what is not asked at all
+// ---- calls that are not sent
 
 TEST_F(WorkerAnswers, ADeltaThatIsLongerThanItsBlockIsNotSent) {
   Ready();
@@ -467,7 +471,7 @@ TEST_F(WorkerAnswers, WhatTheWorkerCouldNotReadIsNotSent) {
   EXPECT_TRUE(next.get().ok());
 }
 
-// ---- a system that has nothing left
+// ---- a system without resources
 
 int OpenDescriptors() {
   int count = 0;

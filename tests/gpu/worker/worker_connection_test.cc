@@ -1,4 +1,5 @@
-// What an owner that is broken may send: the worker answers, or ends, and reads nothing that is not there.
+// Tests messages of a broken owner: the worker answers, or exits, and reads nothing that does not
+// exist.
 #include "gpu/worker/worker_connection.h"
 
 #include <fcntl.h>
@@ -41,13 +42,13 @@ class WorkerConnectionTest : public ::testing::Test {
   }
 
   absl::Status Handle(Message message) { return connection_->Handle(message); }
-  // The status in the answer that came last.
+  // Returns the status in the last answer.
   absl::Status Answered() {
     const absl::StatusOr<Message> answer = ReceiveMessage(ends_[0]);
     if (!answer.ok()) return absl::InternalError("no answer");
     return answer->type == MessageType::kDone ? StatusOf(*answer) : absl::OkStatus();
   }
-  // Of a message with a descriptor.
+  // For a message with a descriptor.
   void ExpectRefusedAndClosed(Message message) {
     message.fd = dup(ends_[0]);
     const int descriptor = message.fd;
@@ -68,7 +69,7 @@ class WorkerConnectionTest : public ::testing::Test {
     message.fd = dup(segment_->fd());
     ASSERT_TRUE(Handle(std::move(message)).ok());
   }
-  // A display of 4x4 pixels in 4 slices.
+  // Sets a display of 4x4 pixels in 4 slices.
   absl::Status SetTarget() {
     Target target;
     display::PlanarStack stack{.width_px = 4, .height_px = 4};
@@ -104,7 +105,7 @@ TEST_F(WorkerConnectionTest, AnEngineThatIsOpenedAnewHasNoTarget) {
   TellSegment();
   ASSERT_TRUE(SetTarget().ok());
   EXPECT_TRUE(Frame(1).ok());
-  // Slices that the display which was has not.
+  // Slices that the previous display does not have.
   Open(EngineKind::kCpu, {.begin = 40, .end = 80});
   EXPECT_TRUE(Answered().ok());
   EXPECT_EQ(Frame(2).code(), absl::StatusCode::kFailedPrecondition);
@@ -120,7 +121,7 @@ TEST_F(WorkerConnectionTest, AnEngineThatCannotBeOpenedLeavesTheOneThatIs) {
   EXPECT_TRUE(Frame(1).ok());
 }
 
-// What is pinned is unpinned while it is mapped, also if another takes its name.
+// A pinned segment is unpinned while it is mapped, also if another takes its name.
 TEST_F(WorkerConnectionTest, ASegmentInAnothersPlaceLeavesNothingPinned) {
   std::map<const std::byte*, size_t> pinned;
   hooks_.pin = hooks_.pin_read_only = [&](std::span<std::byte> memory) {

@@ -1,4 +1,4 @@
-// What an engine's owner sees when its worker fails.
+// Tests what an engine's owner sees when its worker fails.
 #include "gpu/worker/worker_engine.h"
 
 #include <gmock/gmock.h>
@@ -27,7 +27,7 @@ using ::testing::HasSubstr;
 
 class FaultyWorker : public ::testing::Test {
  protected:
-  // `fault`: its kind and, behind a colon, its frame.
+  // `fault`: its kind and, after a colon, its frame.
   conformance::EngineDriver Make(const std::string& fault, int64_t deadline_ns = 20'000'000'000) {
     const size_t colon = fault.find(':');
     return MakeWith({.frame = fault.substr(colon + 1), .kind = fault.substr(0, colon)},
@@ -110,7 +110,7 @@ TEST_F(FaultyWorker, ThatHangsDoesNotHoldUpItsOwnersEnd) {
   EXPECT_EQ(answer.get_future().get().code(), absl::StatusCode::kCancelled);
 }
 
-// ---- several engines of one process
+// ---- several engines in one process
 
 class SharedWorker : public FaultyWorker {
  protected:
@@ -158,7 +158,7 @@ TEST_F(SharedWorker, ThatIsLostIsLostToAllAndTheNextEngineHasANewOne) {
   const pid_t process = Process();
   ASSERT_TRUE(b.SetTarget(target_).ok());
   ASSERT_EQ(kill(process, SIGKILL), 0);
-  // Also to the one that was not asking for anything.
+  // Also to the one that had no call under way.
   EXPECT_EQ(told.get_future().get().code(), absl::StatusCode::kDataLoss);
   EXPECT_EQ(b.Frame().status().code(), absl::StatusCode::kDataLoss);
   conformance::EngineDriver c = Drive(Options());
@@ -197,7 +197,7 @@ TEST_F(SharedWorker, ThatIsNotWaitedForAndCannotServeSaysWhy) {
   options.workers = nullptr;
   options.worker = "/bin/true";
   const absl::StatusOr<std::unique_ptr<Engine>> engine = CreateEngine(options);
-  if (!engine.ok()) {  // it has ended already
+  if (!engine.ok()) {  // it has already exited
     EXPECT_EQ(engine.status().code(), absl::StatusCode::kFailedPrecondition);
     return;
   }

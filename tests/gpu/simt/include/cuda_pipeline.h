@@ -1,4 +1,4 @@
-// Copies that are done when they are waited for.
+// Copies that are made when they are waited for.
 #pragma once
 
 #include <cstring>
@@ -9,5 +9,5 @@ inline void __pipeline_memcpy_async(void* to, const void* from, size_t bytes) {
   voxeld::simt::Later([=] { std::memcpy(to, from, bytes); });
 }
 inline void __pipeline_commit() {}
-// For all of them, whatever is asked.
+// Waits for all of them, whatever is requested.
 inline void __pipeline_wait_prior(size_t) { voxeld::simt::DoLater(); }

@@ -1,7 +1,7 @@
-// CUDA's runtime, as much of it as the engine calls, on the CPU: what gpu/cuda is built against where its
-// kernels are run without a GPU (tests/gpu/simt/grid.h). Names, values and meanings are those of
-// https://docs.nvidia.com/cuda/cuda-runtime-api; work is done when it is queued, so streams and events
-// order nothing that is not in order already.
+// The part of CUDA's runtime that the engine uses, on the CPU: gpu/cuda is built with it where its
+// kernels run without a GPU (tests/gpu/simt/grid.h). Names, values and meanings are those of
+// https://docs.nvidia.com/cuda/cuda-runtime-api; work is done when it is queued, so streams and
+// events have no effect on the order.
 #pragma once
 
 #include <cstddef>
@@ -56,7 +56,7 @@ cudaError_t cudaGetDeviceProperties(cudaDeviceProp* properties, int device);
 cudaError_t cudaSetDevice(int device);
 cudaError_t cudaSetDeviceFlags(unsigned flags);
 
-// Fresh memory has no zeros in it.
+// New memory is not zeroed.
 cudaError_t cudaMalloc(void** memory, size_t bytes);
 cudaError_t cudaFree(void* memory);
 cudaError_t cudaMallocHost(void** memory, size_t bytes);
@@ -85,7 +85,7 @@ cudaError_t cudaEventRecord(cudaEvent_t event, cudaStream_t stream);
 cudaError_t cudaEventSynchronize(cudaEvent_t event);
 cudaError_t cudaEventElapsedTime(float* ms, cudaEvent_t from, cudaEvent_t to);
 
-// Modules are for devices that there are.
+// Modules are only for real devices.
 using cudaLibrary_t = struct CUlib_st*;
 using cudaKernel_t = struct CUkern_st*;
 inline cudaError_t cudaLibraryLoadData(cudaLibrary_t*, const void*, const void*, const void*,

@@ -1,5 +1,5 @@
 // CUB's sums over a block (https://nvidia.github.io/cccl/cub): the memory must not be used for
-// anything else until all threads have come by a barrier.
+// anything else until all threads have passed a barrier.
 #pragma once
 
 #include <utility>

@@ -1,5 +1,5 @@
-// CUB's sorting of an array: called without memory it says how much it takes; what is sorted lies in
-// either buffer afterwards.
+// CUB's sorting of an array: when called without memory, it returns how much it needs; afterwards,
+// the sorted array may be in either buffer.
 #pragma once
 
 #include <algorithm>

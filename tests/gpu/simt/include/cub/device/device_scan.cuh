@@ -1,4 +1,4 @@
-// CUB's sums over an array: called without memory it says how much it takes.
+// CUB's sums over an array: when called without memory, it returns how much it needs.
 #pragma once
 
 #include "tests/gpu/simt/grid.h"

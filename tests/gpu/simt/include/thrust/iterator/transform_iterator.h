@@ -4,7 +4,7 @@
 
 namespace thrust {
 
-// What `function` makes of an array's values.
+// Iterates over the results of `function` for an array's values.
 template <typename Function, typename Iterator>
 struct transform_iterator {
   Iterator from;
