@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""That tools/check_includes.py finds what points the wrong way, in quotes and in angle brackets alike."""
+"""Tests that tools/check_includes.py finds includes in the wrong direction, in quotes and in angle brackets alike."""
 
 import os
 import sys

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Optional parts (cmake/VoxeldParts.cmake) are added one after the other, as the commands say that voxelctl prints."""
+"""Tests that optional parts (cmake/VoxeldParts.cmake) can be added one after the other with the commands that voxelctl prints."""
 
 import json
 import re

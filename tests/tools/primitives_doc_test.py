@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""That tools/primitives_doc.py says of every field unit and default, and leaves out no guarantee."""
+"""Tests that tools/primitives_doc.py states the unit and the default of every field, and leaves out no guarantee."""
 
 import os
 import sys

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Tests which programs tools/run_matching.py builds for a pattern. The project has two tests, and nothing of it has been built."""
+"""Tests which programs tools/run_matching.py builds for a pattern. The project has two tests, none of which has been built."""
 
 import os
 import re

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""tools/setup, tools/jobs, tools/demo and .ci/run with faked commands: what they install, and what they say where something is missing.
+"""Tests tools/setup, tools/jobs, tools/demo and .ci/run with fake commands: what they install, and their messages when something is missing.
 
 Runs without root, network, packages or compiler: PATH is one folder of stubs and of links to the ordinary tools.
 
@@ -25,7 +25,7 @@ ORDINARY = ("awk basename bash cat chmod cp cut date dirname env find grep head 
             "sort tail tar timeout touch tr uname wc").split()
 MODULES = ["world-atlas", "three", "uplot", "esbuild"]  # of the default tier
 
-# What apt-get prints of its plan, as Debian 12's does.
+# The plan that apt-get prints, as Debian 12's does.
 PLAN = """The following NEW packages will be installed:
   a b c
 0 upgraded, 201 newly installed, 0 to remove and 0 not upgraded.
@@ -72,7 +72,7 @@ class Sandbox(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.clone = Path(folder.name) / "clone"
         self.path = Path(folder.name) / "path"
-        self.called = Path(folder.name) / "called"  # a line for each call of a stub
+        self.called = Path(folder.name) / "called"  # one line for each call of a stub
         self.path.mkdir()
         (self.clone / "tools").mkdir(parents=True)
         for name in ("setup", "demo", "jobs", "progress.py"):
@@ -513,7 +513,7 @@ mkdir -p build/demo/bin; cp "$STUBS/voxeld" "$STUBS/voxelctl" build/demo/bin"""
         self.assertIn("FAILED: x/2.cc.o", done.stdout)
 
     def test_a_command_that_fails_without_an_error_was_out_of_memory_too(self) -> None:
-        # Clang compiles in its own process, so nobody is left to say that it was killed.
+        # Clang compiles in its own process, so no other process reports that it was killed.
         self.programs(build='echo "@ 1 3 Building CXX object x/1.cc.o"; echo "FAILED: x/2.cc.o"; echo "clang++-16 -c x/2.cc -o x/2.cc.o"; exit 1')
         done = self.run_tool("demo", "--once")
         self.assertEqual(done.returncode, 1)

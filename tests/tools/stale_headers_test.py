@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""tools/stale_headers.py removes precompiled headers that Ninja takes for current although a header in them was upgraded."""
+"""Tests that tools/stale_headers.py removes precompiled headers that Ninja considers current although a header in them was upgraded."""
 
 import os
 import subprocess
@@ -32,7 +32,7 @@ class StaleHeaders(unittest.TestCase):
         self.make()
 
     def install(self, text: str) -> None:
-        """As dpkg does: the file is replaced, and keeps the time at which its package was made."""
+        """Installs a file as dpkg does: it is replaced, and keeps the time at which its package was made."""
         new = self.header.with_suffix(".new")
         new.write_text(text, encoding="utf-8")
         os.utime(new, (1_500_000_000, 1_500_000_000))

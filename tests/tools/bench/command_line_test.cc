@@ -86,7 +86,7 @@ TEST(CommandLine, HelpNamesThemAll) {
 
 TEST(CommandLine, TheDefaultsOfEachFitIntoTwoMinutes) {
   const auto total = [](const auto& options) { return options.rounds * options.seconds; };
-  // Both sides of each case; the normal client three times a round.
+  // Both sides of each case; the normal client three times in a round.
   EXPECT_LE(2 * total(IngestOptions()) * static_cast<double>(IngestCases().size()), 90);
   EXPECT_LE(total(LatencyOptions()), 90);
   EXPECT_LE(total(FairnessOptions()), 90);

@@ -1,4 +1,4 @@
-// Whole frames: what the scenes contain, what a run says, what it refuses.
+// Tests whole frames: the contents of scenes, the report of a run, and the errors.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ struct Counted {
   uint64_t lines = 0, voxels = 0;
 };
 
-// Voxels of THIN lines, vertices two by two.
+// Counts the voxels of THIN lines; vertices are taken in pairs.
 Counted CountLines(const std::vector<Content>& contents) {
   Counted out;
   for (const Content& content : contents) {
@@ -100,7 +100,7 @@ TEST(FrameScenes, OneSeedOneSceneAnotherAnother) {
   for (const std::string& name : SceneNames()) {
     if (name == "mesh" || name == "gyroid" || name == "implicit" || name == "volume" ||
         name == "isosurface" || name == "filled") {
-      continue;  // nothing at random
+      continue;  // nothing is random
     }
     const auto first = ScenesOf(name, 5, 1e-4), again = ScenesOf(name, 5, 1e-4);
     const auto other = ScenesOf(name, 6, 1e-4);
@@ -145,7 +145,7 @@ TEST(FrameScenes, OfWhatMovesTheStatedPartIsNew) {
   const double shares[] = {0, 0.01, 0.05, 0.2, 0.5, 1};
   for (size_t row = 1; row < rows.size(); ++row) {
     const Scene scene = rows[row]().value();
-    // Those that reach out of their part of the volume stay.
+    // Lines that extend beyond their part of the volume stay.
     const uint64_t changed = CountLines(scene.changing[0]).lines;
     EXPECT_LE(static_cast<double>(changed), shares[row] * 100'000 * 1.2) << scene.name;
     EXPECT_GE(static_cast<double>(changed), shares[row] * 100'000 * 0.6) << scene.name;
@@ -226,7 +226,7 @@ TEST(FrameScenes, MixedHasEverything) {
   EXPECT_THAT(modes, SizeIs(3));
 }
 
-// Against the definition in whole numbers, for lines along an axis, where no rounding is in doubt.
+// Compared with the definition in integers, for lines along an axis, where no rounding is in doubt.
 TEST(PlainLines, DrawsTheVoxelsOfALine) {
   constexpr int kSize = 8;
   const std::vector<float> positions = {1.5F, 2.5F, 3.5F, 6.5F, 2.5F, 3.5F,   // along x
@@ -291,7 +291,7 @@ TEST(FrameBench, RowsHaveTheirFields) {
   EXPECT_THAT(text, HasSubstr("plain loop"));
 }
 
-// What moves stays in the volume, so each frame is as full as the last, and all of it is drawn.
+// Moving items stay in the volume, so each frame is as full as the last, and all of it is drawn.
 TEST(FrameBench, EveryVoxelInReachOfTheRotorIsLitInEveryFrame) {
   for (const int rounds : {1, 2}) {
     const auto report = Measured({.scene = "rotor", .threads = 2, .rounds = rounds});

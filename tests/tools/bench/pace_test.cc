@@ -30,7 +30,7 @@ TEST(Pace, WhoComesLateFindsThemAllAndNoneIsMoved) {
 
 TEST(Pace, CountsWhatIsDueHoweverItIsAskedFor) {
   for (const double rate : {0.7, 3.0, 600.0, 999.9, 7919.0}) {
-    // In one step of a thousand seconds, and in steps of each one's own time.
+    // In one step of a thousand seconds, and in steps of each rate's own interval.
     Pace once(17, rate), each(17, rate);
     const sync::TimeNs end = 17 + 1000 * kSecond;
     const uint64_t all = once.Take(end);
@@ -55,7 +55,7 @@ TEST(Credit, NoneToldMeansNoPacing) {
 
 TEST(Credit, AMessageMayExceedWhatIsLeftButNotFollowWhenNoneIs) {
   Credit credit;
-  credit.Sent(40);  // Open, before anything was told
+  credit.Sent(40);  // Open, before any credit was announced
   credit.Told(100);
   EXPECT_TRUE(credit.MaySend());
   EXPECT_TRUE(credit.MaySendAfter(59));
@@ -71,7 +71,7 @@ TEST(Credit, AMessageMayExceedWhatIsLeftButNotFollowWhenNoneIs) {
 TEST(Credit, NeverBecomesLess) {
   Credit credit;
   credit.Told(100);
-  credit.Told(0);  // an answer that says nothing of it
+  credit.Told(0);  // an answer without credit
   credit.Told(50);
   EXPECT_EQ(credit.credit(), 100u);
 }

@@ -1,4 +1,5 @@
-// The paper's tables again: batches, rows, text, figures; and a small run on the CPU.
+// Tests the reproduction of the paper's tables: batches, rows, text, figures; and a small run on
+// the CPU.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +24,7 @@ uint64_t CountOf(const Workload& workload) {
     double sum = 0;
     for (size_t a = 0; a < 3; ++a)
       sum += (segment.end[a] - segment.start[a]) * (segment.end[a] - segment.start[a]);
-    voxels += static_cast<uint64_t>(std::sqrt(sum)) + 1;  // the paper's N, and one
+    voxels += static_cast<uint64_t>(std::sqrt(sum)) + 1;  // the paper's N, plus one
   }
   return voxels;
 }
@@ -128,7 +129,7 @@ TEST(LogPlot, PutsDecadesAtEqualDistancesAndEscapesText) {
   EXPECT_THAT(svg, HasSubstr("one &amp; all"));
   // Two decades over 560 and 410 pixels from the lower left.
   EXPECT_THAT(svg, HasSubstr("points=\"90.0,460.0 370.0,255.0 650.0,50.0 \""));
-  // With marks of its own an axis ends where they do.
+  // With explicit marks, an axis ends where they do.
   const std::string marked =
       LogLogSvg("t", "x", "y",
                 {{.name = "g", .points = {{2, 1}, {4, 10}, {8, 100}}, .guide = true}}, {2, 4, 8});

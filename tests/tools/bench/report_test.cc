@@ -19,7 +19,7 @@ TEST(Report, SaysWhatWhereAndHow) {
   EXPECT_GE(int(report["machine"]["cores"]), 1);
   EXPECT_FALSE(std::string(report["machine"]["cpu"]).empty());
   EXPECT_FALSE(std::string(report["build"]["type"]).empty());
-  // Of a tree without git there is none.
+  // A tree without git has no commit.
   const nlohmann::json& commit = report["build"]["commit"];
   EXPECT_TRUE(commit.is_null() || !std::string(commit).empty());
 }

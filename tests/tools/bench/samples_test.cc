@@ -21,7 +21,7 @@ TEST(Samples, QuartilesAreThoseOfTheSortedTimes) {
   ExpectQuartiles({7}, 7, 7, 7);
   ExpectQuartiles({40, 20}, 20, 30, 40);
   ExpectQuartiles({30, 10, 20}, 15, 20, 25);
-  ExpectQuartiles({4, 1, 3, 2}, 1, 2, 3);  // means of whole nanoseconds, downwards
+  ExpectQuartiles({4, 1, 3, 2}, 1, 2, 3);  // means of whole nanoseconds, rounded down
   ExpectQuartiles({50, 10, 40, 20, 30}, 20, 30, 40);
   ExpectQuartiles({10, 20, 30, 40, 50, 60, 70}, 25, 40, 55);
 }

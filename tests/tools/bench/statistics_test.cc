@@ -26,7 +26,7 @@ TEST(Spread, OfNothingIsNothing) {
 }
 
 TEST(Ratios, AreOfPairsNotOfMedians) {
-  // Medians 2 and 4; the pairs say 1/4, 2/2, 3/4… of one another.
+  // Medians 2 and 4; the ratios of the pairs are 1/4, 2/2 and 3/6.
   const std::vector<double> values = {1, 2, 3}, baseline = {4, 2, 6};
   const Spread ratios = RatiosOf(values, baseline);
   EXPECT_THAT(ratios.values, ElementsAre(0.25, 1, 0.5));

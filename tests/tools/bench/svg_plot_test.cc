@@ -12,7 +12,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
 
-// The points of each line drawn, in order.
+// Returns the points of each line drawn, in order.
 std::vector<std::vector<std::pair<double, double>>> LinesIn(const std::string& svg) {
   std::vector<std::vector<std::pair<double, double>>> lines;
   const std::regex polyline("<polyline[^>]* points=\"([^\"]*)\""), point("([-0-9.]+),([-0-9.]+)");

@@ -96,7 +96,7 @@ TEST(TemporaryFolder, GoesWithAllThatIsInIt) {
 }
 
 TEST(Programs, AreFoundBesideOrAbove) {
-  // This test lies in bin/tests, programs in bin.
+  // This test is in bin/tests, programs are in bin.
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe");
   EXPECT_EQ(ProgramBeside(self.filename()), self);
   EXPECT_EQ(ProgramBeside("none"), self.parent_path().parent_path() / "none");

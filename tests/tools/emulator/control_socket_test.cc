@@ -63,7 +63,7 @@ TEST_F(ControlSocketTest, ALineWithoutAnEndIsCutOff) {
   EXPECT_TRUE(lines_.empty());
   std::vector<pollfd> fds;
   socket_->AddTo(fds);
-  EXPECT_EQ(fds.size(), 1u);  // only who listens
+  EXPECT_EQ(fds.size(), 1u);  // only the listening socket
 }
 
 TEST_F(ControlSocketTest, WhoLeavesIsForgotten) {
@@ -79,7 +79,7 @@ TEST_F(ControlSocketTest, WhoLeavesIsForgotten) {
   EXPECT_EQ(fds.size(), 1u);
 }
 
-// Its answers are more than a socket holds.
+// Its answers are more than a socket can hold.
 TEST_F(ControlSocketTest, WhoTakesNoAnswersIsCutOff) {
   Peer peer(Connect(path_));
   std::vector<pollfd> fds;

@@ -10,7 +10,7 @@
 
 namespace voxeld::emulator {
 
-// A folder that is removed with all that is in it.
+// A folder that is removed with all its contents.
 class TestFolder {
  public:
   TestFolder();
@@ -23,14 +23,15 @@ class TestFolder {
   std::string path_;
 };
 
-// The program and these.
+// Returns the program with these arguments.
 std::vector<std::string> Emulator(std::vector<std::string> arguments);
 
-// Descriptors of connections; throw if there is none to be had.
+// These return descriptors of connections, and throw if the connection fails.
 int Connect(const std::string& path);
 int ConnectTcp(uint16_t port);
 
-// Asks again whenever `fd` has something to read, or soon in any case; false: not within e2e::kPatience.
+// Checks `done` whenever `fd` can be read, or soon in any case. Returns false if it did not hold
+// within e2e::kPatience.
 bool Until(int fd, const std::function<bool()>& done);
 
 }  // namespace voxeld::emulator

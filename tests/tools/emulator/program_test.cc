@@ -1,4 +1,4 @@
-// The real program, as a host on the other end of USB/IP or usbredir finds it.
+// Tests the real program, as seen by a host at the other end of USB/IP or usbredir.
 #include <sys/socket.h>
 
 #include <charconv>
@@ -35,7 +35,7 @@ class Program : public testing::Test {
     EXPECT_FALSE(std::filesystem::exists(control_));
     EXPECT_FALSE(std::filesystem::exists(usbredir_));
   }
-  // Once it is ready; what it has said.
+  // Starts it, and waits until it is ready. Returns its output.
   std::string Start(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), kDevice);
     arguments.insert(arguments.end(), {"--control", control_});
@@ -70,7 +70,7 @@ class OverUsbip : public Program {
     std::from_chars(said.data() + at + before.size(), said.data() + said.size(), port_);
     ASSERT_NE(port_, 0);
   }
-  // The first `size` bytes that come; fewer if they do not.
+  // Returns the first `size` bytes that arrive; fewer if they do not.
   static Bytes Receive(Peer& peer, size_t size) {
     Bytes all;
     Until(peer.fd(), [&] {
@@ -116,7 +116,7 @@ TEST_F(OverUsbip, PlaysTheDeviceOneHostAfterTheOther) {
   ExpectDescriptor(*first);
   const int plugs = Status()["plugs"];
   first = nullptr;
-  // For the device the host's leaving is the cable.
+  // For the device, a disconnected host is a pulled cable.
   EXPECT_TRUE(Until(-1, [&] { return Status()["plugs"] == plugs + 1; }));
   ExpectDescriptor(*Import());
 }
@@ -177,7 +177,7 @@ TEST_F(OverUsbredir, PlaysTheDeviceThroughUnplugs) {
   ASSERT_TRUE(guest.Await([&] { return guest.host.controls.size() == 2; }));
 }
 
-// Events come without anything new from the guest.
+// Events arrive without further requests from the guest.
 TEST_F(OverUsbredir, InterruptsGoOn) {
   Guest guest(usbredir_);
   ASSERT_TRUE(guest.Await([&] { return guest.host.connects == 1; }));
@@ -201,7 +201,7 @@ TEST_F(OverUsbredir, APathThatIsTakenIsRefused) {
   const e2e::Ended ended = e2e::RunToEnd(Emulator({kDevice, "--usbredir", usbredir_}));
   EXPECT_EQ(ended.code, 1) << ended.output;
   EXPECT_NE(ended.output.find(usbredir_), std::string::npos) << ended.output;
-  Guest guest(usbredir_);  // and is still there
+  Guest guest(usbredir_);  // and still exists
   EXPECT_TRUE(guest.Await([&] { return guest.host.connects == 1; }));
 }
 

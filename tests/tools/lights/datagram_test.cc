@@ -19,7 +19,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using Bytes = std::vector<uint8_t>;
 
-// Written out from the protocols' tables, not by this project's own writer.
+// Written out from the protocols' tables, independently of this project's own writer.
 Bytes Ddp(uint8_t flags, uint8_t sequence, uint8_t type, uint32_t offset, const Bytes& data) {
   Bytes out = {flags, sequence, type, 1};
   for (int shift = 24; shift >= 0; shift -= 8) out.push_back(static_cast<uint8_t>(offset >> shift));
@@ -134,7 +134,8 @@ TEST(DdpDatagram, OfNothingIsAWordToShowOrNone) {
   EXPECT_EQ(ReadDatagram(Protocol::kDdp, Ddp(0x40, 0, 0x0B, 0, {}))->kind, Datagram::Kind::kOther);
 }
 
-// Each field of the layers made another: refused, and by what it says.
+// Each field of the layers is changed in turn: the packet is refused, and the message names the
+// field.
 TEST(E131Datagram, EachFieldOfItsLayersCounts) {
   const Bytes good = E131(3, 9, {1, 2, 3});
   for (const size_t at :
@@ -143,7 +144,7 @@ TEST(E131Datagram, EachFieldOfItsLayersCounts) {
     bad[at] ^= 0x01;
     EXPECT_TRUE(absl::IsInvalidArgument(ReadDatagram(Protocol::kE131, bad).status())) << at;
   }
-  // Its lengths are right, and it ends before its values.
+  // Its lengths are right, but it ends before its values.
   for (const size_t size : {49u, 125u}) {
     Bytes cut(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(size));
     for (const size_t at : {16u, 38u}) {
@@ -161,7 +162,7 @@ TEST(E131Datagram, EachFieldOfItsLayersCounts) {
   EXPECT_EQ(Wrong(Protocol::kE131, E131(1, 9, {1}, 201)), "priority 201; 200 is the most");
 }
 
-// Art-Net 4's table of ArtPollReply, field by field: 239 bytes, all that is not named here 0.
+// Art-Net 4's table of ArtPollReply, field by field: 239 bytes; all that are not named here are 0.
 TEST(ArtNetDatagram, AnAnswerIsAsItsTableHasIt) {
   for (const auto& [first, universes, ports] : {std::tuple{0x1234, 3, 3}, std::tuple{0x123E, 9, 2},
                                                 std::tuple{0, 9, 4}, std::tuple{0, 0, 1}}) {
@@ -208,7 +209,7 @@ TEST(ArtNetDatagram, EachLengthIsLookedAt) {
   EXPECT_EQ(Wrong(Protocol::kArtNet, ArtDmx(5, 0, Bytes(513))),
             "bytes 16 and 17 say 513 values; 2 to 512 are possible");
   EXPECT_EQ(ReadDatagram(Protocol::kArtNet, ArtDmx(5, 0, Bytes(512)))->values.size(), 512u);
-  // What is for others may be as short as its operation.
+  // A packet for others may be as short as its opcode.
   Bytes other(good.begin(), good.begin() + 10);
   other[9] = 0x60;
   EXPECT_EQ(ReadDatagram(Protocol::kArtNet, other)->kind, Datagram::Kind::kOther);

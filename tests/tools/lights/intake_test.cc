@@ -19,7 +19,8 @@ constexpr sync::TimeNs kMs = sync::kMillisecond;
 
 Bytes Bytes3(size_t lights, uint8_t value) { return Bytes(lights * 3, value); }
 
-// Packets as this project's drivers send them: read here by code that shares none of theirs.
+// Packets as this project's drivers send them: they are read here by code that shares nothing with
+// the drivers.
 class Sender {
  public:
   explicit Sender(display::network::StreamOptions options, int32_t pixels = 170)
@@ -64,7 +65,7 @@ TEST(Intake, AnOpcMessageIsAPicture) {
   intake.AddMessage(Opc(0, {1, 2, 3}), 0);
   EXPECT_THAT(*intake.Take(), ElementsAre(1, 2, 3, 0, 0, 0));
   EXPECT_FALSE(intake.Take().has_value());
-  // More than there are: the rest is nobody's. Two: the second is shown.
+  // With more lights than exist, the rest is ignored. With two messages, the second is shown.
   intake.AddMessage(Opc(0, {9, 9, 9, 9, 9, 9, 9, 9, 9}), 0);
   intake.AddMessage(Opc(0, {4, 5, 6, 7, 8, 9}), 0);
   EXPECT_THAT(*intake.Take(), ElementsAre(4, 5, 6, 7, 8, 9));
@@ -85,7 +86,7 @@ TEST(Intake, OpcChannelsAreParts) {
   EXPECT_FALSE(intake.waiting());
   intake.Tick(4 * kMs);
   EXPECT_THAT(*intake.Take(), ElementsAre(10, 10, 10, 10, 10, 10, 20, 20, 20, 20, 20, 20));
-  // A part that comes again ends the picture before, which has none of it.
+  // If a part is received again, it ends the previous picture and is not included in it.
   intake.AddMessage(Opc(1, Bytes3(2, 30)), 5 * kMs);
   intake.AddMessage(Opc(1, Bytes3(2, 40)), 6 * kMs);
   EXPECT_EQ((*intake.Take())[0], 30);
@@ -105,7 +106,7 @@ TEST(Intake, DdpShowsWhatIsPushed) {
   ASSERT_TRUE(picture.has_value());
   EXPECT_THAT(picture->first(300), Each(1));
   EXPECT_THAT(picture->subspan(300), Each(2));
-  // Without a push it is shown after a while.
+  // Without a push, it is shown after a while.
   ASSERT_TRUE(intake.AddDatagram(sender.Pixels(0, Bytes3(100, 3)), 10 * kMs).ok());
   intake.Tick(intake.due());
   EXPECT_TRUE(intake.waiting());
@@ -144,7 +145,7 @@ TEST(Intake, UniversesAreParts) {
   ASSERT_TRUE(intake.AddDatagram(sender.Pixels(1, Bytes3(170, 2)), 1 * kMs).ok());
   ASSERT_TRUE(intake.AddDatagram(sender.Pixels(2, Bytes3(170, 3)), 1 * kMs).ok());
   EXPECT_EQ(intake.tally().outside, 1u);
-  // The next picture's first part comes before the gathering's end.
+  // The first part of the next picture arrives before the end of the wait.
   ASSERT_TRUE(intake.AddDatagram(sender.Pixels(0, Bytes3(170, 4)), 2 * kMs).ok());
   const auto picture = intake.Take();
   ASSERT_TRUE(picture.has_value());
@@ -156,7 +157,7 @@ TEST(Intake, UniversesAreParts) {
 TEST(Intake, WaitsForSynchronisationWhereThereIsOne) {
   Sender sender(E131Stream(100, 1, 7));
   Intake intake({.protocol = Protocol::kE131, .lights = 340});
-  // Until the first has come nothing is waited for.
+  // Until the first has arrived, it does not wait for any.
   ASSERT_TRUE(intake.AddDatagram(sender.Pixels(0, Bytes3(170, 1)), 100 * sync::kSecond).ok());
   EXPECT_EQ(intake.due(), 100 * sync::kSecond + 4 * kMs);
   ASSERT_TRUE(intake.AddDatagram(sender.Sync(), 100 * sync::kSecond).ok());
@@ -168,7 +169,7 @@ TEST(Intake, WaitsForSynchronisationWhereThereIsOne) {
   EXPECT_FALSE(intake.waiting());
   ASSERT_TRUE(intake.AddDatagram(sender.Sync(), 101 * sync::kSecond + 200 * kMs).ok());
   EXPECT_THAT(*intake.Take(), Each(2));
-  // When none comes any more, pictures go on without.
+  // When they stop arriving, pictures are shown without them.
   ASSERT_TRUE(intake.AddDatagram(sender.Pixels(0, Bytes3(170, 3)), 102 * sync::kSecond).ok());
   intake.Tick(106 * sync::kSecond);
   EXPECT_TRUE(intake.waiting());
@@ -188,7 +189,7 @@ TEST(Intake, TheHighestPriorityHasAUniverse) {
   EXPECT_EQ(shown(high.Pixels(0, Bytes3(170, 2)), 1 * kMs), 2);
   EXPECT_EQ(shown(low.Pixels(0, Bytes3(170, 3)), 2 * kMs), -1);
   EXPECT_EQ(intake.tally().outranked, 1u);
-  // It ends, or falls silent: the other one has it.
+  // The stream ends, or falls silent: the other one takes over.
   EXPECT_EQ(shown(high.End(0, Bytes3(170, 2)), 3 * kMs), -1);
   EXPECT_EQ(shown(low.Pixels(0, Bytes3(170, 4)), 4 * kMs), 4);
   EXPECT_EQ(shown(high.Pixels(0, Bytes3(170, 5)), 5 * kMs), 5);
@@ -207,14 +208,14 @@ TEST(Intake, PassesOverWhatComesLate) {
   EXPECT_EQ(intake.tally().stale, 1u);
   ASSERT_TRUE(intake.AddDatagram(packets[30], 0).ok());
   EXPECT_EQ(intake.tally().lost, 24u);
-  ASSERT_TRUE(intake.AddDatagram(packets[5], 0).ok());  // 25 behind: its sender began anew
+  ASSERT_TRUE(intake.AddDatagram(packets[5], 0).ok());  // 25 behind: its sender was restarted
   EXPECT_EQ(intake.tally().stale, 1u);
   EXPECT_EQ(intake.tally().set, 3u);
   ExpectSound(intake.tally(), intake);
 }
 
 TEST(Intake, OpcChannelsWithoutASizeAreWholePictures) {
-  // A channel has as many lights as there are, so that all but the first have none of them.
+  // A channel has as many lights as the display, so only the first channel has any.
   Intake intake({.protocol = Protocol::kOpc, .lights = 2});
   intake.AddMessage(Opc(1, Bytes3(2, 10)), 0);
   EXPECT_THAT(*intake.Take(), Each(10)) << "at once";
@@ -256,7 +257,7 @@ TEST(Intake, ArtNetWaitsForSynchronisationOnceThereWasOne) {
   EXPECT_EQ(intake.due(), 14 * sync::kSecond) << "as long as sync packets may be apart";
   ASSERT_TRUE(intake.AddDatagram(sender.Sync(), 12 * sync::kSecond).ok());
   EXPECT_THAT(*intake.Take(), Each(2));
-  // Those of universes before the first are nobody's.
+  // Packets for universes before the first are ignored.
   stream.first_universe = 2;
   Sender below(stream);
   ASSERT_TRUE(intake.AddDatagram(below.Pixels(0, Bytes3(170, 3)), 12 * sync::kSecond).ok());
@@ -272,7 +273,8 @@ TEST(Intake, ADdpPushByItselfShowsWhatCame) {
   EXPECT_FALSE(intake.waiting());
   ASSERT_TRUE(intake.AddDatagram(push, 0).ok());
   EXPECT_THAT(*intake.Take(), ElementsAre(7, 8, 9));
-  // Beyond the last light, pushed: what came before it is a picture, and nothing is none.
+  // Beyond the last light, pushed: what came before it makes a picture; without that, there is no
+  // picture.
   const Bytes beyond = {0x41, 0, 0x0B, 1, 0, 0, 0, 3, 0, 3, 1, 1, 1};
   ASSERT_TRUE(intake.AddDatagram(beyond, 0).ok());
   EXPECT_FALSE(intake.waiting());
@@ -299,7 +301,7 @@ TEST(Intake, SourcesOfAUniverseAreSixteenAtTheMost) {
   }
   EXPECT_EQ(intake.tally().set, 16u);
   EXPECT_EQ(intake.tally().outranked, 1u);
-  // One that is known goes on; another when they have fallen silent.
+  // A known sender continues; another takes over when all have fallen silent.
   Sender first(E131Stream(100, 1));
   first.Pixels(0, Bytes3(170, 1));
   ASSERT_TRUE(intake.AddDatagram(first.Pixels(0, Bytes3(170, 1)), 1 * kMs).ok());
@@ -341,7 +343,7 @@ TEST(Intake, UniversesOf512ChannelsFollowOneAnother) {
   EXPECT_EQ(UniversesOf(options), 2);
   Intake intake(options);
   const auto packet = [](uint8_t universe, const Bytes& values) {
-    // E1.31's layers by its table 4-1: sizes, vectors, the universe and the start code.
+    // E1.31's layers according to its table 4-1: sizes, vectors, the universe and the start code.
     Bytes out(126 + values.size());
     const size_t size = out.size();
     const auto flags = [&](size_t at) {
@@ -375,7 +377,7 @@ TEST(Intake, UniversesOf512ChannelsFollowOneAnother) {
   ASSERT_TRUE(picture.has_value());
   for (size_t i = 0; i < 900; ++i) EXPECT_EQ((*picture)[i], i % 251) << i;
   EXPECT_EQ(intake.tally().unused, 0u);
-  // With 170 lights a universe the last two values are told of, unless they are 0.
+  // With 170 lights in a universe, the last two values are reported unless they are 0.
   options.universe_channels = 510;
   Intake plain(options);
   ASSERT_TRUE(plain.AddDatagram(packet(1, first), 0).ok());

@@ -60,7 +60,7 @@ TEST_F(ReceiverTest, TakesOpcOfSeveral) {
   RunUntil([this] { return intake_->tally().set == 2; });
   EXPECT_THAT(*intake_->Take(), ElementsAre(1, 2, 3));
   EXPECT_EQ(receiver_->tally().open, 2u);
-  // One ends within a message, the other goes on.
+  // One connection ends within a message, the other continues.
   asio::write(one, asio::buffer(message, 5));
   one.close();
   RunUntil([this] { return receiver_->tally().cut_off == 1; });

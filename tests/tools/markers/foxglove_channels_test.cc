@@ -1,4 +1,4 @@
-// What a Foxglove server says of its channels, without a socket.
+// Tests a Foxglove server's announcements of its channels, without a socket.
 #include "tools/markers/foxglove_channels.h"
 
 #include <gmock/gmock.h>
@@ -42,7 +42,7 @@ TEST(FoxgloveChannels, AreSubscribedToByTheirNumbers) {
 TEST(FoxgloveChannels, GoOnlyByTheirOwnNumber) {
   FoxgloveChannels channels({});
   ASSERT_TRUE(channels.Told(kAdvertise).ok());
-  // 5 and 6 beyond 32 bits, and what are none.
+  // 5 and 6 beyond 32 bits, and invalid ones.
   ASSERT_TRUE(
       channels.Told(R"({"op": "unadvertise", "channelIds": [4294967301, 4294967302, -5, "5"]})")
           .ok());

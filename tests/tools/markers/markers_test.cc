@@ -48,7 +48,7 @@ TEST(Markers, PosesTurnAndThenMove) {
   foxglove::SceneEntity entity;
   foxglove::CubePrimitive* cube = entity.add_cubes();
   Set(cube->mutable_pose()->mutable_position(), 1, 2, 3);
-  // A quarter turn about z, of a quaternion twice as long as it should be.
+  // A quarter turn about z, given by a quaternion that is twice as long as it should be.
   cube->mutable_pose()->mutable_orientation()->set_z(2 * std::sqrt(0.5));
   cube->mutable_pose()->mutable_orientation()->set_w(2 * std::sqrt(0.5));
   Set(cube->mutable_size(), 4, 5, 6);

@@ -1,4 +1,5 @@
-// Files as they are written and read; that others read them is tests/e2e/check_mcap.js's.
+// Tests files as they are written and read; tests/e2e/check_mcap.js tests that other
+// implementations can read them.
 #include "tools/recording/mcap.h"
 
 #include <gmock/gmock.h>
@@ -39,7 +40,7 @@ class McapTest : public ::testing::Test {
     EXPECT_EQ((*writer)->AddChannel({0, "b", "json", {}}), 2);
     return *std::move(writer);
   }
-  // Some compress well, some not at all.
+  // Some of them compress well, some not at all.
   std::vector<Got> Fill(McapWriter& writer, int count, uint32_t seed = 1) {
     std::mt19937 random(seed);
     std::vector<Got> all;
@@ -149,13 +150,13 @@ TEST_F(McapTest, DamageIsFoundAndSaysWhere) {
   EXPECT_THAT(std::string(read.status().message()), HasSubstr("is damaged at byte"));
 }
 
-// Sizes are believed as far as there is something.
+// A stated size is trusted only as far as data exists.
 TEST_F(McapTest, AChunkTakesNoMemoryForWhatIsNotThere) {
   rlimit before;
   ASSERT_EQ(getrlimit(RLIMIT_AS, &before), 0);
   for (const uint64_t size : {uint64_t{1}, uint64_t{3} << 30}) {
     McapBytes chunk;
-    // An empty frame of zstd's, which says that there are `size` bytes.
+    // An empty zstd frame, which states that there are `size` bytes.
     chunk.Number(uint64_t{0}).Number(uint64_t{0}).Number(size).Number(uint32_t{0}).Text("zstd");
     const std::string frame("\x28\xb5\x2f\xfd\x20\x00\x01\x00\x00", 9);
     chunk.Number(uint64_t{frame.size()}).Raw(frame);
@@ -163,7 +164,7 @@ TEST_F(McapTest, AChunkTakesNoMemoryForWhatIsNotThere) {
     auto reader = McapReader::Open(path_);
     ASSERT_TRUE(reader.ok()) << reader.status();
 #ifndef VOXELD_SANITIZED
-    rlimit small = before;  // whole gigabytes there are none
+    rlimit small = before;  // gigabytes of memory are not available
     small.rlim_cur = rlim_t{2} << 30;
     ASSERT_EQ(setrlimit(RLIMIT_AS, &small), 0);
 #endif

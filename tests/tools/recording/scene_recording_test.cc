@@ -1,4 +1,4 @@
-// A scene into a file and up again: random change sets, through the daemon's own store.
+// Records a scene and replays it: random change sets, through the daemon's own store.
 #include "tools/recording/scene_recording.h"
 
 #include <gmock/gmock.h>
@@ -33,8 +33,8 @@ using daemon::OwnedName;
 using daemon::Snapshot;
 using daemon::testing::StoreFixture;
 
-// What shows of a scene, in words: layers in the order in which they blend, without their owners' and their
-// own names.
+// Returns what is visible of a scene, as text: layers in the order in which they blend, without the
+// names of their owners and their own.
 std::string Shown(const Snapshot& scene) {
   std::vector<std::tuple<int32_t, uint64_t, std::string>> layers;
   const auto contents = [&](const Layer& layer) {
@@ -49,7 +49,7 @@ std::string Shown(const Snapshot& scene) {
     return words;
   };
   scene.layers.ForEach([&](const OwnedName& key, const LayerPtr& layer) {
-    if (layer->entities.empty()) return;  // nothing shows
+    if (layer->entities.empty()) return;  // nothing is visible
     v1::LayerInfo info;
     daemon::LayerInfo plain;
     plain.visible = layer->visible;
@@ -68,7 +68,7 @@ std::string Shown(const Snapshot& scene) {
   std::sort(layers.begin(), layers.end());
   std::string text;
   for (const auto& [order, number, words] : layers) absl::StrAppend(&text, order, " ", words, "\n");
-  // Definitions, whatever they are called.
+  // The definitions, whatever their names.
   std::vector<std::string> objects;
   scene.objects.ForEach([&](const OwnedName&, const daemon::ObjectPtr& object) {
     std::string words = "object";
@@ -85,7 +85,7 @@ std::string Shown(const Snapshot& scene) {
   return text;
 }
 
-// The scene of whoever replays.
+// The scene of the replaying client.
 class Replayed {
  public:
   void Apply(const std::vector<v1::StreamRequest>& requests) {
@@ -229,7 +229,7 @@ TEST(Layers, GoByTheirNamesAndByANumberWhereSeveralHaveOne) {
   *changes.add_layers() = layer(59, std::string(254, 'a') + "é", 129);
   EXPECT_THAT(names(changes), ::testing::ElementsAre("+night: voxelctl", "+night: voxelctl (2)",
                                                      "+night: " + std::string(233, 'a')));
-  // Made again: it is another layer, while the first is there.
+  // If it is made again, it is another layer, although the first still exists.
   changes.Clear();
   *changes.add_layers() = layer(58, "voxelctl", 130);
   EXPECT_THAT(names(changes), ::testing::ElementsAre("-night: voxelctl", "+night: voxelctl (3)"));
@@ -247,7 +247,7 @@ TEST(Objects, ThatLeaveTogetherLeaveBeforeTheirParts) {
     object->mutable_key()->set_object(name);
     *removed.add_removed_objects() = object->key();
   }
-  // b has a, and c has b.
+  // b contains a, and c contains b.
   const auto part = [&](int of) {
     return defined.mutable_objects(of)->mutable_definition()->add_parts()->mutable_primitive();
   };

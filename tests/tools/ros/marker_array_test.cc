@@ -38,7 +38,7 @@ void ExpectColor(const foxglove::Color& is, double r, double g, double b, double
   EXPECT_EQ((std::array{is.r(), is.g(), is.b(), is.a()}), (std::array{r, g, b, a}));
 }
 
-// Where a pose has (x, y, z), by the matrix that the shapes are drawn with.
+// Returns where a pose puts (x, y, z), by the matrix with which the shapes are drawn.
 std::array<double, 3> Posed(const foxglove::Pose& pose, double x, double y, double z) {
   foxglove::SceneEntity entity;
   *entity.add_cubes()->mutable_pose() = pose;
@@ -218,7 +218,7 @@ TEST(EntityOf, CubesOfAListTurnWithItAndHaveTwelveTrianglesEach) {
   ExpectColor(mesh.colors(7), 0, 1, 0, 1);
   ExpectColor(mesh.colors(8), 0, 0, 1, 1);
   ASSERT_EQ(mesh.indices_size(), 72);
-  // Closed: each edge is of two triangles.
+  // The mesh is closed: each edge belongs to two triangles.
   std::map<std::set<uint32_t>, int> edges;
   for (int t = 0; t < 24; ++t) {
     for (int i = 0; i < 3; ++i) {
@@ -227,8 +227,8 @@ TEST(EntityOf, CubesOfAListTurnWithItAndHaveTwelveTrianglesEach) {
   }
   EXPECT_EQ(edges.size(), 36u);
   for (const auto& [edge, triangles] : edges) EXPECT_EQ(triangles, 2);
-  // The first one's triangles, each in a face, have the faces' areas together.
-  std::map<std::pair<int, double>, double> areas;  // by axis and where on it
+  // The triangles of the first one are each in a face, and together have the areas of the faces.
+  std::map<std::pair<int, double>, double> areas;  // by axis and position on it
   for (int t = 0; t < 12; ++t) {
     std::array<std::array<double, 3>, 3> p;
     for (int i = 0; i < 3; ++i) {

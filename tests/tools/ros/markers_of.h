@@ -5,7 +5,7 @@
 
 namespace voxeld::ros1 {
 
-// Of ns "n" and id 7, at the origin, of size 1, opaque red.
+// Returns a marker with ns "n" and id 7, at the origin, with size 1, opaque red.
 inline Marker Of(int type) {
   Marker marker;
   marker.ns = "n";

@@ -28,7 +28,7 @@ std::vector<std::string> Entities(const PendingMarkers::Taken& taken) {
   return ids;
 }
 
-// "*": of all.
+// "*": all are deleted.
 std::vector<std::string> Deletions(const PendingMarkers::Taken& taken) {
   std::vector<std::string> ids;
   for (const foxglove::SceneEntityDeletion& deletion : taken.update.deletions()) {
@@ -118,7 +118,7 @@ TEST(PendingMarkers, HasItsLimits) {
   Marker many = Of(Marker::SPHERE_LIST);
   for (int i = 0; i < 60'000; ++i) AddPoint(&many, i, 0, 0);
   pending.Add(many);
-  pending.Add(many);  // in place of itself
+  pending.Add(many);  // replaces itself
   EXPECT_THAT(pending.Take().left_out, IsEmpty());
   pending.Add(many);
   many.id = 8;

@@ -1,4 +1,5 @@
-// A voxeld of a test's own, with a page, and voxelctl to draw into it. Paths are in VOXELD, VOXELCTL and WHEEL.
+// A voxeld for one test, with a page, and voxelctl to draw into it. Paths are in VOXELD, VOXELCTL
+// and WHEEL.
 import { execFile, spawn } from "node:child_process";
 import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { createServer } from "node:net";
@@ -17,8 +18,9 @@ export async function freePort() {
 }
 
 export class Daemon {
-  // `displays`: as after --display. `terminal`: its output is a terminal, so it prints the address that gives control. `config`: a
-  // file's text. `listen`: in place of a unix socket.
+  // `displays`: as after --display. `terminal`: its output is a terminal, so it prints the address
+  // that gives control. `config`: the text of a configuration file. `listen`: replaces the Unix
+  // socket.
   static async start(displays, { terminal = false, port, folder, config, listen } = {}) {
     const daemon = new Daemon();
     daemon.displays = displays;
@@ -48,7 +50,7 @@ export class Daemon {
     return `http://127.0.0.1:${this.port}/`;
   }
 
-  // The address that gives control, as a terminal is told it.
+  // Returns the address that gives control, as printed on a terminal.
   get control() {
     return /http:\S*\/control\?key=[0-9a-f]+/.exec(this.output)?.[0];
   }
@@ -57,7 +59,8 @@ export class Daemon {
     return (await run(process.env.VOXELCTL, ["--server", this.server, ...words], { maxBuffer: 1 << 26 })).stdout;
   }
 
-  // A client of another name, whose layers stay: Python, connected as `v`. WHEEL is where its module is.
+  // Runs a client with another name, whose layers stay: Python, connected as `v`. WHEEL is where
+  // its module is.
   async python(name, code) {
     const program = `import voxeld\nwith voxeld.connect("${this.server}", name=${JSON.stringify(name)}, on_disconnect="keep") as v:\n${code.replace(/^/gm, "    ")}\n    v.commit().wait_shown(timeout=60)\n`;
     await run("/usr/bin/python3", ["-c", program], { env: { ...process.env, PYTHONPATH: process.env.WHEEL } });

@@ -1,4 +1,5 @@
-// Files dropped on the page, in a browser, and played by voxelctl. NODE_MODULES is where playwright-core and the others are.
+// Tests files dropped on the page, in a browser, and played by voxelctl. NODE_MODULES is where
+// playwright-core and the others are.
 import assert from "node:assert/strict";
 import { createHash } from "node:crypto";
 import { chmodSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
@@ -38,7 +39,7 @@ async function open(address, more = {}) {
   return page;
 }
 
-// As a hand does it: over the views, and let go.
+// Drops files like a user: drags them over the views, and releases them.
 async function drop(page, ...files) {
   const dataTransfer = await page.evaluateHandle((all) => {
     const transfer = new DataTransfer();
@@ -62,7 +63,7 @@ async function until(what, is) {
   }
 }
 
-// What the terminal's program has started.
+// Returns the process that the terminal's program has started.
 function voxeldOf(pid) {
   if (readFileSync(`/proc/${pid}/comm`, "utf8") === "voxeld\n") return pid;
   const [child] = readFileSync(`/proc/${pid}/task/${pid}/children`, "utf8").trim().split(" ");
@@ -73,7 +74,8 @@ async function withDaemon(options, use) {
   const daemon = await Daemon.start([kCube], { terminal: true, ...options });
   try {
     await use(daemon);
-    process.kill(voxeldOf(daemon.process.pid), "SIGTERM"); // itself: its terminal would not wait until it has ended
+    process.kill(voxeldOf(daemon.process.pid), "SIGTERM"); // the daemon: its terminal would not
+                                                           // wait for its exit
     await daemon.ended;
   } finally {
     await daemon.stop();
@@ -115,7 +117,7 @@ describe("a file dropped on the page", { timeout: 6 * kPatience }, () => {
       await says(page, "not-played", "an STL begins with");
       assert.match(await page.textContent("#not-played"), /^Not played: _img src=x onerror=broken=1_\.stl: is text that begins with/);
       assert.equal(await page.evaluate(() => globalThis.broken), undefined);
-      await page.click("#toggle"); // the panel is away
+      await page.click("#toggle"); // hides the panel
       await drop(page, ["../../what.docx", "PK"]);
       await says(page, "said", "Not played: what.docx: files of type .docx are not read");
       await page.click("#toggle");

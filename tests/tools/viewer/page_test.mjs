@@ -1,5 +1,6 @@
-// The page in a browser: Debian's Chromium without a screen. What it draws is held against a camera worked out here, and
-// picture elements are counted one by one. NODE_MODULES is where playwright-core and the others are.
+// Tests the page in a browser: Debian's Chromium without a screen. Its drawing is compared with a
+// camera computed here, and screen pixels are counted one by one. NODE_MODULES is where
+// playwright-core and the others are.
 import assert from "node:assert/strict";
 import { createRequire } from "node:module";
 import { request } from "node:http";
@@ -23,7 +24,8 @@ async function launch(more = []) {
   return chromium.launch({ executablePath: "/usr/bin/chromium", args: ["--no-sandbox", ...more], timeout: kPatience });
 }
 
-// A page that has drawn the first display, and what it was up to meanwhile.
+// Opens a page and waits until it has drawn the first display. Returns it, with the errors and
+// requests that it records.
 async function open(address, { width = 800, height = 600, panel = false, browserOf = browser, ...more } = {}) {
   const context = await browserOf.newContext({ viewport: { width, height }, deviceScaleFactor: 1, ...more });
   const page = await context.newPage();
@@ -48,7 +50,7 @@ async function drawnPoints(page, points) {
   await page.waitForFunction((wanted) => globalThis.voxeld.inspect().drawn.points === wanted, points);
 }
 
-// The canvas of a display, without what lies over it.
+// Returns the canvas of a display, without what is above it.
 async function picture(page, index = 0) {
   await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
   await page.evaluate(() => document.querySelectorAll(".overlay, .label").forEach((over) => (over.style.visibility = "hidden")));
@@ -57,7 +59,8 @@ async function picture(page, index = 0) {
   return PNG.sync.read(shot);
 }
 
-// The first picture of a display for which `good` holds. Views that appear are not drawn in the same frame as their volumes come.
+// Returns the first picture of a display for which `good` holds. Views that appear are not drawn in
+// the same frame in which their volumes arrive.
 async function pictureWith(page, index, good) {
   for (let turn = 0; turn < 50; ++turn) {
     const image = await picture(page, index);
@@ -68,7 +71,7 @@ async function pictureWith(page, index, good) {
 
 const at = (image, x, y) => [...image.data.subarray((y * image.width + x) * 4, (y * image.width + x) * 4 + 3)];
 
-// Places that are not the page's ground, as a box.
+// Returns the bounding box of the places that differ from the page's background.
 function lit(image, of = () => true) {
   let box = null;
   let count = 0;
@@ -83,8 +86,9 @@ function lit(image, of = () => true) {
   return { box, count };
 }
 
-// A pinhole of 30 degrees, in front (towards −y) and level, 1.08 of the distance from which the lights' sphere just fits. `at`
-// and the sphere in millimetres about the middle; `pitch` of the display's pixels.
+// A pinhole camera of 30 degrees, in front (towards −y) and level, at 1.08 of the distance at which
+// the sphere of the lights just fits. `at` and the sphere are in millimetres around the middle;
+// `pitch` is that of the display's pixels.
 function expectedSquare(where, [x, y, z], radius, pitch) {
   const half = Math.min(where.width, where.height) / 2;
   const focal = half / Math.tan(Math.PI / 12);
@@ -124,7 +128,7 @@ describe("the page", { timeout: 5 * kPatience }, () => {
     assert.equal((await inspect(page)).renderer, "2D");
     await drawnPoints(page, 2);
     const image = await picture(page);
-    const middle = (place) => place.map((v) => v - 8); // of a grid of 16 cells of 1 mm
+    const middle = (place) => place.map((v) => v - 8); // in a grid of 16 cells of 1 mm
     const radius = Math.hypot(7.5, 7.5, 7.5); // lights are in the middle of cells
     for (const [place, color] of [[[3.5, 8.5, 12.5], [1, 1, 1]], [[12.5, 8.5, 2.5], [1, 0x80 / 255, 0]]]) {
       const wanted = expectedSquare(image, middle(place), radius, 1);
@@ -249,12 +253,14 @@ describe("the page", { timeout: 5 * kPatience }, () => {
     const labels = await page.locator(".view .label").allTextContents();
     assert.deepEqual(labels.map((label) => label.replace(/\d+/, "N")), ["cube as shown", "as sent, of volume N", "difference: blue is missing, orange too much, of volume N"]);
     assert.match(await page.textContent("#compared"), /of 66 voxels sent 0 have no light near \(0.0 %\); of 66 lit pixels 0 have no voxel near, and 0 differ/);
-    // The same from the same place: here pixels are voxels. A third of the page is no whole number of picture elements.
+    // The same from the same viewpoint: here pixels are voxels. A third of the page is not a whole
+    // number of screen pixels.
     const [shown, sent] = [lit(await picture(page, 0)), lit(await picture(page, 1))];
     sent.box.forEach((edge, i) => assert.ok(Math.abs(edge - shown.box[i]) <= 1, `${sent.box} and ${shown.box}`));
     assert.ok(shown.count > 1000 && Math.abs(sent.count - shown.count) < shown.count * 0.05, `${sent.count} and ${shown.count}`);
 
-    // A scene that moves on is compared anew; a layer that is not wanted is left out of what was sent, and its light is stray then.
+    // A scene that changes is compared again; an unselected layer is left out of what was sent, and
+    // its light is then stray.
     await daemon.voxelctl("clear");
     await daemon.python("other", 'v.layer("next").box("box", size=(2, 2, 2), center=(8, 8, 8), fill="solid", color="white")');
     await compared("sent", 8);
@@ -268,7 +274,7 @@ describe("the page", { timeout: 5 * kPatience }, () => {
     await daemon.voxelctl("clear", "--layer", "next");
     await daemon.voxelctl("draw", "sphere radius=4 at=8,8,8 color=lime");
 
-    // Another display is chosen while one is compared: that one's answer holds nobody up.
+    // Another display is selected while one is compared: the answer for that one delays nothing.
     await page.evaluate(() => document.getElementById("compare").click());
     await page.evaluate(() => document.getElementById("compare").click());
     await page.selectOption("#display", "rotor");
@@ -276,7 +282,7 @@ describe("the page", { timeout: 5 * kPatience }, () => {
     await page.selectOption("#display", "rotor");
     await page.waitForFunction(() => globalThis.voxeld.inspect().compared.sent?.points > 0);
 
-    // Of several displays each is told how far off it is.
+    // With several displays, each is labelled with how far off it is.
     await page.selectOption("#display", "");
     await page.waitForFunction(() => [...document.querySelectorAll(".view .label")].every((label) => /: missing 0.0 %, stray \S+ %, off \S+ %$/.test(label.textContent)));
     assert.equal(await page.locator(".view").count(), 2);
