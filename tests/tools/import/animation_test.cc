@@ -1,4 +1,5 @@
-// What assimp reads beside the formats with checks of their own, in a process of its own, and what moves.
+// Tests the formats that assimp reads without checks of our own, in a process of its own, and
+// animations.
 #include "tools/voxelctl/import/import_program.h"
 
 #include <gmock/gmock.h>
@@ -52,7 +53,7 @@ TEST_P(MoreMeshes, AreReadWhole) {
   EXPECT_EQ(indices, GetParam().indices);
 }
 
-// 56 of the FBX spider's 1368 triangles have no area, and one of the house.
+// 56 of the FBX spider's 1368 triangles have no area, and one of the house's.
 INSTANTIATE_TEST_SUITE_P(
     Table, MoreMeshes,
     testing::Values(Real{"OFF/Wuson.off", "OFF", 11196}, Real{"FBX/spider.fbx", "FBX", 3936},
@@ -76,7 +77,8 @@ TEST(MoreMeshes, ThatAreWrong) {
   EXPECT_THAT(error("a.bvh", "hello"), HasSubstr("\"HIERARCHY\" is expected"));
   EXPECT_THAT(error("a.off", "OFF\n99999999 99999999 0\n1 2 3\n"),
               HasSubstr("declares 99999999 vertices and 99999999 faces but has only 30 bytes"));
-  // However the header is written: with comments, a dimension, glued to the count, larger than 64 bits, or with letters after the digits.
+  // However the header is written: with comments, a dimension, joined to the count, larger than 64
+  // bits, or with letters after the digits.
   for (const char* text :
        {"COFF # 1 2\n# 1 1\n 1\r\n18446744073709551615 0\n1 2 3\n", "nOFF\n3\n1 99999999 0\n",
         "STCN4nOFF 3 99999999 1 0\n", "OFF99999999 1 1\n", "OFF\n18446744073809551615 1 0\n",
@@ -113,7 +115,7 @@ TEST(MoreMeshes, DamagedOnesEndWell) {
   }
 }
 
-// ----------------------------------------------------------------------------------- what moves
+// ----------------------------------------------------------------------------------- animations
 
 TEST(Animations, OfASkeletonAlone) {
   const auto frames = OpenAnimation(ModelFile("BVH/01_01.bvh"), 1, 20);
@@ -128,7 +130,7 @@ TEST(Animations, OfASkeletonAlone) {
   EXPECT_EQ(a.thickness, b.thickness);
   ASSERT_EQ(a.positions.size(), b.positions.size());
   EXPECT_NE(a.positions, b.positions);
-  // Bones turn and do not stretch.
+  // Bones rotate, but do not stretch.
   for (size_t i = 2; i + 1 < a.positions.size(); i += 2) {
     const auto length = [i](const Part& part) {
       const Point3 &p = part.positions[i], &q = part.positions[i + 1];
@@ -138,7 +140,8 @@ TEST(Animations, OfASkeletonAlone) {
   }
 }
 
-// A root that moves, a joint, and an end, 4 apart; `order` are the channels of turns of both, `frames` their numbers, 0.05 s each.
+// A root that moves, a joint, and an end, 4 apart; `order` has the channels of the rotations of
+// both, `frames` their numbers, 0.05 s each.
 std::string Bvh(const std::string& order, const std::vector<std::string>& frames) {
   std::string text = absl::StrCat(
       "HIERARCHY\nROOT hips\n{\n\tOFFSET 0 0 0\n\tCHANNELS 6 Xposition Yposition Zposition ", order,
@@ -149,7 +152,7 @@ std::string Bvh(const std::string& order, const std::vector<std::string>& frames
   return text;
 }
 
-// Where the joint and the end are in each frame of a file, at so many frames a second.
+// Returns where the joint and the end are in each frame of a file, at that many frames a second.
 std::vector<std::pair<Point3, Point3>> Poses(const std::string& bytes, double fps) {
   TempFolder folder;
   const auto frames = OpenAnimation(folder.Write("a.bvh", bytes), 1, fps);
@@ -173,7 +176,7 @@ MATCHER_P2(AreNear, joint, end, "") {
   return apart(arg.first, joint) < 1e-4 && apart(arg.second, end) < 1e-4;
 }
 
-// A frame lasts as long as the file says, the last one too.
+// A frame lasts as long as the file says, including the last one.
 TEST(Animations, OfASkeletonShowEveryFrame) {
   const auto upright = AreNear(Point3{0, 4, 0}, Point3{0, 8, 0}),
              lying = AreNear(Point3{-4, 0, 0}, Point3{-8, 0, 0}),
@@ -192,17 +195,17 @@ TEST(Animations, OfASkeletonShowEveryFrame) {
   EXPECT_THAT(Poses(Bvh(zxy, {"1 2 3 0 0 0 0 0 0"}), 20), ElementsAre(far));
 }
 
-// Turns are applied from the last channel to the first, about the axes of what is above.
+// Rotations are applied from the last channel to the first, about the axes of the parent.
 TEST(Animations, OfASkeletonTurnInTheOrderOfItsChannels) {
   const auto second = [](const std::string& order, const std::string& turns) {
     const auto poses = Poses(Bvh(order, {"0 0 0 0 0 0 0 0 0", turns}), 20);
     EXPECT_EQ(poses.size(), 2u);
     return poses.empty() ? std::pair<Point3, Point3>() : poses.back();
   };
-  // About x first: y becomes z, which a turn about z leaves where it is.
+  // About x first: y becomes z, which a rotation about z does not move.
   EXPECT_THAT(second("Zrotation Xrotation Yrotation", "1 2 3 90 90 0 0 0 0"),
               AreNear(Point3{1, 2, 7}, Point3{1, 2, 11}));
-  // About z first: y becomes -x, which a turn about x leaves where it is.
+  // About z first: y becomes -x, which a rotation about x does not move.
   EXPECT_THAT(second("Xrotation Yrotation Zrotation", "1 2 3 90 0 90 0 0 0"),
               AreNear(Point3{-3, 2, 3}, Point3{-7, 2, 3}));
   EXPECT_THAT(second("Yrotation Xrotation Zrotation", "0 0 0 90 90 0 0 0 0"),

@@ -1,4 +1,4 @@
-// Formats that assimp reads: colours, textures, what it passes over, and single precision.
+// Tests formats that assimp reads: colours, textures, what it skips, and single precision.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -42,7 +42,8 @@ class AssimpFormats : public testing::Test {
 
 // ---------------------------------------------------------------------------------------- COLLADA, FBX
 
-// A quad; `effect` is what stands in <lambert>, `images` an image library, `extra` another source of the mesh.
+// A quad; `effect` is the content of <lambert>, `images` an image library, `extra` another source
+// of the mesh.
 std::string Dae(const std::string& effect, const std::string& positions, bool textured = false) {
   return absl::StrCat(
       "<?xml version='1.0'?><COLLADA xmlns='http://www.collada.org/2005/11/COLLADASchema' "
@@ -104,7 +105,7 @@ TEST_F(AssimpFormats, ColladaTexturesStandInPlaceOfColours) {
   const Part& part = model.parts[0];
   EXPECT_EQ(part.picture, 0u);
   EXPECT_EQ(part.colors[0], (Rgb{255, 255, 255}));
-  // v goes up in COLLADA: the lower left corner is (0, 1) on the picture.
+  // v increases upwards in COLLADA: the lower left corner is (0, 1) on the picture.
   for (size_t v = 0; v < part.positions.size(); ++v) {
     EXPECT_FLOAT_EQ(part.texture_coordinates[v][0], static_cast<float>(part.positions[v].x));
     EXPECT_FLOAT_EQ(part.texture_coordinates[v][1],
@@ -116,7 +117,7 @@ TEST_F(AssimpFormats, ColladaTexturesStandInPlaceOfColours) {
 }
 
 TEST_F(AssimpFormats, SinglePrecisionIsReportedBeyondHalfAVoxel) {
-  // 16777216 is 2²⁴: halves are lost there. The model is 4 high, half a voxel of 256 is 1/128.
+  // 16777216 is 2²⁴: halves are lost there. The model is 4 high; half a voxel of 256 is 1/128.
   const Model far = Good("a.dae", Dae("", "9000000 0 0 9000001 0 0 9000001 4 0 9000000 4 0"));
   EXPECT_THAT(far.note, HasSubstr("single precision"));
   EXPECT_THAT(Good("a.dae", Dae("", kQuad)).note, IsEmpty());
@@ -127,7 +128,8 @@ TEST_F(AssimpFormats, SinglePrecisionIsReportedBeyondHalfAVoxel) {
       HasSubstr("single precision"));
 }
 
-// Three corners 1, 2 and 3 from a fourth, along x, y and z: where each of them lies in the display (x right, -y front, z up).
+// Three corners at distances 1, 2 and 3 from a fourth, along x, y and z: the direction of each of
+// them in the display (x right, -y front, z up).
 struct Axes {
   Point3 x, y, z;
 };
@@ -135,7 +137,7 @@ constexpr char kArrow[] = "0 0 0 1 0 0 0 2 0 0 0 3";
 
 Axes AxesInTheDisplay(Model model) {
   PlaceModels({&model, 1}, DisplaySpace(), {});
-  // The corner that is nearest to the three others together, and those by how far from it they are.
+  // The corner that is nearest to the other three together, and those by their distance from it.
   std::vector<Point3> corners;
   for (const Part& part : model.parts) {
     for (const Point3& p : part.positions) {
@@ -276,7 +278,7 @@ TEST_F(AssimpFormats, FbxTextures) {
   EXPECT_EQ(model.parts[0].texture_coordinates.size(), model.parts[0].positions.size());
 }
 
-// The library shows what there is of them.
+// The library shows the part that exists.
 TEST_F(AssimpFormats, FilesThatEndTooEarlyAreSaidToDo) {
   const std::string faces =
       "0\nSECTION\n2\nENTITIES\n0\n3DFACE\n8\n0\n10\n0\n20\n0\n30\n0\n11\n1\n21\n0\n"
@@ -289,7 +291,7 @@ TEST_F(AssimpFormats, FilesThatEndTooEarlyAreSaidToDo) {
               HasSubstr("it ends without END-ISO-10303-21"));
 }
 
-// The library takes a corner that is missing for the first one.
+// The library replaces a missing corner by the first one.
 TEST_F(AssimpFormats, FacesOfOffThatAreCutOff) {
   const std::string off = "OFF\n# a comment\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n\n3 0 1 2\n";
   EXPECT_THAT(Good("a.off", off + "3 0 2 3 1 0 0").parts, testing::SizeIs(1));
@@ -300,7 +302,7 @@ TEST_F(AssimpFormats, FacesOfOffThatAreCutOff) {
   }
 }
 
-// The library follows a reference to what is missing to address 0.
+// The library follows a reference to a missing object to address 0.
 TEST_F(AssimpFormats, IfcThatRefersToWhatIsMissing) {
   const auto error = [this](const std::string& data) {
     const std::string text =
@@ -310,12 +312,12 @@ TEST_F(AssimpFormats, IfcThatRefersToWhatIsMissing) {
   };
   EXPECT_THAT(error("#1=IFCPROJECT(#2);"), HasSubstr("refers to #2, which it does not define"));
   EXPECT_THAT(error("#1 = IFCPROJECT(#12);\n#2=IFCX(#1);"), HasSubstr("refers to #12"));
-  // Texts and comments refer to nothing.
+  // Texts and comments are not references.
   EXPECT_THAT(error("#1=IFCPROJECT('#7','it''s #8'); /* #9 */"),
               testing::Not(HasSubstr("refers to")));
 }
 
-// It looks at what a file holds; its own readers of these formats crash where ours do not.
+// It examines the contents of a file; its own readers of these formats crash where ours do not.
 TEST_F(AssimpFormats, FormatsOfOtherReadersUnderAnotherName) {
   const std::pair<const char*, const char*> files[] = {
       {"ply",
@@ -348,14 +350,14 @@ TEST_F(AssimpFormats, FbxSaysWhichAxisIsUp) {
   const auto property = [](const char* name, int value) {
     return absl::StrCat("\t\tP: \"", name, "\", \"int\", \"Integer\", \"\",", value, "\n");
   };
-  // As Maya and as 3ds Max write them.
+  // As written by Maya and by 3ds Max.
   ExpectAxes(axes(property("UpAxis", 1) + property("UpAxisSign", 1) + property("FrontAxis", 2) +
                   property("FrontAxisSign", 1)),
              {1, 0, 0}, {0, 0, 1}, {0, -1, 0}, "y");
   ExpectAxes(axes(property("UpAxis", 2) + property("UpAxisSign", 1) + property("FrontAxis", 1) +
                   property("FrontAxisSign", -1)),
              {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, "z");
-  // Half a turn about x brings an axis that points down up.
+  // Half a turn about x makes an axis that points down point up.
   ExpectAxes(axes(property("UpAxis", 1) + property("UpAxisSign", -1)), {1, 0, 0}, {0, 0, -1},
              {0, 1, 0}, "-y");
   ExpectAxes(axes(property("UpAxis", 2) + property("UpAxisSign", -1)), {1, 0, 0}, {0, -1, 0},
@@ -400,7 +402,7 @@ std::string Zip(const std::vector<std::pair<std::string, std::string>>& entries)
                       number(0, 2));
 }
 
-// A tetrahedron; `triangles` are the properties of each of its four.
+// A tetrahedron; `triangles` are the properties of each of its four triangles.
 std::string ThreeMf(const std::string& resources, const std::string& object,
                     const std::vector<std::string>& triangles, const std::string& more = "",
                     const std::string& item = "") {
@@ -482,13 +484,14 @@ TEST_F(AssimpFormats, ThreeMfTextureGroups) {
   const Part& part = model.parts[1];
   ASSERT_EQ(part.picture, 0u);
   const auto at = [&part](size_t corner) { return part.texture_coordinates[part.indices[corner]]; };
-  // v goes up in 3MF.
+  // v increases upwards in 3MF.
   EXPECT_EQ(at(0), (std::array<float, 2>{0, 1}));
   EXPECT_EQ(at(1), (std::array<float, 2>{1, 1}));
   EXPECT_EQ(at(2), (std::array<float, 2>{0, 0.25}));
 }
 
-// The core specification writes vectors as rows: a component's matrix is applied before that of its item.
+// The core specification writes vectors as rows: a component's matrix is applied before that of its
+// item.
 TEST_F(AssimpFormats, ThreeMfItemsAndComponents) {
   const Model model = Good(
       "a.3mf",
@@ -498,7 +501,7 @@ TEST_F(AssimpFormats, ThreeMfItemsAndComponents) {
           "0'/><component objectid='1' transform='3 0 0 0 3 0 0 0 3 20 0 0'/></components>"
           "</object><object id='3'><components><component objectid='2' transform='1 0 0 0 1 0 0 "
           "0 1 0 0 100'/></components></object>",
-          // x goes to y and y to -x, and then 7 up.
+          // x becomes y and y becomes -x, and then 7 up.
           "/><item objectid='2' transform='0 1 0 -1 0 0 0 0 1 0 0 7'/><item objectid='3'"));
   std::vector<std::string> boxes;
   for (const Part& part : model.parts) {
@@ -529,7 +532,7 @@ TEST_F(AssimpFormats, ThreeMfPlacesAndWhatIsNotShown) {
   }
   EXPECT_EQ(least, 10);
   EXPECT_EQ(most, 12);
-  // A mirror: the bottom is the top, and its normal points up.
+  // A mirror image: the bottom is the top, and its normal points up.
   EXPECT_THAT(model.parts[0].normals[model.parts[0].indices[0]].z, testing::DoubleNear(1, 1e-9));
   EXPECT_THAT(model.left_out, ElementsAre(LeftOut{"composite materials", 1}));
 }

@@ -1,4 +1,4 @@
-// Point clouds as text, PCD and LAS: every way to write them, and what is said of those that are broken.
+// Tests point clouds as text, PCD and LAS: every way to write them, and the errors for broken ones.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <liblzf/lzf.h>
@@ -106,7 +106,7 @@ TEST_F(Clouds, TextWhoseCommentNamesTheColumns) {
   EXPECT_EQ(part.normals.at(0), (Point3{0, 0, 1}));
   EXPECT_THAT(Points("a.csv", "# made by hand\n# b,g,r,z,y,x\n1,2,3,6,5,4\n").positions,
               ElementsAre(Point3{4, 5, 6}));
-  // A comment that names something else, or not every column, says nothing.
+  // A comment that names other columns, or not every column, is ignored.
   EXPECT_THAT(Points("a.txt", "# x y and z\n0 0 0 10 20 30\n").colors,
               ElementsAre(Rgb{10, 20, 30}));
   EXPECT_THAT(Points("a.txt", "# x y z\n0 0 0 10 20 30\n").colors, ElementsAre(Rgb{10, 20, 30}));
@@ -156,7 +156,7 @@ TEST_F(Clouds, PcdInItsThreeWays) {
   columns.resize(40);
   std::string squeezed(100, '\0');
   const unsigned size = lzf_compress(columns.data(), 40, squeezed.data(), 100);
-  // Forty bytes may not become fewer: as one literal run of 32 and one of 8.
+  // Forty bytes cannot be compressed to fewer: as one literal run of 32 and one of 8.
   if (size == 0) {
     squeezed = absl::StrCat(std::string(1, 31), columns.substr(0, 32), std::string(1, 7),
                             columns.substr(32));
@@ -226,7 +226,8 @@ TEST_F(Clouds, PcdColoursByTheirGreatestValue) {
               ElementsAre(Rgb{255, 128, 1}));
 }
 
-// Padding that PCL calls "_", of one byte and of many, at every place in a point and in every way to write the data.
+// Padding that PCL calls "_", of one byte and of many, at every place in a point and in every way
+// to write the data.
 TEST_F(Clouds, PcdPaddingIsPassedOver) {
   const std::vector<Point3> positions = {{1, 2, 3}, {4, 5, 6}};
   const std::vector<Rgb> colors = {{255, 0, 0}, {0, 128, 255}};
@@ -259,7 +260,7 @@ TEST_F(Clouds, PcdPaddingIsPassedOver) {
   for (const auto& field : fields) columns += field[0] + field[1];
   expect(head + "binary\n" + rows);
   ASSERT_EQ(columns.size(), 70u);
-  // Runs of at most 32 bytes that stand as they are.
+  // Uncompressed runs of at most 32 bytes.
   const std::string packed =
       absl::StrCat(std::string(1, 31), columns.substr(0, 32), std::string(1, 31),
                    columns.substr(32, 32), std::string(1, 5), columns.substr(64));
@@ -289,7 +290,7 @@ TEST_F(Clouds, PcdPointsThatAreNowhereAreLeftOut) {
   EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"points that are not finite", 1}}));
 }
 
-// The attributes of a file that is read for them, as "NAME: NUMBERS" each.
+// Returns the attributes with which a file is read, as "NAME: NUMBERS" each.
 std::vector<std::string> AttributesOf(const std::string& path) {
   const absl::StatusOr<Model> model = ReadHere(path, {.attributes = true});
   EXPECT_THAT(model, IsOk());
@@ -347,7 +348,7 @@ TEST_F(Clouds, PropertiesOfPlyAreAttributes) {
   EXPECT_EQ(cloud->parts[0].attributes[1], (Attribute{"red", {1, 2, 4}})) << "there is no green";
   EXPECT_EQ(cloud->left_out, (std::vector<LeftOut>{{"points that are not a number", 1},
                                                    {"other properties of vertices", 1}}));
-  // Two vertices at one place have different numbers.
+  // Two vertices at one place have different values.
   const auto mesh = ReadHere(
       folder_.Write(
           "b.ply",
@@ -405,7 +406,7 @@ struct LasPoint {
   uint16_t rgb[3];
 };
 
-// The public header block and records, as the specification numbers their bytes.
+// Returns the public header block and records, with offsets as in the specification.
 std::string Las(uint8_t minor, uint8_t format, uint16_t record, size_t color,
                 const std::vector<LasPoint>& points) {
   const size_t header = minor >= 4 ? 375 : 227;
@@ -460,7 +461,8 @@ TEST_F(Clouds, LasInEveryPointFormat) {
   }
 }
 
-// Whether colours have 8 or 16 bits is a question of the whole file: a dark point of 16 bits stays dark.
+// Whether colours have 8 or 16 bits is decided for the whole file: a dark point of 16 bits stays
+// dark.
 TEST_F(Clouds, LasColoursHaveTheBitsOfTheBrightest) {
   const auto colors = [&](std::vector<LasPoint> points) {
     return Points("a.las", Las(2, 2, 26, 20, points)).colors;
@@ -512,7 +514,8 @@ TEST_F(Clouds, LasThatIsWrong) {
   EXPECT_THAT(Error("a.las", bad), HasSubstr("has scale 0"));
 }
 
-// Whatever a byte of it becomes: an error, or points; never more than the file has room for.
+// For any value of a byte, the result is an error, or points; never more than the file has room
+// for.
 TEST_F(Clouds, DamagedOnesEndWell) {
   const std::string files[] = {
       PcdHeader("2", "binary") + PcdPoint(1, 2, 3, 4) + PcdPoint(5, 6, 7, 8),
@@ -536,8 +539,9 @@ TEST_F(Clouds, DamagedOnesEndWell) {
 }
 
 TEST_F(Clouds, FieldsOfLasAreAttributes) {
-  // LAS 1.4, tables 7 and 10: of formats before 6 bits 0 to 2 of byte 14 are the return and bits 0 to 4 of byte 15 the class, the source is
-  // at 18; from 6 on bits 0 to 3, byte 16, and 20.
+  // LAS 1.4, tables 7 and 10: in formats before 6, bits 0 to 2 of byte 14 are the return and bits 0
+  // to 4 of byte 15 the class, and the source is at 18; from 6 on, they are bits 0 to 3, byte 16,
+  // and 20.
   std::string before = Las(2, 0, 20, 0, {{0, 0, 0, 77, 0, {}}});
   before[227 + 14] = '\x0a';  // the second of one
   before[227 + 15] = '\x46';  // class 6, key point
@@ -639,7 +643,7 @@ TEST_F(Clouds, DescriptorsOfLasThatAreWrong) {
   EXPECT_THAT(ReadHere(folder_.Write("a.las", far), {.attributes = true}), IsOk());
 }
 
-// The first byte of a wave packet is the number of its descriptor; 0: there is none.
+// The first byte of a wave packet is the number of its descriptor; 0: no descriptor.
 TEST_F(Clouds, WaveformsOfLasAreCounted) {
   for (const auto& [format, record, at] : {std::array{4, 57, 28}, std::array{5, 63, 34},
                                            std::array{9, 59, 30}, std::array{10, 67, 38}}) {
@@ -652,7 +656,7 @@ TEST_F(Clouds, WaveformsOfLasAreCounted) {
   }
 }
 
-// Single precision would take the first two of these times for one.
+// Single precision could not distinguish the first two of these times.
 TEST_F(Clouds, TimesKeepTheirPrecision) {
   const auto model =
       ReadHere(folder_.Write("a.csv", "x,y,z,time\n0,0,0,1764500000\n1,0,0,1764500001\n"),
@@ -676,7 +680,7 @@ TEST_F(Clouds, LinesEndAsEverySystemEndsThem) {
               HasSubstr("is UTF-16 text; UTF-8 is expected"));
 }
 
-// Whatever a table writes for a number that is missing.
+// Every way in which a table writes a missing number.
 TEST_F(Clouds, PointsWhoseNumbersAreMissing) {
   for (const std::string none : {"", "nan", "NaN", "NA", "n/a", "null", "None", "-"}) {
     const auto model = ReadHere(
@@ -692,12 +696,12 @@ TEST_F(Clouds, PointsWhoseNumbersAreMissing) {
                               {"colours and intensities that are not a number (shown white)", 1}}))
         << none;
   }
-  // They are no part of the range of intensities either.
+  // Nor are they part of the range of intensities.
   const auto grey = ReadHere(folder_.Write("a.csv", "x,y,z,i\n1,2,3,10\n1,2,4,nan\n1,2,5,20\n"));
   ASSERT_THAT(grey, IsOk());
   EXPECT_THAT(grey->parts.at(0).colors,
               ElementsAre(Rgb{0, 0, 0}, Rgb{255, 255, 255}, Rgb{255, 255, 255}));
-  // A first line of them does not name columns.
+  // If they are in the first line, it does not name columns.
   EXPECT_THAT(Points("a.xyz", "nan nan nan\n1 2 3\n").positions, ElementsAre(Point3{1, 2, 3}));
   EXPECT_THAT(Error("a.csv", "x,y,z\nNA,NA,NA\n"),
               HasSubstr("no point whose x, y and z are numbers"));

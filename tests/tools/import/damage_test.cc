@@ -1,5 +1,5 @@
-// Every importer on files that are cut off, damaged, or of another kind than their names say: it ends, with a model or with a
-// message that names the file, and with little memory.
+// Tests every importer with files that are truncated, damaged, or of another kind than their names
+// say: it ends, with a model or with a message that names the file, and with little memory.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -24,8 +24,9 @@
 #include "tests/tools/voxelctl/status_matchers.h"
 #include "tools/voxelctl/import/frames.h"
 
-// assimp does not free all of what it made of a file that it then refuses, nor libxml2 all texts of entities of damaged drawings;
-// fontconfig keeps its configuration. A reader ends after its file. LeakSanitizer asks this.
+// assimp does not free everything that it made of a file that it then refuses, nor libxml2 all
+// texts of entities of damaged drawings; fontconfig keeps its configuration. A reader process ends
+// after its file. LeakSanitizer calls this.
 extern "C" const char* __lsan_default_suppressions();  // NOLINT: its name
 extern "C" const char* __lsan_default_suppressions() {
   return "leak:libassimp\nleak:libfontconfig\nleak:FcConfigCreate\nleak:xmlParseEntityValue\n";
@@ -35,19 +36,19 @@ namespace voxeld::voxelctl {
 namespace damage_test {
 
 struct Sample {
-  std::string name;    // the file's, with the extension that decides who reads it
-  std::string bytes;   // a file that is read
+  std::string name;    // the file's name, with the extension that selects the reader
+  std::string bytes;   // a valid file
   bool apart = false;  // in a process of its own, which takes time
-  // A file that stands beside it, whole.
+  // A file beside it, which is not damaged.
   std::string beside, beside_bytes;
-  size_t tries = 200;  // how often it is damaged
+  size_t tries = 200;  // how many damaged copies are read
 };
 
 Sample Apart(const std::string& name, const std::string& bytes, size_t tries = 30) {
   return {.name = name, .bytes = bytes, .apart = true, .tries = tries};
 }
 
-// AddressSanitizer keeps memory that was freed for a while.
+// AddressSanitizer keeps freed memory for a while.
 #if defined(__SANITIZE_ADDRESS__)
 constexpr double kLittleMegabytes = 300;
 #elif defined(__has_feature)
@@ -173,7 +174,7 @@ std::string Nifti2() {
   return out + std::string(24, 'c');
 }
 
-// The bones of a real one, and as many moments as are asked for.
+// The bones of a real file, and as many moments as requested.
 std::string Bvh(int moments) {
   const std::string real = Real(std::string(VOXELD_MODELS_DIR) + "/BVH/01_01.bvh");
   const size_t motion = real.find("Frames:"), lines = real.find('\n', real.find("Frame Time:")) + 1;
@@ -281,7 +282,7 @@ std::vector<Sample> Samples() {
 
 class Damage : public testing::Test {
  protected:
-  // `beside`: what stands beside it may be what is said to be wrong.
+  // `beside`: the error may be in the file beside it.
   absl::StatusOr<Model> Import(const std::string& name, const std::string& bytes,
                                const std::string& beside = "") {
     const auto model = ReadHere(folder_.Write(name, bytes), {.raw = RawLayout{.size = {2, 2, 2}}});
@@ -295,7 +296,7 @@ class Damage : public testing::Test {
     return model;
   }
 
-  // The samples, with what stands beside them.
+  // Returns the samples, and writes the files beside them.
   std::vector<Sample> Prepared() {
     std::vector<Sample> samples = Samples();
     for (const Sample& sample : samples) {
@@ -331,7 +332,7 @@ TEST_F(Damage, CutOffAnywhere) {
 // Imports randomly damaged copies of every sample; makes 1/`divisor` of the sample's usual number of attempts.
 void Damage::OtherBytes(uint32_t seed, size_t divisor) {
   std::mt19937 random(seed);
-  // Numbers that are on the edge of something, and any.
+  // Numbers that are at a limit, and random ones.
   const auto byte = [&random] {
     static constexpr uint8_t kEdges[] = {0, 1, 0x7f, 0x80, 0xff, '-', '9'};
     const uint32_t draw = random();
@@ -339,7 +340,7 @@ void Damage::OtherBytes(uint32_t seed, size_t divisor) {
   };
   for (const Sample& sample : Prepared()) {
     SCOPED_TRACE(sample.name);
-    // Most of what may go wrong is in the beginning.
+    // Most errors are possible in the beginning.
     const size_t head = std::min<size_t>(sample.bytes.size(), 2048);
     for (size_t i = 0; i < (sample.tries + divisor - 1) / divisor; ++i) {
       std::string bytes = sample.bytes;
@@ -354,7 +355,7 @@ TEST_F(Damage, BytesThatAreOthers) { OtherBytes(18, 10); }
 
 TEST_F(Damage, ChangedBytesAllAttempts) { OtherBytes(17, 1); }
 
-// A slice of three is damaged, or a picture of three that follow one another.
+// One of three slices is damaged, or one of three consecutive pictures.
 TEST_F(Damage, FoldersAndSequences) {
   const std::string slices = absl::StrCat(kDicoms, "dicomdirtests/98892001/CT5N/");
   std::vector<std::string> good;
@@ -427,7 +428,8 @@ TEST_F(Damage, OfAnotherKind) { OtherKinds(7); }
 
 TEST_F(Damage, WrongExtensionsAllPairs) { OtherKinds(1); }
 
-// How much more memory a process has at its height that does this than one that does nothing; MiB.
+// Returns how much more memory, in MiB, a process that does this has at its peak than one that does
+// nothing.
 double MegabytesOf(const std::function<void()>& work) {
   const auto height = [](const std::function<void()>& done) {
     const pid_t child = ::fork();
@@ -445,7 +447,7 @@ double MegabytesOf(const std::function<void()>& work) {
   return height(work) - nothing;
 }
 
-// What says that it is huge, or becomes huge, and is not.
+// Files that claim to be huge, or expand to something huge, but are not.
 TEST_F(Damage, HugeOnesTakeLittleMemory) {
   const auto set16 = [](std::string bytes, size_t at, int16_t value) {
     Put<int16_t>(&bytes, at, value);
@@ -499,7 +501,7 @@ TEST_F(Damage, HugeOnesTakeLittleMemory) {
       {"b.gltf",
        gltf("\"sparse\":{\"count\":1,\"indices\":{\"bufferView\":0,\"componentType\":5125},"
             "\"values\":{\"bufferView\":0}},")},
-      // Far from each other, where atoms that touch are looked for.
+      // Far from each other, where touching atoms are searched for.
       {"a.pdb",
        "ATOM      1  N   ALA A   1    -999.999-999.999-999.999  1.00  0.00           N\n"
        "ATOM      2  CA  ALA A   1    9999.9999999.9999999.999  1.00  0.00           C\nEND\n"},

@@ -1,4 +1,5 @@
-// Nests each recursive construct of each format deeper and deeper: the file is read, or refused with a message, on a small stack.
+// Nests each recursive construct of each format deeper and deeper: the file is read, or refused
+// with a message, on a small stack.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

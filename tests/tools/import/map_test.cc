@@ -1,4 +1,4 @@
-// Shapefiles, GPX and KML, flat and on the globe.
+// Tests shapefiles, GPX and KML, flat and on the globe.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -33,8 +33,9 @@ std::string Little(T value) {
 }
 std::string Big(uint32_t value) { return Little(__builtin_bswap32(value)); }
 
-// A file by ESRI's Shapefile Technical Description (1998): a header of 100 bytes with the length in words of 16 bits, the shape type and
-// eight bounds, then records: number and length (big-endian), type and contents (little-endian).
+// Returns a file according to ESRI's Shapefile Technical Description (1998): a header of 100 bytes
+// with the length in words of 16 bits, the shape type and eight bounds, then records: number and
+// length (big-endian), type and contents (little-endian).
 std::string Shapefile(uint32_t type, const std::vector<std::string>& shapes) {
   std::string records;
   for (size_t i = 0; i < shapes.size(); ++i) {
@@ -50,7 +51,8 @@ std::string Shapefile(uint32_t type, const std::vector<std::string>& shapes) {
 
 using Line = std::vector<std::array<double, 2>>;
 
-// The contents of a record: 3 a line, 5 an area; bounds, numbers of parts and points, where parts begin, points.
+// Returns the contents of a record: type 3 is a line, 5 an area; bounds, numbers of parts and
+// points, where parts begin, points.
 std::string Shape(uint32_t type, const std::vector<Line>& parts) {
   std::string begins, points;
   uint32_t count = 0;
@@ -93,7 +95,7 @@ std::string Dbf(const std::vector<Field>& fields, const std::vector<std::string>
   return out + "\x1a";
 }
 
-// UTM zone 33N as ESRI writes it.
+// UTM zone 33N as written by ESRI.
 constexpr char kUtm[] =
     R"(PROJCS["WGS_1984_UTM_Zone_33N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",)"
     R"(SPHEROID["WGS_1984",6378137.0,298.257223563]],PRIMEM["Greenwich",0.0],)"
@@ -179,7 +181,8 @@ TEST_F(Maps, FilesBesideWithOtherSpellingAndForbiddenOnes) {
   EXPECT_TRUE(model->parts.at(0).attributes.empty());
 }
 
-// At the equator, 500,000 m east in zone 33 is longitude 15; the other place was worked out with the series of Krüger (to n³) for 52° N, 16° E.
+// At the equator, 500,000 m east in zone 33 is longitude 15; the other place was computed with the
+// series of Krüger (to n³) for 52° N, 16° E.
 TEST_F(Maps, ProjectedCoordinatesGoOnTheGlobe) {
   const std::string shape =
       Shapefile(1, {PointShape(500000, 0), PointShape(568649.705, 5761510.317)});
@@ -196,11 +199,11 @@ TEST_F(Maps, ProjectedCoordinatesGoOnTheGlobe) {
   EXPECT_NEAR(at[0].y, on_sphere(15, 0).y, 1e-9);
   EXPECT_NEAR(at[1].x, on_sphere(16, 52).x, 1e-6);
   EXPECT_NEAR(at[1].z, on_sphere(16, 52).z, 1e-6);
-  // A flat map is in metres, so that a town keeps its shape.
+  // A flat map is in metres, so that a town keeps its proportions.
   model = Import("a.shp", shape);
   ASSERT_THAT(model, IsOk());
   EXPECT_EQ(model->parts.at(0).positions[0], (Point3{500000, 0, 0}));
-  // Without a .prj nobody knows what the metres are.
+  // Without a .prj, the meaning of the metres is unknown.
   EXPECT_THAT(Error("b.shp", shape, true), HasSubstr("the map is projected"));
   folder_.Write("c.prj", R"(LOCAL_CS["a ship's grid",UNIT["Meter",1.0]])");
   EXPECT_THAT(Error("c.shp", shape, true),
@@ -355,7 +358,7 @@ TEST_F(Maps, ThatAreWrong) {
 }
 
 TEST_F(Maps, TheEnvironmentAndOtherDriversDoNotMatter) {
-  // Other formats that GDAL knows are not read, whatever their names say.
+  // Other formats that GDAL supports are not read, whatever their names say.
   EXPECT_THAT(Error("a.kml",
                     "<OGRVRTDataSource><OGRVRTLayer name='a'><SrcDataSource>/etc/passwd"
                     "</SrcDataSource></OGRVRTLayer></OGRVRTDataSource>"),

@@ -1,4 +1,4 @@
-// Meshes: which way up they come out, real files, and broken ones.
+// Tests meshes: their orientation, real files, and broken ones.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -37,7 +37,7 @@ Totals Count(const Model& model) {
   return totals;
 }
 
-// The vertex that is farthest along something.
+// Returns the vertex that is farthest along a direction.
 Point3 Farthest(const Model& model, const std::function<double(const Point3&)>& along) {
   Point3 best = model.parts[0].positions[0];
   for (const Part& part : model.parts) {
@@ -48,10 +48,10 @@ Point3 Farthest(const Model& model, const std::function<double(const Point3&)>& 
   return best;
 }
 
-// ------------------------------------------------------------------------------ which way up
+// ------------------------------------------------------------------------------ orientation
 
-// The arrow has three points: 3, 2 and 1 from its corner.
-// Where each of them goes, by the axis that is up.
+// The arrow has three points: 3, 2 and 1 away from its corner. The direction of each of them, by
+// the axis that is up.
 struct Turned {
   const char* file;
   Up up;
@@ -69,7 +69,7 @@ TEST_P(Upright, AndNotMirrored) {
   const auto dot = [](const Point3& a, const Point3& b) {
     return a.x * b.x + a.y * b.y + a.z * b.z;
   };
-  // The corner is what lies farthest against all three.
+  // The corner is the vertex that is farthest against all three.
   const Point3 corner = Farthest(*model, [&](const Point3& p) {
     return -dot(p, expected.three) - dot(p, expected.two) - dot(p, expected.one);
   });
@@ -108,7 +108,7 @@ TEST(Upright, NormalsTurnWithTheSurface) {
   const Part& part = model->parts[0];
   ASSERT_EQ(part.normals.size(), part.positions.size());
   for (size_t i = 0; i + 2 < part.indices.size(); i += 3) {
-    // Every face looks away from the middle of the tetrahedron.
+    // Every face points away from the middle of the tetrahedron.
     Point3 middle, face;
     for (const Point3& p : part.positions)
       middle = {middle.x + p.x / part.positions.size(), middle.y + p.y / part.positions.size(),
@@ -142,7 +142,7 @@ TEST_P(RealFiles, AreReadWhole) {
   EXPECT_EQ(totals.points, GetParam().points);
 }
 
-// Of the engine's 121496 triangles 11160 have no area.
+// 11160 of the engine's 121496 triangles have no area.
 INSTANTIATE_TEST_SUITE_P(
     Table, RealFiles,
     testing::Values(RealFile{"glTF2/2CylinderEngine-glTF-Binary/2CylinderEngine.glb", "glTF binary",
@@ -251,7 +251,7 @@ std::string Glb(const std::string& json, uint32_t length_more = 0) {
          U32(static_cast<uint32_t>(padded.size())) + "JSON" + padded;
 }
 
-// A triangle with its members as given.
+// Returns a triangle with the given members.
 std::string Gltf(const std::string& accessors, const std::string& nodes = R"([{"mesh":0}])",
                  const std::string& extra = "") {
   return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":)" + nodes +
@@ -260,7 +260,7 @@ std::string Gltf(const std::string& accessors, const std::string& nodes = R"([{"
          accessors + extra + "}";
 }
 
-// A triangle with a material (empty: none), and with white vertex colours or none.
+// Returns a triangle with a material (empty: none), and with white vertex colours or none.
 std::string ColoredGltf(const std::string& material, bool white_vertices) {
   std::string bytes;
   for (const float value : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f}) {
@@ -409,7 +409,7 @@ TEST(BadMeshes, ACutGlbIsSaidToEndEarlyWithBothSizes) {
   const std::string whole =
       ReadAll(ModelFile("glTF2/2CylinderEngine-glTF-Binary/2CylinderEngine.glb"));
   ASSERT_GT(whole.size(), 1000000u);
-  // With no CR LF in it, and many LF, as any file that long may be.
+  // Without a CR LF, and with many LF, as any file of that length may have.
   std::string cut = whole.substr(0, whole.size() / 2);
   for (size_t at = 0; (at = cut.find("\r\n", at)) != std::string::npos;) cut[at] = ' ';
   const std::string path = folder.Write("a.glb", cut);
@@ -423,7 +423,7 @@ TEST(BadMeshes, TruncatedAnywhereNeverCrashes) {
   const std::string engine = ReadAll(ModelFile("glTF2/BoxTextured-glTF-Binary/BoxTextured.glb"));
   const std::string spider = ReadAll(ModelFile("STL/Spider_binary.stl"));
   std::string stl = ReadAll(ModelFile("STL/triangle.stl"));
-  stl.resize(stl.rfind("endsolid"));  // what follows is not needed
+  stl.resize(stl.rfind("endsolid"));  // the rest is not needed
   const std::string ply = ReadAll(ModelFile("PLY/cube_binary.ply"));
   ASSERT_GT(engine.size() + stl.size() + ply.size() + spider.size(), 5000u);
   for (const auto& [name, bytes] : {std::pair("a.glb", engine), std::pair("a.stl", stl),

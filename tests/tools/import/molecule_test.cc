@@ -1,4 +1,4 @@
-// Molecules: atoms and bonds of real files, and what is said of broken ones.
+// Tests molecules: atoms and bonds of real files, and the errors for broken ones.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -37,7 +37,7 @@ size_t AtomsOf(const Model& model) {
   return atoms;
 }
 
-// The values of an attribute of all atoms, part by part.
+// Returns the values of an attribute of all atoms, part by part.
 std::vector<double> ValuesOf(const Model& model, const std::string& name) {
   std::vector<double> values;
   for (const Part& part : model.parts) {
@@ -49,7 +49,8 @@ std::vector<double> ValuesOf(const Model& model, const std::string& name) {
   return values;
 }
 
-// A table _atom_site, of which `rows` have: element, name, alternate location, residue, chain, residue number, x, y, z, model.
+// A table _atom_site; `rows` have: element, name, alternate location, residue, chain, residue
+// number, x, y, z, model.
 std::string Cif(const std::string& rows) {
   return absl::StrCat(
       "data_X\nloop_\n_atom_site.type_symbol\n_atom_site.label_atom_id\n_atom_site.label_alt_id\n"
@@ -65,7 +66,7 @@ class Molecules : public testing::Test {
                                MoleculeStyle style = MoleculeStyle::kBalls) {
     return ReadHere(folder_.Write("a.pdb", bytes), {.style = style, .attributes = true});
   }
-  // Of the first part, which are the rods, if there are any.
+  // Counts the bonds of the first part, which has the rods, if there are any.
   size_t Bonds(const std::string& bytes) {
     const auto model = Import(bytes);
     EXPECT_TRUE(model.ok()) << model.status();
@@ -157,7 +158,7 @@ TEST_F(Molecules, RealProteins) {
   EXPECT_EQ(AtomsOf(*model), 1631u);  // grep -cE '^(ATOM|HETATM)'
   // grep -c '^HELIX', '^SHEET'
   EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"helices", 2}, {"strands of sheets", 19}}));
-  // A chain of amino acids has about as many bonds as atoms, and a few for rings.
+  // A chain of amino acids has about as many bonds as atoms, and a few more for rings.
   EXPECT_GT(model->parts[0].indices.size() / 4, 1500u);
   EXPECT_LT(model->parts[0].indices.size() / 4, 1800u);
 }
@@ -204,7 +205,8 @@ TEST_F(Molecules, DamagedOnesEndWell) {
 }
 
 TEST_F(Molecules, SerialNumbersOfAnyKind) {
-  // Hexadecimal, hybrid-36 and stars: the atoms of CONECT are found by the text, and stars are not one atom.
+  // Hexadecimal, hybrid-36 and stars: the atoms of CONECT are identified by the text, and stars do
+  // not identify an atom.
   const auto bonds = [this](const std::string& first, const std::string& second) {
     std::string a = Atom(1, " C  ", 0, 0, 0, "C"), b = Atom(2, " C  ", 5, 0, 0, "C");
     a.replace(6, 5, first);
@@ -215,7 +217,8 @@ TEST_F(Molecules, SerialNumbersOfAnyKind) {
   EXPECT_EQ(bonds("A0000", "A0001"), 1u);
   EXPECT_EQ(bonds("99999", "A0000"), 1u);
   EXPECT_EQ(bonds("*****", "*****"), 0u);
-  // After 99,999 some programs begin again: which atom is meant is not clear, and that is said.
+  // After 99,999 some programs start again: it is ambiguous which atom is meant, and that is
+  // reported.
   const auto model = Import(Atom(1, " C  ", 0, 0, 0, "C") + Atom(1, " C  ", 5, 0, 0, "C") +
                             Atom(2, " C  ", 9, 0, 0, "C") + "CONECT    1    2\n");
   ASSERT_THAT(model, IsOk());
@@ -334,7 +337,7 @@ TEST_F(Molecules, ChemicalComponents) {
   EXPECT_EQ(AtomsOf(*model), 2u);
   EXPECT_EQ(model->parts[0].indices.size() / 4, 1u);
   EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"further models", 1}}));
-  // A deposited structure may carry the bonds of its components.
+  // A deposited structure may include the bonds of its components.
   const auto whole = ImportAs(
       "a.cif", Cif("O O . HOH A 1 0 0 0 1\nH H1 . HOH A 1 3 0 0 1\nO O . HOH A 2 9 0 0 1\n") +
                    component.substr(component.rfind("loop_")));
@@ -442,7 +445,7 @@ TEST_F(Molecules, XyzThatIsWrong) {
               HasSubstr("line 4 has \"nan\" in column 2"));
 }
 
-// Bonds are found by a grid: 100,000 atoms take a fraction of a second.
+// Bonds are found with a grid: 100,000 atoms take a fraction of a second.
 TEST_F(Molecules, LargeOnesAreQuick) {
   std::string rows;
   for (int i = 0; i < 100'000; ++i)
@@ -464,7 +467,7 @@ TEST_F(Molecules, BallsStayWithinTheDisplay) {
   PlaceModels({&*model, 1}, DisplaySpace(), {});
   const Part& part = model->parts[0];
   EXPECT_NEAR(part.positions[1].x + part.thickness / 2, 0.97, 1e-9);
-  // And are sent as balls of that size.
+  // And they are sent as balls of that size.
   std::vector<client::Shape> shapes;
   const ObjectSink sink = [&](const std::string&, std::vector<client::Part> parts, uint64_t) {
     for (client::Part& p : parts) shapes.push_back(p.shape);

@@ -1,4 +1,4 @@
-// NIfTI: volumes of either version, in one file and two, real and broken ones.
+// Tests NIfTI: volumes of either version, in one file and two, real and broken ones.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -29,7 +29,8 @@ using ::testing::HasSubstr;
 
 constexpr char kTemplates[] = "/usr/share/mricron/templates/";
 
-// Bytes as the standard numbers them: dim at 40, datatype at 70, pixdim at 76, vox_offset at 108, scl_slope at 112.
+// Byte offsets as in the standard: dim at 40, datatype at 70, pixdim at 76, vox_offset at 108,
+// scl_slope at 112.
 std::string Nifti(const std::vector<int16_t>& dim, int16_t type, const std::string& samples) {
   std::string out(352, '\0');
   Put<int32_t>(&out, 0, 348);
@@ -83,7 +84,7 @@ TEST_F(Volumes, NiftiWithoutAPlaceHasItsSamplesBehindTheHeader) {
       << "within the header";
 }
 
-// As the standard numbers them: dim at 16, datatype at 12, pixdim at 104, vox_offset at 168.
+// Byte offsets as in the standard: dim at 16, datatype at 12, pixdim at 104, vox_offset at 168.
 std::string Nifti2(const std::vector<int64_t>& dim, int16_t type, const std::string& samples) {
   std::string out(544, '\0');
   Put<int32_t>(&out, 0, 540);
@@ -119,7 +120,7 @@ TEST_F(Volumes, Nifti2) {
               HasSubstr("a header of NIfTI is expected"));
 }
 
-// Every number of a big-endian header and of its samples lies the other way.
+// Every number of a big-endian header and of its samples is reversed.
 TEST_F(Volumes, NiftiOfTheOtherEnd) {
   std::string one = Nifti({3, 2, 1, 1}, 4, std::string("\x01\x02\xff\xfe", 4));
   TurnHeader(&one);
@@ -152,7 +153,8 @@ TEST_F(Volumes, NiftiInTwoFiles) {
   EXPECT_THAT(Read("c.hdr", header).samples, ElementsAre('5', '6', '7', '8'));
 }
 
-// The header from which NIfTI's was made: without a magic, with other fields in the places of the slope, the turn and the matrix.
+// The header from which NIfTI's was made: without a magic number, with other fields in the places
+// of the slope, the rotation and the matrix.
 TEST_F(Volumes, Analyze) {
   std::string header = Nifti({4, 2, 2, 2, 1}, 4, "").substr(0, 348);
   Put<float>(&header, 76, 0);
@@ -185,7 +187,7 @@ TEST_F(Volumes, Analyze) {
     EXPECT_EQ(model->format, format);
     const SampledVolume& volume = model->volumes[0];
     EXPECT_THAT(volume.samples, ElementsAre(-4, -3, -2, -1, 0, 1, 2, 3));
-    // x goes to the left of the head, which is to the viewer's right.
+    // x points to the left of the head, which is to the viewer's right.
     EXPECT_EQ(volume.corners[0], (Point3{-0.5, 1, -1.5}));
     EXPECT_EQ(volume.corners[7], (Point3{1.5, -3, 4.5}));
   }
@@ -196,7 +198,7 @@ TEST_F(Volumes, Analyze) {
       {'\2', {-1.5, 0.5, -1}, {4.5, -1.5, 3}},
       {'\3', {-0.5, -3, -1.5}, {1.5, 1, 4.5}},
       {'\4', {-0.5, 1.5, 3}, {1.5, -4.5, -1}},
-      {'\x20', {-0.5, 1, -1.5}, {1.5, -3, 4.5}}};  // none that there is: transverse
+      {'\x20', {-0.5, 1, -1.5}, {1.5, -3, 4.5}}};  // an unknown value: transverse
   for (const auto& [orient, first, last] : orientations) {
     header[252] = orient;
     const SampledVolume volume = Read("a.hdr", header);
@@ -218,7 +220,7 @@ TEST_F(Volumes, NiftiOfColours) {
   EXPECT_THAT(four.colors, ElementsAre(Rgb{100, 200, 255}, Rgb{50, 100, 128}));
 }
 
-// Colours as vectors (intents 2003 and 2004): all of red stands before all of green.
+// Colours as vectors (intents 2003 and 2004): all of red comes before all of green.
 TEST_F(Volumes, NiftiOfColourVectors) {
   std::string three = Nifti({5, 2, 1, 1, 1, 3}, 2, "\xff\x0a\x01\x14\x02\x1e");
   Put<int16_t>(&three, 68, 2003);
@@ -229,12 +231,12 @@ TEST_F(Volumes, NiftiOfColourVectors) {
     EXPECT_TRUE(model->left_out.empty());
   }
   EXPECT_THAT(Error("a.nii", three.substr(0, three.size() - 1)), HasSubstr("bytes of samples"));
-  // 16 bits: the greatest of the type is brightest.
+  // 16 bits: the greatest value of the type is brightest.
   std::string wide =
       Nifti({5, 1, 1, 1, 1, 4}, 512, std::string("\xff\xff\x00\x80\x00\x00\xff\xff", 8));
   Put<int16_t>(&wide, 68, 2004);
   EXPECT_THAT(Read("a.nii", wide).colors, ElementsAre(Rgb{255, 128, 0}));
-  // Vectors of another intent are not colours.
+  // Vectors with another intent are not colours.
   Put<int16_t>(&three, 68, 1007);
   const auto vector = Import("a.nii", three);
   ASSERT_THAT(vector, IsOk());
@@ -248,13 +250,15 @@ TEST_F(Volumes, NiftiLiesWhereItsMatrixSays) {
   const float rows[12] = {2, 0, 0, 10, 0, 3, 0, 20, 0, 0, 4, 30};
   for (size_t i = 0; i < 12; ++i) Put<float>(&bytes, 280 + 4 * i, rows[i]);
   const SampledVolume volume = Read("a.nii", bytes);
-  // Samples lie in the middle of their cells; x and y are turned so that the face is to the viewer.
+  // Samples are in the middle of their cells; x and y are reversed so that the face is to the
+  // viewer.
   EXPECT_EQ(volume.corners[0], (Point3{-9, -18.5, 28}));
   EXPECT_EQ(volume.corners[7], (Point3{-13, -24.5, 36}));
   EXPECT_EQ(volume.corners[1], (Point3{-13, -18.5, 28}));
 }
 
-// The standard's three methods: the steps alone, a turn as a quaternion, a matrix. Corners 0 and 7 of a volume of two samples an axis.
+// The standard's three methods: the steps alone, a rotation as a quaternion, a matrix. Corners 0
+// and 7 of a volume of two samples an axis.
 TEST_F(Volumes, NiftiLiesWhereEachMethodSays) {
   struct Method {
     const char* name;
@@ -267,13 +271,13 @@ TEST_F(Volumes, NiftiLiesWhereEachMethodSays) {
   const std::array<float, 12> matrix = {2, 0, 0, 10, 0, 3, 0, 20, 0, 0, 4, 30};
   const std::array<float, 12> mirrored = {-2, 0, 0, 10, 0, 3, 0, 20, 0, 0, 4, 30};
   for (const Method& method : {
-           // Steps of 1, 2 and 3. The reader turns x and y round.
+           // Steps of 1, 2 and 3. The reader reverses x and y.
            Method{.name = "steps", .first = {0.5, 1, -1.5}, .last = {-1.5, -3, 4.5}},
            Method{.name = "steps, without a qfac",
            .qfac = 0,
            .first = {0.5, 1, -1.5},
            .last = {-1.5, -3, 4.5}},
-           // Method 1 knows no offset.
+           // Method 1 has no offset.
            Method{.name = "steps beside an offset that has no code",
            .offset = {10, 20, 30},
            .first = {0.5, 1, -1.5},
@@ -295,7 +299,7 @@ TEST_F(Volumes, NiftiLiesWhereEachMethodSays) {
            .offset = {10, 20, 30},
            .first = {-9.5, -19, 31.5},
            .last = {-11.5, -23, 25.5}},
-           // Half a turn about x: y and z go the other way.
+           // Half a turn about x: y and z are reversed.
            Method{.name = "half a turn",
            .qform = 1,
            .quaternion = {1, 0, 0},
@@ -346,7 +350,7 @@ TEST_F(Volumes, NiftiLiesWhereEachMethodSays) {
   }
 }
 
-// Of axes that are not there no step is known; some programs write 0.
+// For axes that do not exist, the step is unknown; some programs write 0.
 TEST_F(Volumes, NiftiOfOneSliceNeedsNoThirdStep) {
   for (const bool both : {false, true}) {
     std::string bytes = Nifti({2, 2, 2}, 2, "1234");
@@ -371,7 +375,7 @@ TEST_F(Volumes, NiftiOfSeveralVolumes) {
               ElementsAre(LeftOut{"further times", 2}, LeftOut{"further components", 1}));
 }
 
-// A background of not-a-number stays one: 0 is a number like others here.
+// A background of not-a-number stays one: 0 is an ordinary number here.
 TEST_F(Volumes, NiftiKeepsWhatIsNoNumber) {
   std::string floats;
   for (const float number : {-1.0f, NAN, 0.0f}) Put<float>(&floats, floats.size(), number);
@@ -405,7 +409,7 @@ TEST_F(Volumes, NiftiThatIsWrong) {
   EXPECT_THAT(Error("a.nii", Nifti({1, 1}, 16, nothing)), HasSubstr("no sample that is a number"));
 }
 
-// What a small file decompresses to beyond the samples is not even looked at.
+// The data to which a small file expands beyond the samples is not even read.
 TEST_F(Volumes, BombsTakeNoMemory) {
   const std::string bomb =
       Gzip(Nifti({3, 2, 2, 1}, 2, "1234") + std::string(size_t{200} << 20, '\0'));
@@ -413,8 +417,8 @@ TEST_F(Volumes, BombsTakeNoMemory) {
   EXPECT_THAT(Read("a.nii.gz", bomb).samples.size(), 4);
 }
 
-// Nor does what came before cost again for each of many streams that are empty: a hundred thousand times 32 MiB take minutes,
-// and one time none.
+// Nor does the earlier data cost again for each of many empty streams: a hundred thousand times 32
+// MiB takes minutes, and one time takes no measurable time.
 TEST_F(Volumes, ManyEmptyStreamsTakeNoTime) {
   const std::string zeros(size_t{32} << 20, '\0'), empty = Gzip("");
   std::string packed = Gzip(zeros);

@@ -1,4 +1,4 @@
-// NRRD, and raw samples: real and broken ones.
+// Tests NRRD, and raw samples: real and broken ones.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -163,7 +163,7 @@ TEST_F(Volumes, NrrdOfEitherHand) {
   }
 }
 
-// Of npm's nrrd-js, which tools/setup fetches.
+// Files of npm's nrrd-js, which tools/setup fetches.
 TEST_F(Volumes, RealNrrd) {
   const std::string folder = absl::StrCat(VOXELD_DATA_DIR, "/nrrd-js/");
   const auto picture = ReadHere(folder + "example1.nrrd", {});
@@ -212,7 +212,7 @@ TEST_F(Volumes, NrrdThatIsWrong) {
               HasSubstr("a.nhdr: has \"gone.raw\" for \"datafile\"; a regular file in its folder"));
 }
 
-// Steps that span a volume, and so long that no number says where it ends.
+// Steps that span a volume, and steps that are so long that its end overflows.
 TEST_F(Volumes, NrrdThatEndsNowhere) {
   const auto place = [](const char* directions, const char* origin) {
     return absl::StrCat(

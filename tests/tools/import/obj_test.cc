@@ -1,4 +1,4 @@
-// Wavefront OBJ: statements, materials and pictures, worked out by hand.
+// Tests Wavefront OBJ: statements, materials and pictures, with values computed by hand.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -73,7 +73,7 @@ TEST_F(ObjFiles, ReferencesBackwardsAndForwards) {
 TEST_F(ObjFiles, ConcavePolygonsAndThoseOfManyCorners) {
   // A square of 16 with a notch of 6 in its upper edge.
   EXPECT_DOUBLE_EQ(AreaOf(Good("v 0 0 0\nv 4 0 0\nv 4 4 0\nv 2 1 0\nv 0 4 0\nf 1 2 3 4 5\n")), 10);
-  // The same, begun at every corner and turned round.
+  // The same, started at every corner and reversed.
   EXPECT_DOUBLE_EQ(AreaOf(Good("v 0 0 0\nv 4 0 0\nv 4 4 0\nv 2 1 0\nv 0 4 0\nf 4 3 2 1 5\n")), 10);
   // A concave quad.
   EXPECT_DOUBLE_EQ(AreaOf(Good("v 0 0 0\nv 4 4 0\nv 0 1 0\nv -4 4 0\nf 1 2 3 4\n")), 4);
@@ -115,7 +115,7 @@ TEST_F(ObjFiles, TrianglesWithoutAnAreaAreCounted) {
   EXPECT_THAT(model.left_out, ElementsAre(LeftOut{"triangles without an area", 1}));
 }
 
-// Thin is not empty: a turned square of a thousand slivers keeps its area.
+// Thin is not empty: a rotated square of a thousand slivers keeps its area.
 TEST_F(ObjFiles, SliversAreTriangles) {
   for (const double width : {1e-3, 1e-6}) {
     std::string text;
@@ -179,7 +179,7 @@ TEST_F(ObjFiles, ColoursOfVerticesAreFactorsOfTheMaterial) {
   EXPECT_EQ(plain("usemtl one\nf 1 2 3 4")[0], (Rgb{128, 128, 128})) << "one number is for all";
   EXPECT_THAT(plain("usemtl plain\nf 1 2 3 4"), IsEmpty()) << "the file gives no colour";
   EXPECT_THAT(plain("f 1 2 3 4"), IsEmpty());
-  // To 255; with an opacity.
+  // Up to 255; with an opacity.
   EXPECT_EQ(Good("v 0 0 0 255 128 0\nv 4 0 0 0 0 0\nv 4 1 0 0 0 0\nf 1 2 3").parts[0].colors[0],
             (Rgb{255, 128, 0}));
   EXPECT_EQ(Good("v 0 0 0 1 0 0 1\nv 4 0 0 1 0 0 1\nv 4 1 0 1 0 0 1\nf 1 2 3").parts[0].colors[0],
@@ -226,7 +226,7 @@ TEST_F(ObjFiles, TexturesInAllSpellings) {
         "map_Kd C:\\models\\a b.png", "map_Kd -s 1 1 1 a b.png", "map_Kd -s 1 1 a b.png"}) {
     const Model model = read(map);
     ASSERT_THAT(model.pictures, ElementsAre(png)) << map;
-    // v goes up in OBJ.
+    // v increases upwards in OBJ.
     EXPECT_THAT(model.parts[0].texture_coordinates,
                 ElementsAre(std::array<float, 2>{0, 1}, std::array<float, 2>{1, 1},
                             std::array<float, 2>{1, 0}, std::array<float, 2>{0, 0}))
@@ -235,7 +235,7 @@ TEST_F(ObjFiles, TexturesInAllSpellings) {
     EXPECT_THAT(model.left_out, IsEmpty()) << map;
   }
   EXPECT_EQ(read("Kd 1 0 0\nmap_Kd a b.png").parts[0].colors[0], (Rgb{255, 0, 0}));
-  // Scaled by 2 and moved by 0.25 along u, where v goes up.
+  // Scaled by 2 and moved by 0.25 along u, where v increases upwards.
   EXPECT_THAT(read("map_Kd -s 2 4 -o 0.25 a b.png").parts[0].texture_coordinates,
               ElementsAre(std::array<float, 2>{0.25, 1}, std::array<float, 2>{2.25, 1},
                           std::array<float, 2>{2.25, -3}, std::array<float, 2>{0.25, -3}));

@@ -1,4 +1,4 @@
-// Which of the files that a file names are read, and that messages do not reveal the others.
+// Tests which of the files that a file names are read, and that messages do not reveal the others.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -46,7 +46,7 @@ std::string Nrrd(const std::string& name) {
       "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 6 6 1\nencoding: raw\ndata file: ", name, "\n");
 }
 
-// A folder "own", with the file, beside a folder "private" whose files nobody else may see.
+// A folder "own", with the file, beside a folder "private" whose files no other user may see.
 class OtherFilesTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -79,7 +79,7 @@ class OtherFilesTest : public ::testing::Test {
     return ImportFile(folder_.Write(absl::StrCat("own/", name), text), {.other_files = allowed});
   }
 
-  // Names without their extension: in the folder or below; outside of it; not regular files.
+  // Names without their extension: in the folder or below; outside it; not regular files.
   const std::vector<std::string> below_ = {"a", "below/b", "./a", "below/../a", "inside"};
   std::vector<std::string> outside() const {
     return {"../private/key",

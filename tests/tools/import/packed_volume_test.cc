@@ -1,4 +1,4 @@
-// What is sent of volumes.
+// Tests what is sent of volumes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -43,7 +43,7 @@ TEST(PackedVolumes, AreBytesWithinTheWindow) {
 
 TEST(PackedVolumes, AreReducedToWhatTheServerTakes) {
   client::Limits limits;
-  limits.max_message_bytes = 8192;  // less 4096 for all else
+  limits.max_message_bytes = 8192;  // less 4096 for everything else
   const auto packed = PackVolume(Ramp(33, 16, 16), {}, limits);
   ASSERT_THAT(packed, IsOk());
   const auto& grid = std::get<client::Volume>(packed->part.shape).grid;
@@ -93,7 +93,8 @@ TEST(PackedVolumes, LargeOnesGoAsAssets) {
   const auto& grid = std::get<client::Volume>(packed->part.shape).grid;
   ASSERT_TRUE(std::get<client::Array<uint8_t>>(grid.samples).asset());
   EXPECT_EQ(std::get<client::Array<uint8_t>>(grid.samples).asset()->sha256, "hash");
-  // Of a surface two bytes each; more than the server takes of one asset is averaged.
+  // For a surface, two bytes each; a volume that exceeds the server's limit for one asset is
+  // averaged.
   ASSERT_THAT(PackVolume(Ramp(33, 16, 16), {.level = 5}, limits, upload), IsOk());
   EXPECT_EQ(brought.size(), 2u * 33 * 16 * 16);
   limits.max_asset_bytes = 5000;

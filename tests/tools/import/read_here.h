@@ -1,4 +1,5 @@
-// Reads files of all formats as ImportFile does, but in this process where that is safe: much faster, and sanitizers see what happens.
+// Reads files of all formats as ImportFile does, but in this process where that is safe: it is much
+// faster, and sanitizers can check it.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +29,8 @@ inline absl::StatusOr<Model> ReadApart(const std::string& path, const ImportOpti
 }
 
 inline absl::StatusOr<Model> ReadHere(const std::string& path, const ImportOptions& options = {}) {
-  // Damaged files of other formats can crash the libraries that read them, so tests read those in a process of their own too.
+  // Damaged files of other formats can crash the libraries that read them, so tests read those in a
+  // separate process too.
   constexpr std::array<std::string_view, 37> kSafe = {
       "asc", "cif",  "csv", "ent",  "geojson",  "glb", "gltf", "gpx",   "gz",  "hdr",
       "img", "json", "kml", "las",  "map",      "mha", "mhd",  "mmcif", "mrc", "nhdr",

@@ -1,4 +1,4 @@
-// MetaImage, MRC and TIFF stacks: right and broken ones.
+// Tests MetaImage, MRC and TIFF stacks: valid and broken ones.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <zlib.h>
@@ -26,7 +26,7 @@ namespace stack_test {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-// `numbers` as little-endian or big-endian ones of type T.
+// Returns `numbers` as little-endian or big-endian values of type T.
 template <typename T>
 std::string Numbers(const std::vector<double>& numbers, bool big_endian = false) {
   std::string out;
@@ -113,14 +113,14 @@ TEST_F(Volumes, MetaImageInItsWays) {
               ElementsAre(3, 4, 1, -2));
 }
 
-// Steps of 2, 3 and 4: the first axis goes to the back, the second to the left, the third down.
+// Steps of 2, 3 and 4: the first axis points to the back, the second to the left, the third down.
 TEST_F(Volumes, MetaImageLiesWhereItsMatrixSays) {
   const std::string lines =
       "TransformMatrix = 0 1 0 1 0 0 0 0 -1\nOffset = 10 20 30\nElementSpacing = 2 3 4\n";
   const SampledVolume volume = Read("a.mha", Meta("MET_UCHAR", lines, "1234"));
   EXPECT_EQ(volume.corners[0], (Point3{10 - 1.5, 20 - 1, 30 + 2}));
   EXPECT_EQ(volume.corners[7], (Point3{10 + 1.5, 20 + 3, 30 - 6}));
-  // Rows are axes: a turn by 90° about z, not its inverse.
+  // Rows are axes: a rotation by 90° about z, not its inverse.
   const SampledVolume turned =
       Read("b.mha", Meta("MET_UCHAR", "TransformMatrix = 0 1 0 -1 0 0 0 0 1\n", "1234"));
   EXPECT_EQ(turned.corners[1], (Point3{0.5, 1.5, -0.5}));
@@ -263,7 +263,8 @@ TEST_F(Volumes, MrcOfEveryMode) {
                  .Bytes())
             .samples,
         ElementsAre(60000, 1, 2, 3));
-    // By IEEE 754: 1, -2, the greatest (65504) and the least above 0 (2 to the power of -24).
+    // According to IEEE 754: 1, -2, the greatest (65504) and the least above 0 (2 to the power of
+    // -24).
     EXPECT_THAT(Read("h.mrc", Mrc{.mode = 12,
                                   .big_endian = big,
                                   .samples = Numbers<uint16_t>({0x3c00, 0xc000, 0x7bff, 1}, big)}
@@ -299,7 +300,7 @@ TEST_F(Volumes, MrcLiesWhereItsHeaderSays) {
   EXPECT_EQ(other.corners[0], (Point3{-1, -1.5, 3 * 4 - 2}));
   EXPECT_EQ(other.corners[1], (Point3{-1, -1.5, 3 * 4 + 6}));
   EXPECT_EQ(other.corners[4], (Point3{3, -1.5, 3 * 4 - 2}));
-  // A cell with 60° between x and y: a step of rows goes half of its length to the right.
+  // A cell with 60° between x and y: a step of rows moves to the right by half of its length.
   const SampledVolume skewed =
       Read("c.mrc", Mrc{.size = {2, 2, 2}, .samples = "12345678", .floats = {{16, 60}}}.Bytes());
   EXPECT_NEAR(skewed.corners[2].x - skewed.corners[0].x, 1, 1e-6);
@@ -334,7 +335,8 @@ TEST_F(Volumes, MrcThatIsWrong) {
               HasSubstr("has an extended header of -5 bytes"));
 }
 
-// A page: its tags (TIFF 6.0, section 2), each a short (3) or a long (4), and its samples, which are one strip unless lists say else.
+// A page: its tags (TIFF 6.0, section 2), each a short (3) or a long (4), and its samples, which
+// are one strip unless lists say otherwise.
 struct Page {
   uint16_t width = 2, height = 1, bits = 8, channels = 1, photometric = 1;
   std::string samples;
@@ -460,7 +462,7 @@ TEST_F(Volumes, TiffOfColours) {
                                    .lists = {{320, 3, {0xffff, 0, 0, 0x8080, 0, 0xffff}}}}}))
                   .colors,
               ElementsAre(Rgb{255, 0, 0}, Rgb{0, 128, 255}));
-  // An opacity that is not multiplied in (ExtraSamples 2): half of it.
+  // An opacity that is not premultiplied (ExtraSamples 2): half of it.
   EXPECT_THAT(Read("c.tif", Tiff({{.width = 1,
                                    .channels = 4,
                                    .photometric = 2,
@@ -486,7 +488,7 @@ TEST_F(Volumes, TiffStacks) {
   EXPECT_THAT(pages->volumes[0].samples, ElementsAre('1', '2', '3', '4', '5', '6'));
   EXPECT_THAT(pages->left_out, ElementsAre(LeftOut{"pages of another size or type", 1},
                                            LeftOut{"previews and masks", 1}));
-  // Tiles of 16 by 16 round a picture of 17 by 2: the second has one column of it.
+  // Tiles of 16 by 16 for a picture of 17 by 2: the second has one column of it.
   std::string tiles(512, '\0');
   for (size_t row = 0; row < 2; ++row) {
     for (size_t x = 0; x < 17; ++x)
@@ -499,7 +501,7 @@ TEST_F(Volumes, TiffStacks) {
                            .tags = {{322, 3, 16}, {323, 3, 16}},
                            .lists = {{324, 4, {8, 8 + 256}}, {325, 4, {256, 256}}}}}));
   for (size_t i = 0; i < 34; ++i) ASSERT_EQ(volume.samples[i], static_cast<float>(i + 1));
-  // A strip a row.
+  // One strip for each row.
   EXPECT_THAT(Read("s.tif", Tiff({{.height = 2,
                                    .samples = "12xx34",
                                    .tags = {{278, 3, 1}},
@@ -508,7 +510,8 @@ TEST_F(Volumes, TiffStacks) {
               ElementsAre('1', '2', '3', '4'));
 }
 
-// Channels change first, then slices, then times: pages 1 and 3 of 8 are the first channel's at the first time.
+// Channels change first, then slices, then times: pages 1 and 3 of 8 are the first channel's at the
+// first time.
 TEST_F(Volumes, TiffStacksOfChannelsAndTimes) {
   const auto stack = [](const std::string& description) {
     std::vector<Page> pages;
@@ -542,7 +545,7 @@ TEST_F(Volumes, TiffStacksOfChannelsAndTimes) {
               HasSubstr("counts 2 slices, 3 channels and 1 times, and it has 8 pages"));
 }
 
-// OME's elements say where each page lies; the order of the pages does not.
+// OME's elements say where each page is; the order of the pages does not.
 TEST_F(Volumes, TiffPagesWhereOmePutsThem) {
   const auto stack = [this](const std::string& elements, const std::string& sizes) {
     std::vector<Page> pages;
@@ -565,7 +568,7 @@ TEST_F(Volumes, TiffPagesWhereOmePutsThem) {
                     times),
               ElementsAre('d', 'b'));
   EXPECT_THAT(stack("<TiffData/>", times), ElementsAre('a', 'b'));
-  // What does not name all pages, or names a slice that there is not, says nothing.
+  // A text that does not name all pages, or names a slice that does not exist, is ignored.
   EXPECT_THAT(stack("<TiffData IFD=\"0\" FirstZ=\"3\"/>", deep), ElementsAre('a', 'b', 'c', 'd'));
   EXPECT_THAT(stack("<TiffData IFD=\"0\" FirstZ=\"9\"/>", deep), ElementsAre('a', 'b', 'c', 'd'));
 }
@@ -614,7 +617,7 @@ TEST_F(Volumes, TiffThatIsWrong) {
   EXPECT_THAT(Read("a.tif", loop).size, ElementsAre(2, 1, 1));
 }
 
-// Bit flips and truncations of each format: an error or a model, and never a crash.
+// Bit flips and truncations of each format: the result is an error or a model, never a crash.
 TEST_F(Volumes, DamagedStacks) {
   const std::vector<std::pair<const char*, std::string>> files = {
       {"a.mha", Meta("MET_SHORT", "TransformMatrix = 0 1 0 1 0 0 0 0 -1\nOffset = 10 20 30\n",

@@ -1,4 +1,4 @@
-// Drawings: where which colour is seen, what is left out, and what is said of broken ones.
+// Tests drawings: which colour is visible where, what is left out, and the errors for broken ones.
 #include <fontconfig/fontconfig.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -71,7 +71,7 @@ class Drawings : public testing::Test {
     return std::string(Import(bytes).status().message());
   }
 
-  // At a share of the width from the left, and of the height from the top.
+  // Returns the colour at a part of the width from the left, and of the height from the top.
   static Rgb At(const Model& model, double x, double y) {
     const SampledVolume& volume = model.volumes[0];
     const auto index = [](double share, uint32_t size) {
@@ -83,7 +83,7 @@ class Drawings : public testing::Test {
   Rgb Seen(const std::string& content, double x = 0.5, double y = 0.5) {
     return At(ReadAll(Svg(content)), x, y);
   }
-  // How many pixels have the colour.
+  // Returns how many pixels have the colour.
   static int64_t Count(const Model& model, const Rgb& color) {
     return std::count(model.volumes[0].colors.begin(), model.volumes[0].colors.end(), color);
   }
@@ -91,7 +91,7 @@ class Drawings : public testing::Test {
   TempFolder folder_;
 };
 
-// The picture is upright: to the right is x, up is z after the turn that brings y up.
+// The picture is upright: x is to the right, and z is up after the rotation that makes y point up.
 TEST_F(Drawings, LieUprightInOnePlane) {
   const Model model =
       ReadAll(Svg("<rect width='20' height='10' fill='red'/>", "width='40' height='10'"));
@@ -172,13 +172,13 @@ TEST_F(Drawings, SizesOfThePage) {
   EXPECT_EQ(Count(ReadAll(Svg(square, "width='200' height='100' preserveAspectRatio='none'" + box)),
                   kRed),
             64 * 32);
-  // Without a size it is as large as what is drawn, wherever that lies.
+  // Without a size, it is as large as its contents, wherever they are.
   const Model model = ReadAll(Svg("<rect x='-70' y='900' width='20' height='10' fill='red'/>", ""));
   EXPECT_THAT(model.volumes[0].size, ElementsAre(64, 32, 1));
   EXPECT_EQ(Count(model, kRed), 64 * 32);
   EXPECT_NEAR(model.volumes[0].corners[0].x, -70, 1e-6);
   EXPECT_NEAR(model.volumes[0].corners[0].y, -900, 1e-6);
-  // Also where librsvg draws a part on a picture of its own, and by percentages.
+  // Also where librsvg draws a part on a surface of its own, and with percentages.
   for (const char* offset : {"0", "-70", "900"}) {
     const Model half = ReadAll(Svg(absl::StrCat("<g opacity='.5'><rect x='", offset,
                                                 "' y='5' width='.2' height='.1' fill='red'/></g>"),
@@ -219,7 +219,7 @@ TEST_F(Drawings, ColoursOfCss) {
   EXPECT_EQ(color("darkslategrey"), (Rgb{47, 79, 79}));
   EXPECT_EQ(Seen("<g color='#ff0000'><rect width='100' height='100' fill='currentColor'/></g>"),
             kRed);
-  // What is half opaque is half as bright.
+  // Half opaque means half as bright.
   for (const char* half :
        {"fill='rgba(255,0,0,.5)'", "fill='#ff000080'", "fill='red' fill-opacity='.5'",
         "fill='red' opacity='50%'", "style='fill:red;opacity:.5'"}) {
@@ -237,7 +237,7 @@ TEST_F(Drawings, ColoursOfCss) {
   EXPECT_EQ(Seen(green + over + "red'/>"), kRed);
 }
 
-// Two that cover each other within a group are not seen through each other.
+// Where two shapes in a group cover each other, the lower one is not visible through the upper.
 TEST_F(Drawings, OpacityOfGroups) {
   const Rgb seen = Seen(
       "<g opacity='.5'><rect width='100' height='100' fill='red'/>"
@@ -285,7 +285,7 @@ TEST_F(Drawings, SelectorsOfStyleSheets) {
   two("rect {fill:lime} rect:first-child {fill:red}");
   two("/* x */ * {fill:red} rect.b {fill:lime} .b {fill:blue}");
   two("<![CDATA[ .a rect {fill:red!important} .a rect {fill:blue} .b {fill:lime} ]]>");
-  // A style attribute is stronger than a rule, which is stronger than an attribute.
+  // A style attribute takes precedence over a rule, and a rule over an attribute.
   EXPECT_EQ(Seen("<style>rect{fill:blue}</style><rect width='100' height='100' fill='lime' "
                  "style='fill:red'/>"),
             kRed);
@@ -305,7 +305,7 @@ TEST_F(Drawings, EntitiesOfText) {
 }
 
 TEST_F(Drawings, ShapesAndPercentages) {
-  // Of a circle of radius 40 in 100: π·40² of 100² pixels.
+  // For a circle of radius 40 in 100: π·40² of 100² pixels.
   const auto is_circle = [this](const std::string& circle) {
     const Model model = ReadAll(Svg(circle));
     EXPECT_EQ(At(model, 0.5, 0.5), kRed) << circle;
@@ -385,7 +385,8 @@ TEST_F(Drawings, PaintServersClipsMasksAndMarkers) {
   EXPECT_EQ(At(marker, 0.1, 0.43), kNothing);
 }
 
-// A stroke that is thinner than a pixel is as bright as one that fills it, but what is half opaque is not.
+// A stroke that is thinner than a pixel is as bright as one that fills it, but a half-opaque one is
+// not.
 TEST_F(Drawings, ThinStrokesAreBright) {
   const auto brightest = [this](const std::string& stroke) {
     const Model model =
@@ -398,7 +399,7 @@ TEST_F(Drawings, ThinStrokesAreBright) {
   EXPECT_GT(brightest("stroke-width='.1'"), 60);
   EXPECT_NEAR(brightest("stroke-width='.4' stroke-opacity='.5'"), 128, 2);
   EXPECT_NEAR(brightest("stroke-width='5' stroke-opacity='.5'"), 128, 2);
-  // Along a row of pixels, wherever it lies.
+  // Along a row of pixels, at any position.
   for (int i = 0; i < 16; ++i) {
     const Model model = ReadAll(
         Svg(absl::StrCat("<path d='M0 ", 50 + i * 0.1, "H100' stroke='red' stroke-width='1'/>")));
@@ -406,7 +407,7 @@ TEST_F(Drawings, ThinStrokesAreBright) {
     for (int y = 0; y < 64; ++y) most = std::max(most, At(model, 0.5, (y + 0.5) / 64).r);
     EXPECT_GE(most, 250) << i;
   }
-  // Edges of areas stay where they are: three eighths of a pixel are covered in part.
+  // Edges of areas stay where they are: three eighths of a pixel are partially covered.
   const Model area = ReadAll(Svg("<rect x='12.5' width='50.5859375' height='100' fill='red'/>"));
   EXPECT_NEAR(At(area, 40.5 / 64, 0.5).r, 96, 8);
 }
@@ -422,7 +423,7 @@ TEST_F(Drawings, InkAndPaper) {
   model =
       ReadAll(Svg("<rect x='10' y='10' width='30' height='30' fill='#111' fill-opacity='.5'/>"));
   EXPECT_NEAR(At(model, 0.25, 0.25).r, 128, 1);
-  // Dark grey with soft edges, and next to nothing else.
+  // Dark grey with soft edges, and almost nothing else.
   model = ReadAll(Svg(
       "<circle cx='50' cy='50' r='40' fill='#2e3436'/><rect width='2' height='2' fill='red'/>"));
   EXPECT_EQ(At(model, 0.5, 0.5), kWhite);
@@ -443,11 +444,11 @@ TEST_F(Drawings, InkAndPaper) {
       Svg(sheet + "<path d='M10 10V90H90' fill='none' stroke='black' stroke-width='.5'/>" + red));
   EXPECT_GT(At(model, 0.1, 0.5).r, 200);
   EXPECT_EQ(At(model, 0.5, 0.5), kNothing);
-  // A flag has nothing dark; its white is meant.
+  // A flag has nothing dark; its white is intended.
   model = ReadAll(Svg(sheet + red));
   EXPECT_EQ(model.note, "");
   EXPECT_EQ(At(model, 0.2, 0.2), kWhite);
-  // A black page with white on it is as it is.
+  // A black page with white on it is unchanged.
   model =
       ReadAll(Svg("<rect width='100' height='100'/><circle cx='50' cy='50' r='20' fill='white'/>"));
   EXPECT_EQ(At(model, 0.5, 0.5), kWhite);
@@ -465,7 +466,7 @@ TEST_F(Drawings, TextsAreDrawnWithFonts) {
   const Model drawn = ReadAll(Svg(text));
   EXPECT_GT(Count(drawn, kRed), 200);
   EXPECT_THAT(drawn.left_out, IsEmpty());
-  // Where no font is found they are counted.
+  // If no font is found, texts are counted.
   FcConfig* const all = FcConfigReference(nullptr);
   FcConfig* const none = FcConfigCreate();
   ASSERT_NE(FcConfigSetCurrent(none), FcFalse);
@@ -478,7 +479,7 @@ TEST_F(Drawings, TextsAreDrawnWithFonts) {
   EXPECT_THAT(error, HasSubstr("has nothing that is to be seen (left out: texts (1))"));
 }
 
-// librsvg would end the process, or need minutes.
+// librsvg would terminate the process, or need minutes.
 TEST_F(Drawings, TextsThatAreTooLargeOrTooLongAreCounted) {
   const std::string area = "<rect width='100' height='100' fill='lime'/>";
   for (const std::string& text :
@@ -581,7 +582,7 @@ TEST_F(Drawings, PicturesOfTheFileAreDrawnAndOthersAreNot) {
       ReadAll(Svg(image + "href='" + png + "'/>" + image + "xlink:href=' " + png + "'/>"));
   EXPECT_EQ(At(drawn, 0.5, 0.5), kRed);
   EXPECT_THAT(drawn.left_out, IsEmpty());
-  // A PNG file beside the drawing, and by every way to it; nothing red appears.
+  // A PNG file beside the drawing, referred to in every way; nothing red appears.
   std::string bytes;
   ASSERT_TRUE(absl::Base64Unescape(kRedPng, &bytes));
   const std::string path = folder_.Write("red.png", bytes);
@@ -641,7 +642,7 @@ TEST_F(Drawings, CompressedOnesAreRead) {
   EXPECT_THAT(Error(gzip(gzip(text))), HasSubstr("is not well-formed XML"));
 }
 
-// Of pymol-data, which tools/setup installs.
+// Drawings of pymol-data, which tools/setup installs.
 TEST_F(Drawings, RealOnes) {
   const std::string folder = "/usr/share/pymol/data/";
   for (const char* name : {"openvr/hints_vive_controller.svg", "openvr/menu_splash.svg",
@@ -675,7 +676,7 @@ TEST_F(Drawings, ThatAreWrong) {
       HasSubstr("cannot be drawn by librsvg ("));
 }
 
-// Nothing nests deeper, or is drawn more often, than there is stack and time for.
+// Nothing nests more deeply, or is drawn more often, than stack and time allow.
 TEST_F(Drawings, WhatNestsOrMultipliesEnds) {
   EXPECT_THAT(Error(Svg(Times("<g>", 240) + "<path d='M0 0 9 9 0 9'/>" + Times("</g>", 240))),
               HasSubstr("more than 200 deep"));
@@ -713,7 +714,7 @@ TEST_F(Drawings, WhatNestsOrMultipliesEnds) {
                 AnyOf(IsEmpty(), HasSubstr("nothing that is to be seen")))
         << tag;
   }
-  // The same by a style sheet, which may apply to anything.
+  // The same with a style sheet, which may apply to anything.
   std::string style = "<style>", patterns;
   for (int i = 1; i < 1000; ++i) {
     absl::StrAppend(&style, ".c", i, "{fill:url(#p", i - 1, ")}");
@@ -723,7 +724,7 @@ TEST_F(Drawings, WhatNestsOrMultipliesEnds) {
   EXPECT_THAT(
       Error(Svg(style + "</style>" + patterns + "<rect class='c999' width='9' height='9'/>")),
       HasSubstr("more than 200 deep"));
-  // Many gradients of one style sheet are not within each other.
+  // Many gradients in one style sheet are not nested in each other.
   std::string gradients = "<style>.a{fill:url(#g1)}";
   for (int i = 0; i < 1000; ++i) absl::StrAppend(&gradients, ".c", i, "{fill:url(#g", i, ")}");
   gradients += "</style>";
@@ -757,7 +758,7 @@ TEST_F(Drawings, WhatNestsOrMultipliesEnds) {
   EXPECT_THAT(Error(Svg(Times("<g/>", 1'000'001))), HasSubstr("has more than 1000000 elements"));
 }
 
-// Much that is used once is no work without end.
+// Many elements that are used once each do not count as endless work.
 TEST_F(Drawings, ManyElementsAreRead) {
   std::string body = "<style>.a{fill:red}.b{stroke:none}#c{opacity:1}</style>";
   for (int i = 0; i < 50'000; ++i)

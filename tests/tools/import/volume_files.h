@@ -1,4 +1,4 @@
-// What tests of volumes' files have in common.
+// Shared by the tests of volume files.
 #pragma once
 
 #include <gtest/gtest.h>
