@@ -1,4 +1,4 @@
-// Moving pictures, read back by the libraries and programs that everyone reads them with.
+// Tests animated pictures by reading them back with common libraries and programs.
 #include <fcntl.h>
 #include <gif_lib.h>
 #include <gmock/gmock.h>
@@ -21,7 +21,7 @@
 namespace voxeld::voxelctl {
 namespace {
 
-// A dark ground, a ramp of the most saturated colours across it, and a white square that moves.
+// A dark background, a ramp of the most saturated colours across it, and a white square that moves.
 Image Frame(int number) {
   Image image{96, 64, {}};
   image.rgb.resize(96 * 64 * 3);
@@ -118,7 +118,7 @@ TEST(OrderedDither, KeepsThePalettesColoursAndTheMeanOfOthers) {
   }
 }
 
-// A GIF's pictures, one over another as its reader shows them.
+// The pictures of a GIF, composed as a reader shows them.
 struct Shown {
   std::vector<Image> images;
   std::vector<int> delays;

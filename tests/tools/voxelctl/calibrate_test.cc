@@ -1,4 +1,5 @@
-// A person's part is played by answers; the display is the simulated one, opened and shown on for each of them.
+// Tests calibration with prepared answers in place of a person; the display is the simulated one,
+// opened and shown on for each of them.
 #include "tools/voxelctl/calibrate/calibrate.h"
 
 #include <gmock/gmock.h>
@@ -45,7 +46,8 @@ class CalibrateTest : public testing::Test {
   std::string said_;
 };
 
-// Two panels; the truth is mirrored, turns clockwise, and the second panel is 0.9 mm farther out.
+// Two panels; in truth it is mirrored and turns clockwise, and the second panel is 0.9 mm farther
+// out.
 TEST_F(CalibrateTest, ARotorsOrientationAndEccentricity) {
   const std::string thought =
       "r=simulated,geometry=rotor,size=16x8,slices=24,pitch_mm=3,eccentricity=1;0,rate=60";
@@ -63,7 +65,8 @@ TEST_F(CalibrateTest, ARotorsOrientationAndEccentricity) {
   EXPECT_THAT(said_, HasSubstr("voxeld --display r=simulated,profile="));
 }
 
-// A quarter of a turn takes what pointed along +x to +y: by the pixels' places, not by the option's name.
+// A quarter turn moves what pointed along +x to +y: tested by the pixels' places, not by the
+// option's name.
 TEST_F(CalibrateTest, AQuarterOfATurnIsOne) {
   const std::string thought =
       "simulated,geometry=rotor,size=8x4,slices=16,rate=60,eccentricity=0.5";
@@ -82,7 +85,7 @@ TEST_F(CalibrateTest, AQuarterOfATurnIsOne) {
 
 TEST_F(CalibrateTest, AStacksMirrorsOrderAndKeystone) {
   const std::string thought = "simulated,size=10x6x4,mirror_v=true,rate=60";
-  // Corners: what is asked first is at -5, -3; enter keeps it.
+  // Corners: the first question's default is -5, -3; enter keeps it.
   ASSERT_TRUE(Answer(thought, "reverse\nmirror-v\nok\nmeasure\n-4.5\n\n4.5\n\n\n\n\n\nok\n").ok())
       << said_;
   EXPECT_EQ(Written(), Of({{"size", "10x6x4"},
@@ -113,7 +116,7 @@ TEST_F(CalibrateTest, WhatCannotBeIsSaidAndNothingIsWritten) {
   EXPECT_EQ(Answer("simulated,size=8x8x4,rate=60", "ok\n").code(),
             absl::StatusCode::kFailedPrecondition);
   EXPECT_FALSE(std::filesystem::exists(file_));
-  // A keystone that no picture can have: as it was, and asked again.
+  // A keystone that no picture can have: it stays unchanged, and the question is asked again.
   ASSERT_TRUE(
       Answer("simulated,size=8x8x4,rate=60", "ok\nmeasure\n0\n0\n0\n0\n0\n0\n0\n0\nok\n").ok())
       << said_;

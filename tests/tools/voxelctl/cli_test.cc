@@ -1,4 +1,4 @@
-// The command line: what is understood, and what is said about what is not.
+// Tests the command line: which arguments are accepted, and the errors for others.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// Colours by numbers.
+// Tests colours by numbers.
 #include "tools/voxelctl/scene/color_by.h"
 
 #include <gmock/gmock.h>
@@ -11,7 +11,8 @@
 namespace voxeld::voxelctl {
 namespace color_by_test {
 
-// Viridis as the contract has it (colormaps.txt): the first, the middle (128 of 255) and the last colour.
+// Viridis according to the contract (colormaps.txt): the first, the middle (128 of 255) and the
+// last colour.
 constexpr Rgb kFirst = {68, 1, 84}, kMiddle = {33, 144, 140}, kLast = {253, 231, 37};
 
 Model Cloud(std::vector<Attribute> attributes) {
@@ -49,7 +50,7 @@ TEST(ColorBy, CoordinatesAreAsInTheFile) {
   Model model = Cloud({{"a", {0, 0, 0}}});
   ASSERT_THAT(ApplyColorBy({.attribute = "x"}, {&model, 1}), IsOk());
   EXPECT_EQ(model.parts[0].colors, (std::vector<Rgb>{kFirst, kMiddle, kLast}));
-  // All alike.
+  // All of them are equal.
   ASSERT_THAT(ApplyColorBy({.attribute = "z"}, {&model, 1}), IsOk());
   EXPECT_EQ(model.parts[0].colors, std::vector<Rgb>(3, kMiddle));
 }

@@ -1,4 +1,4 @@
-// voxelctl run in this process against a server that is in it too.
+// Runs voxelctl in this process against a server that is also in this process.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -39,7 +39,7 @@ class CommandsTest : public testing::Test {
     return {code, out.str(), err.str()};
   }
 
-  // The one document that is all of the data.
+  // Runs it, and returns its output, which must be a single JSON document.
   nlohmann::json RunJson(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "--json");
     const Result result = RunTool(std::move(arguments));

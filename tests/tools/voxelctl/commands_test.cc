@@ -1,4 +1,4 @@
-// The commands against a server in this process.
+// Tests the commands with a server in this process.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -85,7 +85,8 @@ TEST_F(CommandsTest, ALatticeIsListedAndPictured) {
   server_.Set({.lattice = true});
   EXPECT_THAT(RunTool({"displays"}).out, HasSubstr("lattice, 5 lights"));
   EXPECT_EQ(RunJson({"displays"})["displays"][0]["geometry"]["lattice"]["pixels"].size(), 5u);
-  // A pixel without a light has bytes too; what the server puts there is counted, not drawn.
+  // A pixel without a light has bytes too; the light that the server puts there is counted, but not
+  // drawn.
   EXPECT_EQ(RunJson({"snapshot", folder_.Path("a.png")})["lit_pixels"], 6);
   EXPECT_EQ(RunTool({"snapshot", folder_.Path("a.png"), "--slices"}).code, 0);
 }
@@ -100,7 +101,7 @@ TEST_F(CommandsTest, OneIsSingular) {
 }
 
 TEST_F(CommandsTest, StatsAreWatchedUntilAnInterrupt) {
-  // The fake sends without pause; the interrupt comes after the first line.
+  // The fake server sends without pause; the interrupt follows the first line.
   std::ostringstream out, err;
   Console console(out, err, true, false);
   auto connection = Connection::Connect(server_.address(), {}, interrupt_);
@@ -120,7 +121,7 @@ TEST_F(CommandsTest, StatsAreWatchedUntilAnInterrupt) {
 
 TEST_F(CommandsTest, WatchTellsWhatComesChangesAndGoes) {
   const Result result = RunTool({"watch", "--layer", "the\nother"});
-  EXPECT_EQ(result.code, kExitFailure);  // the server went
+  EXPECT_EQ(result.code, kExitFailure);  // the server exited
   EXPECT_EQ(result.out,
             "+ 7 voxelctl  of some\\u{1b}one\n"
             "+ 7 voxelctl a  sphere\n"
@@ -167,7 +168,7 @@ TEST_F(CommandsTest, PlayPutsUpObjectsAndInstancesThatStay) {
     for (const v1::Object::Part& part : log.objects.at(object).parts())
       EXPECT_TRUE(log.objects.contains(part.primitive().instance().object()));
   }
-  // What an earlier play left goes, owner by owner, and nobody else's.
+  // The layers that an earlier play left are removed, owner by owner, and those of no one else.
   ASSERT_EQ(log.clears.size(), 1u);
   EXPECT_EQ(log.clears[0].owner(), 7u);
   EXPECT_EQ(log.clears[0].layer(), "voxelctl");
@@ -279,7 +280,7 @@ TEST_F(CommandsTest, VolumesAreOneMessageEach) {
 TEST_F(CommandsTest, ASequenceReplacesEachByTheNext) {
   std::string many;
   for (int i = 0; i < 30000; ++i) many += "0 0 1\n";
-  folder_.Write("f_1.xyz", many);  // in several pieces, of which the third frame has no use
+  folder_.Write("f_1.xyz", many);  // in several pieces, which the third frame does not use
   folder_.Write("f_2.xyz", "0 0 0\n1 1 1\n");
   folder_.Write("f_3.xyz", "0 0 0\n1 1 1\n");
   const json summary = RunJson({"play", folder_.Path("f_#.xyz"), "--fps", "20"});

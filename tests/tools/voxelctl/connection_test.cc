@@ -1,4 +1,4 @@
-// What needs no server: addresses, issues, captured volumes.
+// Tests that need no server: addresses, issues, captured volumes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -39,7 +39,7 @@ TEST(ChooseServer, OptionThenVariableThenSocketThenPort) {
   TempFolder folder;
   std::map<std::string, std::string> variables = {{"XDG_RUNTIME_DIR", folder.Path("")}};
   const Environment environment = [&](const char* name) { return variables[name]; };
-  variables["XDG_RUNTIME_DIR"].pop_back();  // the slash at its end
+  variables["XDG_RUNTIME_DIR"].pop_back();  // without the final slash
 
   const std::string path = folder.Path("voxeld.sock");
   folder.Write("voxeld.sock", "a plain file is no socket");

@@ -1,4 +1,4 @@
-// Reading in a process of its own: what comes back, and what the reader cannot do.
+// Tests reading in a process of its own: the results, and what the reader cannot do.
 #include "tools/voxelctl/import/contained.h"
 
 #include <fcntl.h>
@@ -131,7 +131,7 @@ TEST(Contained, WhatGoesWrongIsSaid) {
   EXPECT_THAT(error([]() -> absl::StatusOr<Model> { std::abort(); }), HasSubstr("crashed"));
 }
 
-// A compromised reader can send models that no reader makes.
+// A compromised reader can send models that no correct reader makes.
 TEST(Contained, ModelsThatAreNotSoundAreRefused) {
   const auto refused = [](const std::function<void(Model&)>& spoil) {
     Model model;
@@ -176,7 +176,7 @@ TEST(Contained, ModelsThatAreNotSoundAreRefused) {
   EXPECT_TRUE(refused([](Model& m) { m.volumes[0].size = {968973220, 49477, 384773}; }));
 }
 
-// What `act` returns as a reader of `file`: 0, or the error of the call that failed.
+// Returns the result of `act`, run as a reader of `file`: 0, or the error of the call that failed.
 int ErrorOf(const SourceFile& file, const std::function<bool()>& act) {
   const auto model = ReadApart(file, [&act]() -> absl::StatusOr<Model> {
     Model told;
@@ -401,7 +401,7 @@ TEST(ContainedFrames, ACrashEndsOnlyTheReader) {
   EXPECT_THAT((*frames)->Read(1), IsOk());
   const auto crashed = (*frames)->Read(2);
   EXPECT_THAT(std::string(crashed.status().message()), HasSubstr("p: the library that reads it"));
-  // And it stays so.
+  // The error is permanent.
   EXPECT_EQ((*frames)->Read(1).status(), crashed.status());
 }
 
@@ -432,7 +432,7 @@ TEST(ContainedFrames, ReaderCannotOpenFilesOutsideOfTheFolder) {
   EXPECT_EQ((*frames)->Read(0)->note, "10");
 }
 
-// A reader that was taken over writes what it likes to its socket.
+// A compromised reader can write anything to its socket.
 void Send(const std::string& bytes) {
   (void)!::write(kAnswerDescriptor, bytes.data(), bytes.size());
 }
@@ -455,7 +455,7 @@ TEST(ContainedFrames, HalfAnAnswerKeepsTheParentWaitingNoLongerThanItsLimits) {
   }
 }
 
-// A byte now and then does not begin the limit anew.
+// Sending a byte now and then does not restart the time limit.
 TEST(ContainedFrames, AnAnswerInDropsHasTheSameLimit) {
   const auto frames = PointFrames(
       [](int64_t, Model&) {
@@ -473,7 +473,7 @@ TEST(ContainedFrames, AnAnswerInDropsHasTheSameLimit) {
 TEST(ContainedFrames, AnswersThatNobodyAskedForDoNotBlockTheParent) {
   const auto frames = PointFrames([](int64_t frame, Model&) {
     if (frame != 0) return;
-    // It sends without end, and does not read what it is asked any more.
+    // It sends endlessly, and no longer reads requests.
     for (;;) Send(std::string(4096, 'x'));
   });
   ASSERT_THAT(frames, IsOk());
@@ -492,9 +492,9 @@ TEST(Contained, AnswersThatNoReaderGivesAreRefused) {
         Case{std::string(64, 'x'), "gave an answer that is none"},
         Case{std::string("VXMODEL\2\0\0\0\0", 12), "are of different releases"},
         Case{ok, "gave up halfway"}, Case{ok + many, "gave up halfway"},
-        Case{head + "\7", "gave up halfway"},                                // up
+        Case{head + "\7", "gave up halfway"},                                // the up axis
         Case{head + std::string(4, '\0') + many, "gave up halfway"},         // parts
-        Case{head + std::string(4, '\0') + "\1" + none, "gave up halfway"},  // no whole number
+        Case{head + std::string(4, '\0') + "\1" + none, "gave up halfway"},  // not an integer
         Case{head + std::string(4, '\0') + "\1" + std::string(7, '\0') + "\x09",
              "gave up halfway"}}) {  // the kind of a part
     const auto model = ReadApart({.path = "p"}, [&bytes]() -> absl::StatusOr<Model> {
@@ -517,7 +517,7 @@ TEST(Contained, AnAnswerOfMoreThanTheLimitIsRefused) {
   EXPECT_THAT(std::string(model.status().message()), HasSubstr("made more than 1048576 bytes"));
 }
 
-// Memory that this process has, in bytes.
+// Returns the memory of this process, in bytes.
 int64_t ResidentBytes() {
   std::ifstream file("/proc/self/statm");
   int64_t all = 0, resident = 0;

@@ -1,4 +1,4 @@
-// What the demo's scenes are made of.
+// Tests the contents of the demo's scenes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -53,7 +53,8 @@ Life WithLiving(int side, const std::vector<Cell>& cells) {
   return life;
 }
 
-// Each of the square has 3 around it, too few to stay; the places above and below it have 4, those beside it 2 at most.
+// Each cell of the square has 3 around it, too few to stay; the places above and below it have 4,
+// those beside it 2 at most.
 TEST(LifeRule, ASquareBecomesTwoThatLeaveIt) {
   Life life = WithLiving(12, {{5, 5, 5}, {6, 5, 5}, {5, 6, 5}, {6, 6, 5}});
   life.Step();
@@ -62,7 +63,8 @@ TEST(LifeRule, ASquareBecomesTwoThatLeaveIt) {
                                    Cell{5, 5, 6}, Cell{6, 5, 6}, Cell{5, 6, 6}, Cell{6, 6, 6}));
   EXPECT_EQ(CellsOf(life, 3).size(), 4u) << "the square fades";
   life.Step();
-  // On to both sides; and beside the square that fades, two of each new one are around a place, which makes four.
+  // They continue to both sides; and beside the fading square, two of each new one are around a
+  // place, which makes four.
   EXPECT_THAT(CellsOf(life, Life::kAlive),
               UnorderedElementsAre(Cell{5, 5, 3}, Cell{6, 5, 3}, Cell{5, 6, 3}, Cell{6, 6, 3},
                                    Cell{5, 5, 7}, Cell{6, 5, 7}, Cell{5, 6, 7}, Cell{6, 6, 7},
@@ -81,7 +83,8 @@ TEST(LifeRule, ASquareWithOneThatFadesBehindItGoesAheadForEver) {
   }
 }
 
-// The middle of a plus has 4 around it and stays; each arm has the middle and, across corners, two other arms.
+// The middle of a plus has 4 around it and stays; each arm has the middle and, diagonally, two
+// other arms.
 TEST(LifeRule, AMiddleWithFourStaysAndItsArmsFade) {
   Life life = WithLiving(12, {{5, 5, 5}, {4, 5, 5}, {6, 5, 5}, {5, 4, 5}, {5, 6, 5}});
   life.Step();

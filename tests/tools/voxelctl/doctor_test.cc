@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 using State = Finding::State;
 using ::testing::HasSubstr;
 
-// A machine made of files.
+// A machine simulated by files.
 class DoctorTest : public testing::Test {
  protected:
   DoctorTest() {
@@ -48,7 +48,7 @@ class DoctorTest : public testing::Test {
     Write(device + "/busnum", "3\n");
     Write(device + "/devnum", std::to_string(number) + "\n");
   }
-  // The findings of a kind.
+  // Returns the findings of a kind.
   std::vector<Finding> Of(const std::string& what) const {
     std::vector<Finding> found;
     for (const Finding& f : Examine(machine_)) {
@@ -101,7 +101,7 @@ TEST_F(DoctorTest, DevicesThatCannotBeOpened) {
   absl::Status status;
   Told(false, &status);
   EXPECT_EQ(status.message(), "1 thing is to be mended");
-  // Where the rules are missing they are what mends it.
+  // If the rules are missing, they are the remedy.
   fs::remove(folder_.Path("rules/70-voxeld.rules"));
   EXPECT_THAT(Of("usb")[0].fix, HasSubstr("cp packaging/70-voxeld.rules"));
   EXPECT_EQ(Of("udev")[0].state, State::kNote);

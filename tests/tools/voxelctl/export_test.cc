@@ -1,4 +1,4 @@
-// Files for other programs, read back: by numpy, and by what `play` reads.
+// Tests files for other programs by reading them back: with numpy, and with the readers of `play`.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -55,7 +55,7 @@ TEST(WritePly, OfNothingHasNoPoint) {
   EXPECT_THAT(ReadAll(folder.Path("a.ply")), HasSubstr("element vertex 0\n"));
 }
 
-// Where each voxel of a scene is, by the scene's nodes; its colour.
+// Maps the place of each voxel of a scene, by the scene's nodes, to its colour.
 using Placed = std::map<std::vector<int>, std::vector<int>>;
 
 Placed Place(const VoxScene& scene) {

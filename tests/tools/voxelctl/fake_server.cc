@@ -13,7 +13,7 @@ constexpr int kSide = 16;
 constexpr const char* kDisplay = "fake";
 constexpr uint64_t kOwner = 42;
 
-// A cube of 16 lying slices; 8 voxels a scene unit, the scene's origin in its middle.
+// A cube of 16 horizontal slices; 8 voxels a scene unit, with the scene's origin in its middle.
 void FillGeometry(v1::Geometry* geometry) {
   v1::PlanarStack* stack = geometry->mutable_planar_stack();
   stack->set_width_px(kSide);
@@ -142,7 +142,7 @@ class FakeServer::Scene final : public v1::SceneService::Service {
     return grpc::Status::OK;
   }
 
-  // Three change sets, the first in two messages; then it fails.
+  // Three change sets, the first in two messages; then the call fails.
   grpc::Status WatchScene(grpc::ServerContext*, const v1::WatchSceneRequest* request,
                           grpc::ServerWriter<v1::WatchSceneResponse>* writer) override {
     {
@@ -228,7 +228,7 @@ class FakeServer::Scene final : public v1::SceneService::Service {
   grpc::Status ClearLayer(grpc::ServerContext*, const v1::ClearLayerRequest* request,
                           v1::ClearLayerResponse* response) override {
     sync::MutexLock lock(server_.mutex_);
-    // Nothing is ever masked there.
+    // The fake server never has a mask layer.
     if (request->layer() == "voxelctl mask") return {grpc::StatusCode::NOT_FOUND, "no such layer"};
     server_.log_.clears.push_back(*request);
     if (request->layer() == "absent") return {grpc::StatusCode::NOT_FOUND, "no layer absent"};

@@ -1,5 +1,5 @@
-// A server with just enough of both services: it keeps what it is sent,
-// and can be told to misbehave.
+// A server with a minimal implementation of both services: it records what it is sent, and can be
+// made to misbehave.
 #pragma once
 
 #include <grpcpp/server.h>
@@ -17,29 +17,29 @@ namespace voxeld::voxelctl {
 
 class FakeServer final {
  public:
-  // Listens on a unix socket at `path`.
+  // Listens on a Unix socket at `path`.
   explicit FakeServer(const std::string& path);
   ~FakeServer();
 
   std::string address() const { return address_; }
 
-  // Set before the calls that they are for.
+  // Set before the calls to which they apply.
   struct Behaviour {
-    std::string refuse_commits_with;  // not empty: every commit is refused, with an issue
-    bool note_commits = false;        // every commit has an issue that is no refusal
+    std::string refuse_commits_with;  // if not empty, every commit is refused, with an issue
+    bool note_commits = false;        // every commit has an issue that is not a refusal
     bool lose_entities = false;       // SetTransform is answered by an Issue NOT_FOUND
-    bool no_outcomes = false;         // outcomes are owed for ever
+    bool no_outcomes = false;         // outcomes stay outstanding forever
     bool short_volume = false;        // CaptureVolume leaves out its last slice
-    bool hold_streams = false;        // a stream whose client is done is not ended
+    bool hold_streams = false;        // a stream is not ended when its client is done
     bool behind = false;              // no volume ever shows the newest snapshot
-    bool no_watches = false;          // all of the scene's are in use
-    bool lattice = false;  // the display is one of two slices of three lights, one absent
+    bool no_watches = false;          // all scene watches are in use
+    bool lattice = false;             // the display has two slices of three lights, one absent
   };
   void Set(const Behaviour& behaviour);
 
   struct Log {
     std::map<std::string, v1::Object> objects;
-    std::map<std::string, v1::Entity> entities;  // those up, by id
+    std::map<std::string, v1::Entity> entities;  // the present entities, by id
     std::vector<v1::Open> opens;
     uint64_t commits = 0, transforms = 0, largest_message = 0, most_unanswered = 0;
     std::vector<v1::ClearLayerRequest> clears;

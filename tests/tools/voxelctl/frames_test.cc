@@ -1,4 +1,4 @@
-// Models that follow one another: which files are a sequence, and one place for all of them.
+// Tests sequences of models: which files form a sequence, and one placement for all of them.
 #include "tools/voxelctl/import/frames.h"
 
 #include <gmock/gmock.h>

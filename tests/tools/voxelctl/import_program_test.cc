@@ -1,4 +1,4 @@
-// Files that voxelctl hands to voxeld-import, where that is beside it and where it is not.
+// Tests files that voxelctl passes to voxeld-import, with and without that program beside it.
 #include "tools/voxelctl/import/import_program.h"
 
 #include <gmock/gmock.h>

@@ -26,7 +26,7 @@ class InitTest : public testing::Test {
     said_ = err.str();
     return status;
   }
-  // Where the display's lights are, by pixel.
+  // Returns where the display's lights are, by pixel.
   display::Lattice Lattice() const {
     const auto profile = display::ReadProfile(file_);
     EXPECT_TRUE(profile.ok()) << profile.status();
@@ -48,7 +48,8 @@ TEST_F(InitTest, EnterAlwaysIsACubeOnABoard) {
   EXPECT_THAT(said_, HasSubstr("voxeld --display lattice=fadecandy,profile="));
 }
 
-// 3 wide, 2 deep, 4 high; the first light is at the back, top, right; strands hang down, the next one is to the left.
+// 3 wide, 2 deep, 4 high; the first light is at the back, top, right; strands hang down, and the
+// next one is to the left.
 TEST_F(InitTest, WordsAreAPlaceForEveryLight) {
   ASSERT_TRUE(
       Answer(
@@ -60,10 +61,10 @@ TEST_F(InitTest, WordsAreAPlaceForEveryLight) {
   const auto at = [&](size_t n) { return *lattice.points_mm[n]; };
   EXPECT_EQ(at(0), (display::Vec3{10, 5, 15}));   // right, back, top
   EXPECT_EQ(at(3), (display::Vec3{10, 5, -15}));  // down
-  EXPECT_EQ(at(4), (display::Vec3{0, 5, -15}));   // the next strand comes up again
+  EXPECT_EQ(at(4), (display::Vec3{0, 5, -15}));   // the next strand goes up again
   EXPECT_EQ(at(7), (display::Vec3{0, 5, 15}));
   EXPECT_EQ(at(8), (display::Vec3{-10, 5, 15}));
-  EXPECT_EQ(at(12), (display::Vec3{10, -5, 15}));  // the layer before it begins like the first
+  EXPECT_EQ(at(12), (display::Vec3{10, -5, 15}));  // the layer in front of it begins like the first
 }
 
 TEST_F(InitTest, AContinuousChainNeverJumps) {

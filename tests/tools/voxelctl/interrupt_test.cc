@@ -1,5 +1,5 @@
-// Interrupts. In a program of its own: signals go to a whole process,
-// and threads that others made take them.
+// Tests interrupts, in a program of its own: signals go to a whole process, and threads that other
+// code made may receive them.
 #include "tools/voxelctl/process/interrupt.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Which light is where: by places worked out by hand.
+// Tests which light is where, with places computed by hand.
 #include "tools/voxelctl/lights/light_map.h"
 
 #include <gmock/gmock.h>
@@ -13,7 +13,8 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-// Voxels of 2 mm, the volume's corner at (-10, 0, 0); a scene that is turned, doubled and moved: voxel = (5 - 2y, 2x, 4z + 1).
+// Voxels of 2 mm, with the volume's corner at (-10, 0, 0); a scene that is rotated, doubled and
+// moved: voxel = (5 - 2y, 2x, 4z + 1).
 v1::DisplayDescription Display(int nx, int ny, int nz) {
   v1::DisplayDescription display;
   display.set_name("cube");
@@ -31,7 +32,7 @@ v1::DisplayDescription Display(int nx, int ny, int nz) {
   return display;
 }
 
-// Where a place comes to lie, in voxels: by the map there and the display's view back.
+// Returns where a place is in voxels: by the map, and the display's view in reverse.
 std::vector<double> Voxel(const LightMap& map, size_t place) {
   const auto apply = [](const auto& m, const std::vector<double>& p) {
     std::vector<double> out;
@@ -69,7 +70,7 @@ TEST(LightMap, ABoxIsInTheMiddleAndAsLargeAsItCanBe) {
 TEST(LightMap, ABoxLiesWithinARotorsRound) {
   v1::DisplayDescription display = Display(10, 10, 4);
   display.mutable_geometry()->mutable_rotor();
-  const auto map = LightsInBox({3, 4, 1}, display);  // its diagonal is 5 lights: of two voxels
+  const auto map = LightsInBox({3, 4, 1}, display);  // its diagonal is 5 lights: of two voxels each
   ASSERT_TRUE(map.ok()) << map.status();
   EXPECT_THAT(Voxel(*map, 0), ElementsAre(2, 1, 1));
   EXPECT_THAT(Voxel(*map, 11), ElementsAre(6, 7, 1));
@@ -96,7 +97,8 @@ TEST(LightMap, ALatticesLightsAreItsPixels) {
 }
 
 TEST(LightMap, ALayoutIsFitted) {
-  // Ten units along x and five along y: the volume's 11 voxels leave one a unit between their middles.
+  // Ten units along x and five along y: between the middles of the volume's 11 voxels there is one
+  // voxel for each unit.
   const auto map = LightsOfLayout(
       R"([{"point": [0, 0, 0]}, null, {"point": [10, 0, 0]}, {"point": [10, 5, 0]}])",
       Display(11, 11, 3));

@@ -1,4 +1,4 @@
-// GeoJSON and TopoJSON, flat and on the globe.
+// Tests GeoJSON and TopoJSON, flat and on the globe.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,7 +15,7 @@ namespace {
 
 using testing::ElementsAre;
 
-// The segments of a part as pairs of ends.
+// Returns the segments of a part as pairs of ends.
 std::vector<std::pair<Point3, Point3>> Segments(const Part& part) {
   std::vector<std::pair<Point3, Point3>> segments;
   for (size_t i = 0; i + 1 < part.indices.size(); i += 2) {
@@ -235,7 +235,7 @@ TEST(GeoJson, LinesOverTheDateLineOfOtherSpellings) {
               ElementsAre(std::pair(Point3{350, 0, 0}, Point3{360, 5, 0}),
                           std::pair(Point3{0, 5, 0}, Point3{10, 10, 0}),
                           std::pair(Point3{10, 10, 0}, Point3{190, 10, 0})));
-  // Longitudes that count on beyond 180 say themselves which way they go.
+  // Longitudes that continue beyond 180 state their direction themselves.
   EXPECT_EQ(segments("[[-10,0],[190,0]]").size(), 1u);
 }
 
@@ -289,7 +289,7 @@ TEST(Globe, EdgesOfThePaperAreLeftOut) {
   const absl::StatusOr<Model> model =
       ImportText(Line("[[-180,-70],[-180,-90],[180,-90],[180,-70],[170,-70]]"), true);
   ASSERT_THAT(model, IsOk());
-  EXPECT_EQ(Segments(model->parts[0]).size(), 5u);  // the last edge alone, in steps of 2°
+  EXPECT_EQ(Segments(model->parts[0]).size(), 5u);  // only the last edge, in steps of 2°
 }
 
 TEST(Globe, WantsDegrees) {
@@ -331,9 +331,10 @@ TEST(WorldAtlas, CountriesOnTheGlobe) {
   EXPECT_GT(part.positions.size(), 80000u);
   double longest = 0;
   for (const auto& [a, b] : Segments(part)) longest = std::max(longest, Distance(a, b));
-  // No chord through the Earth: each edge has 2° a coordinate at most.
+  // No chord through the Earth: each edge spans at most 2° in each coordinate.
   EXPECT_LT(longest, 2 * std::sin(1.5 * M_PI / 180));
-  // Some point of Africa's west coast, Dakar (14.7 N, 17.5 W), is near, in front and to the left.
+  // Dakar (14.7 N, 17.5 W), on Africa's west coast, is close to some point, in front and to the
+  // left.
   const Point3 dakar = {std::cos(14.7 * M_PI / 180) * std::sin(-17.5 * M_PI / 180),
                         -std::cos(14.7 * M_PI / 180) * std::cos(17.5 * M_PI / 180),
                         std::sin(14.7 * M_PI / 180)};
@@ -346,7 +347,7 @@ TEST(WorldAtlas, LandOnAFlatMap) {
   const absl::StatusOr<Model> model =
       ReadHere(std::string(VOXELD_DATA_DIR) + "/world-atlas/land-110m.json", {});
   ASSERT_THAT(model, IsOk()) << "tools/setup fetches world-atlas into build/data";
-  // No line runs across the map: what crosses the date line was split.
+  // No line runs across the map: lines that cross the date line were split.
   for (const auto& [a, b] : Segments(model->parts[0])) EXPECT_LT(std::abs(a.x - b.x), 60);
 }
 

@@ -1,4 +1,4 @@
-// Commands whose part a build leaves out.
+// Tests commands whose part a build leaves out.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ TEST_F(PartsTest, CommandNotBuiltReportsHowToAddItInOneLine) {
         "VOXELD_RECORDING playlist a.toml", "VOXELD_LIGHTS input opc",
         "VOXELD_LIGHTS pipe --size 2x2x2", "VOXELD_MARKERS markers ws://127.0.0.1:8765"}) {
     const std::vector<std::string> words = absl::StrSplit(line, ' ');
-    // No server is needed for the answer.
+    // The answer needs no server.
     std::vector<std::string> arguments = {"--server", "127.0.0.1:1"};
     arguments.insert(arguments.end(), words.begin() + 1, words.end());
     const Result result = RunAnywhere(arguments);

@@ -1,4 +1,4 @@
-// Commands that make pictures and files of what a display shows.
+// Tests commands that make pictures and files of what a display shows.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,5 @@
-// PLY with surfaces: every way to write faces, colors and normals, and every way in which they may be broken.
+// Tests PLY with surfaces: every way to write faces, colors and normals, and every way in which
+// they may be broken.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -34,7 +35,7 @@ std::string VertexElement(int count) {
 constexpr const char* kFace = "element face 1\nproperty list uchar int vertex_indices\n";
 constexpr const char* kSquare = "0 0 0\n4 0 0\n4 0 1\n0 0 1\n";
 
-// Twice the area of all triangles.
+// Returns twice the area of all triangles.
 double AreaOf(const Part& part) {
   double area = 0;
   for (size_t i = 0; i + 2 < part.indices.size(); i += 3) {
@@ -104,7 +105,7 @@ TEST(PlyMesh, LinesMayEndByEitherMarkOrBoth) {
   const std::string text = AsciiPly(VertexElement(4) + kFace, absl::StrCat(kSquare, "4 0 1 2 3\n"));
   for (const char* end : {"\n", "\r\n", "\r"})
     ExpectSquare(Ply(absl::StrReplaceAll(text, {{"\n", end}})));
-  // Binary data may begin with a byte that is either mark.
+  // Binary data may begin with a byte that is either line end.
   for (const char* end : {"\n", "\r\n", "\r"}) {
     for (const char first : {'\n', '\r'}) {
       std::string data(12, '\0');
@@ -182,7 +183,7 @@ INSTANTIATE_TEST_SUITE_P(Types, PlyMeshBinary,
                                          Binary{"uints", false, "uint", "uint"}),
                          [](const auto& info) { return info.param.name; });
 
-// Faces with colors of floats before vertices, and a strip behind both.
+// Faces with colors as floats before vertices, and a strip after both.
 TEST_P(PlyMeshBinary, IsReadInAnyOrderOfElements) {
   const auto& [name, big, count_type, index_type] = GetParam();
   std::string bytes = absl::StrCat(
@@ -198,7 +199,7 @@ TEST_P(PlyMeshBinary, IsReadInAnyOrderOfElements) {
     bytes += Swapped(value, big);
   const bool restarts = index_type != std::string("uchar") && index_type != std::string("ushort");
   bytes += Swapped<int32_t>(restarts ? 7 : 3, big);
-  // −1 begins a strip; as a number without a sign it has the same bits.
+  // −1 begins a strip; as an unsigned number it has the same bits.
   for (const int index : {0, 1, 2}) bytes += OfType(index_type, index, big);
   for (const int index : {-1, 1, 3, 2}) bytes += restarts ? OfType(index_type, index, big) : "";
   const absl::StatusOr<Model> model = Ply(bytes);
@@ -272,7 +273,7 @@ TEST(PlyMesh, SharpEdgesStayEdgesAndOthersAreSmooth) {
   EXPECT_EQ(sharp->parts[0].positions.size(), 8u) << "two normals at each end of the edge";
 }
 
-// The L of a square of 3 without its upper right square of 2.
+// The L that remains of a square of 3 without its upper right square of 2.
 TEST(PlyMesh, AConcavePolygonIsFilledWithinItsOutline) {
   for (int begin = 0; begin < 6; ++begin) {
     std::string face = "6";

@@ -1,4 +1,4 @@
-// Point clouds: every way to write them, and every way in which they may be broken.
+// Tests point clouds: every way to write them, and every way in which they may be broken.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -129,7 +129,7 @@ TEST(PlyPoints, FloatColorsGoTo255WhereOneIsGreaterThan1) {
   EXPECT_EQ(colors("0 0 0 1 0 0\n1 1 1 0.5 1 0\n"), (std::vector<Rgb>{{255, 0, 0}, {128, 255, 0}}));
 }
 
-// Exporters write 0 to 255 in whatever type they have; the scale is that of the whole file.
+// Exporters write 0 to 255 in any type; the scale applies to the whole file.
 TEST(PlyPoints, WholeColorsGoTo255WhereNoneIsGreater) {
   TempFolder folder;
   const auto colors = [&](const std::string& type, const std::string& body) {
@@ -155,7 +155,7 @@ TEST(PlyPoints, WholeColorsGoTo255WhereNoneIsGreater) {
             (std::vector<Rgb>{{0, 1, 0}, {0, 0, 255}}));
 }
 
-// All in one file: bytes, whole numbers that go to 255, fractions.
+// All in one file: bytes, integers up to 255, fractions.
 TEST(PlyPoints, EachChannelHasTheScaleOfItsType) {
   TempFolder folder;
   const absl::StatusOr<Model> model =
@@ -277,8 +277,8 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(PlyPoints, SaysWhenACopyAsTextHasDamagedIt) {
   TempFolder folder;
-  // 200 line feeds by chance in what ought to be binary, none after a carriage return,
-  // and some bytes missing.
+  // 200 random line feeds in what should be binary, none of them after a carriage return, and some
+  // missing bytes.
   std::string data;
   for (int i = 0; i < 200; ++i) {
     data += '\n';
@@ -321,7 +321,7 @@ TEST(PlyPoints, MendsACloudWithNormalsThatWasCopiedAsText) {
   size_t elsewhere = 0;
   for (size_t i = 0; i < positions.size(); ++i)
     elsewhere += model->parts[0].positions[i] == positions[i] ? 0 : 1;
-  // Where a byte went missing cannot always be told from its neighbour.
+  // It is not always clear which of two adjacent bytes is missing.
   EXPECT_LE(elsewhere, 2 * lost);
 }
 

@@ -67,7 +67,7 @@ TEST(Profile, OfAGridThatIsTooLargeCountsNothing) {
   EXPECT_EQ(json["voxels"][0], 4001);
 }
 
-// A panel on the axis: what is near it is lit more often than what is far.
+// A panel on the axis: voxels near it are lit more often than distant ones.
 TEST(Profile, CountsHowOftenVoxelsAreLit) {
   const TempFolder folder;
   const std::string path =

@@ -1,4 +1,5 @@
-// Reads files of own formats as ImportFile does, but in this process: much faster, and sanitizers see what happens.
+// Reads files of our own formats as ImportFile does, but in this process: it is much faster, and
+// sanitizers can check it.
 #pragma once
 
 #include <string>

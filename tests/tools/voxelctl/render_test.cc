@@ -1,4 +1,4 @@
-// Pictures: what is right, up and near in the display is so in the picture.
+// Tests pictures: what is right, up and near in the display is so in the picture.
 #include <gtest/gtest.h>
 #include <png.h>
 
@@ -29,7 +29,7 @@ Volume Empty(display::Geometry geometry, int width, int height) {
   return volume;
 }
 
-// 32 lying slices of 32×32 pixels, 1 mm apart all ways.
+// 32 horizontal slices of 32×32 pixels, 1 mm apart in all directions.
 Volume Stack() {
   display::PlanarStack stack;
   stack.width_px = stack.height_px = 32;
@@ -78,12 +78,12 @@ void Light(Volume* volume, display::Vec3 at, double radius, uint8_t r, uint8_t g
 }
 
 struct Spot {
-  double x = 0, y = 0;  // middle of its light
+  double x = 0, y = 0;  // the middle of its light
   int brightest = 0;
-  double area = 0;  // elements over half of the brightest
+  double area = 0;  // the screen pixels above half of the brightest
 };
 
-// Of one channel, leaving out what the outline and the axes have in it.
+// Finds the spot of one channel, ignoring the parts of it in the outline and the axes.
 Spot Find(const Image& image, int channel) {
   Spot spot;
   double sum = 0;
@@ -121,7 +121,7 @@ class RenderTest : public testing::TestWithParam<Kind> {
   }
 };
 
-// Of displays whose pixels are no points with gaps between.
+// Displays whose pixels are not points with gaps in between.
 class SurfaceTest : public RenderTest {};
 
 TEST_P(RenderTest, RightIsRightAndUpIsUp) {
@@ -167,8 +167,8 @@ TEST_P(RenderTest, NearerIsBrighterAndLarger) {
   EXPECT_GT(near.area, far.area * 1.2);
 }
 
-// Near the axis many pixels show one place: if each has less light for that, the place looks as bright as one at the rim. From
-// above, so that both are as near.
+// Near the axis many pixels show one place: if each has less light because of that, the place looks
+// as bright as one at the rim. Seen from above, so that both are equally near.
 TEST(Render, PixelsThatCrowdAreSeenTogether) {
   for (const bool even : {false, true}) {
     Volume volume = Spinner();
@@ -194,7 +194,7 @@ TEST(Render, PixelsThatCrowdAreSeenTogether) {
 TEST_P(RenderTest, WalkingRoundTheDisplay) {
   Volume volume = NewVolume();
   Light(&volume, {9, 0, 0}, 1.6, 255, 0, 0);
-  // From the right side what is right is near and in the middle; from behind it is left.
+  // From the right side, what is right is near and in the middle; from behind it is left.
   EXPECT_NEAR(Find(Draw(volume, {90, 0}), 0).x, 160, 6);
   EXPECT_LT(Find(Draw(volume, {180, 0}), 0).x, 130);
   const Spot side = Find(Draw(volume, {90, 0}), 0), front = Find(Draw(volume, kFront), 0);
@@ -219,7 +219,7 @@ TEST_P(SurfaceTest, WhatIsInFrontCoversWhatIsBehind) {
 
 TEST_P(SurfaceTest, SurfacesClose) {
   Volume volume = NewVolume();
-  // A wall across the middle: no dark gaps between its pixels.
+  // A wall across the middle: without dark gaps between its pixels.
   for (int s = 0; s < volume.slices; ++s) {
     for (int u = 0; u < volume.width; ++u) {
       for (int v = 0; v < volume.height; ++v) {
@@ -264,7 +264,7 @@ TEST(RenderLattice, APixelWithoutALightIsNotDrawn) {
   const Image dark = RenderVolume(volume, options);
   absent[0] = absent[1] = absent[2] = 255;
   EXPECT_EQ(RenderVolume(volume, options).rgb, dark.rgb);
-  absent[3] = absent[4] = absent[5] = 255;  // its neighbour is there
+  absent[3] = absent[4] = absent[5] = 255;  // its neighbour exists
   EXPECT_NE(RenderVolume(volume, options).rgb, dark.rgb);
 }
 
@@ -375,7 +375,7 @@ TEST(WritePng, ReadsBackAndReplacesWhole) {
   EXPECT_EQ(back.width, 5);
   EXPECT_EQ(back.height, 3);
   EXPECT_EQ(back.rgb, image.rgb);
-  // Nothing is left beside it.
+  // No other file is left beside it.
   size_t files = 0;
   for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder.Path(".")))
     ++files;
@@ -398,7 +398,8 @@ TEST(Palette, KeepsAFewColoursAndMeansOfMany) {
   EXPECT_EQ(few.colors.size(), 8u);
   for (size_t i = 0; i < 256; ++i) {
     const std::array<uint8_t, 3>& color = few.colors[few.indices[i]];
-    // Four colours to each of the two rows of 128 levels: 64 levels a colour, its mean in their middle.
+    // Four colours for each of the two rows of 128 levels: 64 levels for a colour, whose mean is in
+    // their middle.
     EXPECT_NEAR(color[0], image.rgb[i * 3], 32) << i;
     EXPECT_EQ(color[1], image.rgb[i * 3 + 1]) << i << ": what differs most is told apart first";
     EXPECT_EQ(color[2], 7);

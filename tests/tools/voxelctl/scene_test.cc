@@ -1,4 +1,4 @@
-// Placement, look and packing.
+// Tests placement, style and packing.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -52,7 +52,7 @@ TEST(VisibleSpace, InVoxelsAndTurned) {
   EXPECT_EQ(voxels->center, (Point3{100, 50, 25}));
   EXPECT_EQ(voxels->half, (Point3{100, 50, 25}));
   EXPECT_TRUE(voxels->round);
-  // A quarter turn about z, off centre: the cube that fits.
+  // A quarter turn about z, off centre: the largest cube that fits.
   const absl::StatusOr<DisplaySpace> turned =
       VisibleSpace(200, 100, 50, {{0, -10, 0, 120, 10, 0, 0, 50, 0, 0, 10, 25}}, false);
   ASSERT_THAT(turned, IsOk());
@@ -188,7 +188,7 @@ TEST(ApplyLook, Fills) {
 
 // ---------------------------------------------------------------------------------- packing
 
-// Triangles as multisets of corners, out of the wire's messages.
+// Triangles as multisets of corners, taken from the messages.
 using Corner = std::tuple<float, float, float, int>;
 using Triangles = std::multiset<std::array<Corner, 3>>;
 
@@ -382,7 +382,7 @@ TEST(PackObject, APictureGoesWithEachPieceOfItsPart) {
         std::memcpy(place, mesh.texture().coordinates().data() + v * 8, 8);
         std::memcpy(position, mesh.vertices().positions().data() + v * 12, 12);
         EXPECT_EQ(place[1], 0.25f);
-        EXPECT_EQ(place[0], position[0]) << v;  // as HalfTextured places them
+        EXPECT_EQ(place[0], position[0]) << v;  // as placed by HalfTextured
       }
     }
     EXPECT_EQ(textured, 5000u);
@@ -392,7 +392,7 @@ TEST(PackObject, APictureGoesWithEachPieceOfItsPart) {
 }
 
 TEST(PackObject, APictureThatIsNotSentColoursTheVertices) {
-  // Of points there are no pictures, and the second is larger than a message.
+  // Points have no pictures, and the second is larger than a message.
   const std::string picture = pictures::PngOf(2, 1, {0xff8000, 0x00ff00});
   Model points{.path = "p"};
   points.pictures = {picture};

@@ -1,4 +1,4 @@
-// Shapes as people type them.
+// Tests shapes as typed by a user.
 #include "tools/voxelctl/shape/shape_text.h"
 
 #include <gmock/gmock.h>
@@ -92,7 +92,7 @@ TEST(ShapeText, FieldsOfEveryTypeComeThrough) {
 
 TEST(ShapeText, ShapesArePlaced) {
   const v1::Entity entity = Parsed("sphere radius=1 at=1,2,3 scale=2,1,1 turn=0,0,90");
-  // x, doubled, comes to lie along y.
+  // x, doubled, is mapped to y.
   EXPECT_NEAR(entity.transform().m(0), 0, 1e-12);
   EXPECT_NEAR(entity.transform().m(4), 2, 1e-12);
   EXPECT_NEAR(entity.transform().m(1), -1, 1e-12);
@@ -239,7 +239,7 @@ TEST(AsTyped, ARefusalIsToldInTheWordsOfTheCommandLine) {
   EXPECT_EQ(AsTyped(absl::UnavailableError("gone"), shapes), absl::UnavailableError("gone"));
 }
 
-// The gallery has every shape that there is.
+// The gallery has every existing shape.
 TEST(ShapeText, EveryShapeHasAnExample) {
   std::set<std::string> shown;
   for (const ShapeExample& example : ShapeExamples()) {

@@ -1,4 +1,4 @@
-// Matchers of statuses by their words.
+// Matchers of statuses by their messages.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -21,7 +21,7 @@ MATCHER(IsOk, "") {
   return StatusOf(arg).ok();
 }
 
-// An error whose message contains every one of `words`.
+// Matches an error whose message contains every one of `words`.
 MATCHER_P(Fails, words, "") {
   const absl::Status& status = StatusOf(arg);
   *result_listener << status.ToString();

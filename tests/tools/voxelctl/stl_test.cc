@@ -1,4 +1,5 @@
-// STL: ASCII and binary files as different programs write them, their colors, and broken ones.
+// Tests STL: ASCII and binary files as written by different programs, their colors, and broken
+// ones.
 #include <gtest/gtest.h>
 
 #include <cmath>

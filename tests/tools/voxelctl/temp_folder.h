@@ -1,4 +1,4 @@
-// A folder of a test's own, gone with it.
+// A folder for one test, removed with it.
 #pragma once
 
 #include <unistd.h>
@@ -27,7 +27,7 @@ class TempFolder {
 
   std::string Path(const std::string& name) const { return (path_ / name).string(); }
 
-  // Writes a file; its path.
+  // Writes a file. Returns its path.
   std::string Write(const std::string& name, const std::string& bytes) const {
     std::ofstream(path_ / name, std::ios::binary) << bytes;
     return Path(name);
@@ -44,7 +44,7 @@ inline std::string ReadAll(const std::string& path) {
   return out.str();
 }
 
-// Files in tests/tools/data.
+// Returns the path of a file in tests/tools/data.
 inline std::string DataFile(const std::string& name) {
   return std::string(VOXELD_TEST_DATA_DIR) + "/" + name;
 }

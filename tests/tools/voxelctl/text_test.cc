@@ -1,4 +1,4 @@
-// Words for terminals, tables, JSON.
+// Tests texts for terminals, tables, JSON.
 #include <gtest/gtest.h>
 
 #include <limits>

@@ -1,4 +1,4 @@
-// The dashboard's lines, without a terminal.
+// Tests the dashboard's lines, without a terminal.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -101,7 +101,7 @@ TEST(TopView, WhatTheServerSaysIsMadeFitForATerminal) {
 
 TEST(TopView, DisplaysAreChosenRoundAndRound) {
   TopView view;
-  view.Choose(1);  // nothing is there yet
+  view.Choose(1);  // nothing exists yet
   view.Take(StatsAt(1), Owners(1), "");
   EXPECT_THAT(Text(view), HasSubstr("LATENCY of one"));
   view.Choose(-1);

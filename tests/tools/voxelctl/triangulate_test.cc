@@ -1,4 +1,4 @@
-// Polygons become triangles that cover them once.
+// Tests that polygons become triangles that cover them once.
 #include "tools/voxelctl/import/triangulate.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,8 @@ std::vector<uint32_t> Cut(const std::vector<Point3>& corners) {
   return triangles;
 }
 
-// Twice the area of each, signed by the side of the xy-plane that it is seen from.
+// Returns twice the area of each triangle, with the sign of the side of the xy-plane from which it
+// is seen.
 std::vector<double> Areas(const std::vector<Point3>& corners) {
   std::vector<double> areas;
   const std::vector<uint32_t> triangles = Cut(corners);
@@ -34,7 +35,7 @@ double Sum(const std::vector<double>& values) {
   return sum;
 }
 
-// A star with this many points, counter-clockwise, and not quite plane.
+// A star with this many points, counter-clockwise, and not quite planar.
 std::vector<Point3> Star(int points) {
   std::vector<Point3> corners;
   for (int i = 0; i < 2 * points; ++i) {

@@ -21,7 +21,8 @@ inline Volume DarkVolume(display::Geometry geometry, int width, int height) {
   return volume;
 }
 
-// Lying slices, 1 mm apart all ways, about the origin: pixel (u, v) of slice s is voxel (u, v, s).
+// Horizontal slices, 1 mm apart in all directions, around the origin: pixel (u, v) of slice s is
+// voxel (u, v, s).
 inline Volume DarkStack(int width, int height, int slices) {
   display::PlanarStack stack;
   stack.width_px = width;

@@ -1,4 +1,5 @@
-// MagicaVoxel's files: which faces are to be seen, where nodes put them, and what is said of broken ones.
+// Tests MagicaVoxel's files: which faces are visible, where nodes put them, and the errors for
+// broken ones.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -77,7 +78,7 @@ class VoxFiles : public testing::Test {
     return std::string(Import(bytes).status().message());
   }
 
-  // The least corners of the cubes that faces lie around, each face's middle told from the cubes inside: of single cubes.
+  // Returns the least and the greatest coordinates of the part's vertices.
   static std::tuple<double, double, double, double, double, double> Box(const Part& part) {
     Point3 least = part.positions.at(0), most = least;
     for (const Point3& p : part.positions) {
@@ -106,7 +107,7 @@ TEST_F(VoxFiles, FacesBetweenVoxelsAreLeftOut) {
     }
   }
   EXPECT_EQ(Read(Model3(3, 3, 3, block)).positions.size(), 54u * 4) << "nine a side";
-  // Two triangles cover a face, so all of them have the area of what is to be seen.
+  // Two triangles cover a face, so together they have the area of the visible faces.
   double area = 0;
   for (size_t i = 0; i + 2 < two.indices.size(); i += 3) {
     const Point3 &a = two.positions[two.indices[i]], &b = two.positions[two.indices[i + 1]],
@@ -144,7 +145,7 @@ TEST_F(VoxFiles, NodesPutAndTurnModels) {
   // Row 0 takes −y, row 1 takes x, row 2 takes z: a quarter turn about z. (1 | 0 << 2 | sign of row 0.)
   EXPECT_EQ(Box(Read(model + Transform(0, 1, {{"_r", absl::StrCat(1 | 1 << 4)}}) + Shape(1, 0))),
             Corners(-1, 1, 0, 0, 2, 1));
-  // Turned first, then moved; within another that turns what it moved.
+  // Rotated first, then moved; within another that rotates what it moved.
   EXPECT_EQ(Box(Read(model + Transform(0, 1, {{"_r", absl::StrCat(1 | 1 << 4)}}) + Group(1, {2}) +
                      Transform(2, 3, {{"_t", "5 0 0"}}) + Shape(3, 0))),
             Corners(-1, 6, 0, 0, 7, 1));
@@ -193,7 +194,7 @@ TEST_F(VoxFiles, OfKeyFramesTheFirstIsShown) {
   EXPECT_EQ(Read(models + Transform(0, 1, {}) + shape(0, 5)).positions.size(), 6u * 4);
   EXPECT_EQ(Read(models + Transform(0, 1, {}) + shape(7, 2)).positions.size(), 10u * 4)
       << "in another order";
-  // Where a node is, likewise.
+  // The same applies to the place of a node.
   const std::string moving = Chunk("nTRN", Int(0) + Dictionary({}) + Int(1) + Int(-1) + Int(0) +
                                                Int(2) + Dictionary({{"_f", "3"}, {"_t", "9 0 0"}}) +
                                                Dictionary({{"_f", "0"}, {"_t", "2 0 0"}}));
@@ -241,7 +242,7 @@ TEST_F(VoxFiles, HiddenLayersAreNotShown) {
   EXPECT_EQ(model->parts.at(0).positions.size(), 6u * 4);
   EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"hidden nodes", 1}}));
   EXPECT_EQ(Read(models + nodes + layer(-1, "1")).positions.size(), 16u * 4) << "no layer";
-  // All of a group, whatever layers its members are on; the chunks come in any order.
+  // All members of a group, whatever layers they are on; the chunks come in any order.
   const std::string group = Transform(0, 1, {}) + Group(1, {2, 6}) + on_layer(2, 3, 7) +
                             Group(3, {4}) + on_layer(4, 5, 0) + Shape(5, 0) + on_layer(6, 8, 0) +
                             Shape(8, 1);
@@ -275,7 +276,7 @@ TEST_F(VoxFiles, WhatIsWrongIsSaid) {
               HasSubstr("chunk nGRP is cut off"));
 }
 
-// A group of groups of groups … is 2^60 models, by 60 nodes.
+// A group of groups of groups … is 2^60 models, from 60 nodes.
 TEST_F(VoxFiles, ModelsThatMultiplyEnd) {
   std::string chunks = Model3(2, 2, 2, {{1, 1, 1, 1}});
   for (int32_t i = 0; i < 60; ++i) chunks += Group(i, {i + 1, i + 1});
