@@ -58,7 +58,7 @@ const nlohmann::json& Figure(const nlohmann::json& report, const std::string& na
     if (figure["name"] == name) return figure;
   }
   static const nlohmann::json none;
-  ADD_FAILURE() << "no figure " << name << " in " << report;
+  ADD_FAILURE() << "no metric " << name << " in " << report;
   return none;
 }
 

@@ -158,7 +158,7 @@ class Drilled {
     request.set_once(true);
     const auto call = displays_->WatchStats(&context, request);
     v1::Stats stats;
-    if (!call->Read(&stats)) ADD_FAILURE() << "no figures: " << call->Finish().error_message();
+    if (!call->Read(&stats)) ADD_FAILURE() << "no statistics: " << call->Finish().error_message();
     return stats;
   }
 

@@ -45,7 +45,7 @@ std::string Exchange(int fd, const std::string& path) {
 }  // namespace
 
 HttpConnection::HttpConnection(const std::string& address) : fd_(Connected(address)) {
-  EXPECT_GE(fd_, 0) << "nobody listens on " << address;
+  EXPECT_GE(fd_, 0) << "no process listens on " << address;
 }
 
 HttpConnection::~HttpConnection() { close(fd_); }

@@ -23,7 +23,7 @@ Ended RunToEnd(const std::vector<std::string>& arguments,
                const std::map<std::string, std::string>& environment) {
   Process process(arguments, environment);
   const std::optional<int> code = process.Wait();
-  EXPECT_TRUE(code.has_value()) << "did not end: " << process.output();
+  EXPECT_TRUE(code.has_value()) << "did not exit: " << process.output();
   return {code.value_or(-1), process.output()};
 }
 

@@ -322,7 +322,7 @@ TEST(Stop, WithALongCommitUnderWayEndsInTimeAndWell) {
     SetDeadline(list);
     v1::ListEntitiesResponse entities;
     ASSERT_TRUE(scene->ListEntities(&list, {}, &entities).ok());
-    ASSERT_EQ(entities.total(), 0u) << "nothing of it is seen";
+    ASSERT_EQ(entities.total(), 0u) << "it is not visible at all";
   }
   ExpectEndsWell(daemon);
   EXPECT_EQ(call.Wait().error_code(), grpc::StatusCode::UNAVAILABLE);

@@ -97,7 +97,7 @@ TEST(SamplesCheck, AllTogetherAreLimited) {
   words[kSize + 2] = 257;
   EXPECT_THAT(Why(words), HasSubstr("2⁴⁰ at most"));
   words[kSize + 2] = 256;
-  EXPECT_THAT(Why(words), HasSubstr("bricks is 1")) << "as many as may be";
+  EXPECT_THAT(Why(words), HasSubstr("bricks is 1")) << "the greatest number allowed";
 }
 
 }  // namespace

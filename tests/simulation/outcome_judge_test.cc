@@ -19,7 +19,7 @@ constexpr Look kBlack = 1, kRed = 2, kBlue = 3;
 
 TEST(Eye, SeesWhatWasDrawnAndNothingElse) {
   Eye eye(kBlack);
-  EXPECT_EQ(eye.Sees(kBlack, 5), "") << "black before anything was shown is a capture's";
+  EXPECT_EQ(eye.Sees(kBlack, 5), "") << "black before anything was shown is for a capture";
   eye.Asked(1, 10, false, 6);
   EXPECT_THAT(eye.Sees(kRed, 7), HasSubstr("never drawn"));
   eye.Drew(1, kRed, 10, 10, 8);
@@ -37,7 +37,7 @@ TEST(Eye, GoesNotBack) {
   EXPECT_THAT(eye.Sees(kRed, 6), HasSubstr("shows volume 1 again"));
   eye.Asked(3, 12, false, 7);
   eye.Drew(3, kRed, 12, 12, 8);
-  EXPECT_EQ(eye.Sees(kRed, 9), "") << "a newer volume that looks as an older did";
+  EXPECT_EQ(eye.Sees(kRed, 9), "") << "a newer volume that looks like an older one";
 }
 
 class OutcomeJudgeTest : public ::testing::Test {

@@ -95,8 +95,8 @@ TEST_F(WithAssets, WhatWasStoppedGoesOnWhereItStopped) {
     return true;
   });
   ASSERT_TRUE(rest.ok()) << rest.status();
-  EXPECT_GT(first, 1u << 20) << "the first piece is behind what was there";
-  EXPECT_EQ(store_->figures().bytes_in, bytes.size()) << "every byte came once";
+  EXPECT_GT(first, 1u << 20) << "the first piece is behind the stored bytes";
+  EXPECT_EQ(store_->figures().bytes_in, bytes.size()) << "every byte was sent once";
   EXPECT_EQ(store_->figures().count, 1u);
 }
 

@@ -290,7 +290,7 @@ TEST_F(Channel, WhereThereIsNobodyNothingIsHeld) {
   EXPECT_EQ(Hold(1), Answer::kGone);
   EXPECT_EQ(Hold(2), Answer::kGone);
   channel_ = ConnectLocalSocket(std::string(200, 'x'), "token", this);
-  EXPECT_EQ(Hold(1), Answer::kGone) << "such a path no socket has";
+  EXPECT_EQ(Hold(1), Answer::kGone) << "a socket cannot have such a path";
 }
 
 TEST_F(Channel, WhoIsNotWelcomeHoldsNothing) {

@@ -411,7 +411,7 @@ TEST_P(OutboxAtRandom, KeepsWhatItPromises) {
   for (const auto& [layer, frame] : newest)
     EXPECT_THAT(server.layers[layer], ElementsAre(absl::StrCat("f", frame)));
   // Drops are reported, and nothing else is missing.
-  EXPECT_GE(server.client_drops, drops) << "those of commits that were lost are told again";
+  EXPECT_GE(server.client_drops, drops) << "those of lost commits are reported again";
   std::set<uint64_t> arrived(server.commits.begin(), server.commits.end());
   for (const auto& [frame, count] : frames_of)
     EXPECT_NE(arrived.contains(frame), dropped_whole.contains(frame)) << frame;

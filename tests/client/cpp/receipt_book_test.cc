@@ -227,7 +227,7 @@ TEST_F(ReceiptBookTest, WhatWasNotHeardOfIsToldByItsOutcomesOrLost) {
   ReceiptBook without(false);
   without.Queued(1);
   without.Unheard(1, {"a"});
-  EXPECT_EQ(without.Find(1)->state, Receipt::State::kLost) << "nothing would tell";
+  EXPECT_EQ(without.Find(1)->state, Receipt::State::kLost) << "nothing would report it";
 }
 
 TEST_F(ReceiptBookTest, OutcomesOfAnEarlierSendingAreNotThoseOfTheNext) {
@@ -258,7 +258,7 @@ TEST_F(ReceiptBookTest, IssuesMayComeBeforeTheCommitIsSent) {
   EXPECT_THAT(At(1).issues, SizeIs(1));
   book_.StreamLost();
   book_.Sent(1, 8, 9, 0);
-  EXPECT_THAT(At(1).issues, IsEmpty()) << "it is told anew";
+  EXPECT_THAT(At(1).issues, IsEmpty()) << "it will be reported again";
 }
 
 TEST_F(ReceiptBookTest, TimedCommitsAreScheduledFirst) {

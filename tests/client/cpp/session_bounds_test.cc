@@ -119,7 +119,7 @@ TEST(Bounds, AFrameWithSomethingTooLargeIsRefusedWhole) {
   const absl::Status status = session->Commit(&frame, {}).status();
   EXPECT_TRUE(absl::IsInvalidArgument(status)) << status;
   EXPECT_THAT(MessageOf(status), HasSubstr("f/big takes a message of"));
-  EXPECT_THAT(frame.upserts, IsEmpty()) << "it is given up";
+  EXPECT_THAT(frame.upserts, IsEmpty()) << "it is dropped";
   EXPECT_TRUE(absl::IsInvalidArgument(
       session->Stage(FrameOperation{"f", {Upsert("f", "big", Cloud(2 * kMessage))}})));
   ASSERT_TRUE(session->Commit(nullptr, {}).ok());
@@ -167,7 +167,7 @@ TEST(Bounds, WhatIsStagedIsBounded) {
   EXPECT_THAT(MessageOf(status), HasSubstr("of 5000 (most_staged_bytes) are staged; commit first"));
   EXPECT_LE(session->staged_bytes(), 5000u);
   ASSERT_TRUE(session->Commit(nullptr, {}).ok());
-  EXPECT_TRUE(session->StageUpsert("l", "large", Cloud(20'000), {}).ok()) << "alone it may be";
+  EXPECT_TRUE(session->StageUpsert("l", "large", Cloud(20'000), {}).ok()) << "alone it is accepted";
   EXPECT_FALSE(session->StageUpsert("l", "a", Sphere{}, {}).ok());
 }
 

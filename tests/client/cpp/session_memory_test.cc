@@ -53,7 +53,8 @@ TEST(SessionMemory, ContentGoesByMemoryOnceItIsHeld) {
   EXPECT_EQ(session.memory_path(), "/run/it secret");
   const uint64_t frame = PutCloud(session, "a");
   session.Put("small");
-  EXPECT_THAT(session.TakeWords(), ElementsAre("open")) << "all waits for the answer, in its order";
+  EXPECT_THAT(session.TakeWords(), ElementsAre("open"))
+      << "everything waits for the answer, in order";
   ASSERT_THAT(session.memory()->held, SizeIs(1));
   EXPECT_EQ(session.memory()->held[0].second,
             std::string(reinterpret_cast<const char*>(kCloud.data()), kCloudBytes));
@@ -146,7 +147,7 @@ TEST(SessionMemory, AfterALossItIsHandedOverAnew) {
   session.Settle();
   PutCloud(session, "being handed over");
   session.End(absl::UnavailableError("gone"));
-  EXPECT_EQ(session.memory(), nullptr) << "it went with its stream";
+  EXPECT_EQ(session.memory(), nullptr) << "it was closed with its stream";
   session.Advance(sync::kSecond);
   session.TakeWords();
   session.SayOpened(WithSocket());

@@ -210,7 +210,7 @@ TEST_F(Reconnect, ASessionThatIsResumedMayHaveLostItsLayers) {
       EXPECT_EQ(last_.lost_outcomes, 0u);
     }
     EXPECT_EQ(session->GetTally().resumed, 1u);
-    EXPECT_FALSE(session->FindReceipt(1)->settled) << "its outcome may still come";
+    EXPECT_FALSE(session->FindReceipt(1)->settled) << "its outcome may still arrive";
   }
 }
 

@@ -74,7 +74,7 @@ TEST(Session, CreditIsKeptToTheByte) {
   credit.set_credit_bytes(session.stream().bytes + 1);
   session.Say(credit);
   EXPECT_THAT(session.TakeWords(), ElementsAre("commit 1"));
-  EXPECT_FALSE(session->HasRoom()) << "there is no credit";
+  EXPECT_FALSE(session->HasRoom()) << "the credit is used up";
   EXPECT_EQ(MessageOf(session->WaitForRoom(kAtOnce)),
             "waited in vain for room from voxeld at there:1");
   credit.set_credit_bytes(1 << 20);
@@ -183,7 +183,7 @@ TEST(Session, AFullBufferKeepsWhatIsStaged) {
   credit.set_credit_bytes(1 << 20);
   session.Say(credit);
   session.TakeWords();
-  EXPECT_EQ(*session->Commit(nullptr, {}), 2u) << "no number is left out";
+  EXPECT_EQ(*session->Commit(nullptr, {}), 2u) << "no number is skipped";
   session.Settle();
   EXPECT_THAT(session.TakeWords(), ElementsAre("l/b", "commit 2"));
 }

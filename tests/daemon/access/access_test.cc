@@ -169,7 +169,7 @@ TEST_F(AccessTest, ATokenExpiredBeforeItWasLookedAtChangesNothing) {
   ASSERT_TRUE(access->Look().ok());
   now_ += 5;
   ASSERT_TRUE(access->Look().ok());
-  EXPECT_EQ(changes_, 1) << "nobody lost anything since the first look";
+  EXPECT_EQ(changes_, 1) << "no caller lost scopes since the first look";
 }
 
 TEST_F(AccessTest, TheFileIsReadWhenItChangesOrWhenAskedTo) {
@@ -177,7 +177,7 @@ TEST_F(AccessTest, TheFileIsReadWhenItChangesOrWhenAskedTo) {
   const auto access = Make();
   ASSERT_TRUE(access->Look().ok());
   ASSERT_TRUE(access->Look().ok());
-  EXPECT_EQ(changes_, 1) << "as it was";
+  EXPECT_EQ(changes_, 1) << "unchanged";
   ASSERT_TRUE(access->Look(true).ok());
   EXPECT_EQ(changes_, 2) << "whatever it looks like";
   Put(Token("right", "secret", "\"draw\""));
@@ -194,7 +194,7 @@ TEST_F(AccessTest, OthersOptionsAreInForceAtOnceOrNotAtAll) {
   const std::string other = folder_ + "/other.toml";
   PutFile(other, "[[token]]\n");
   EXPECT_FALSE(access->Change({.grants = other, .anonymous = *ParseScopes("none")}).ok());
-  EXPECT_EQ(access->Identify({.token = "secret"})->principal, "left") << "those from before stay";
+  EXPECT_EQ(access->Identify({.token = "secret"})->principal, "left") << "the previous tokens stay";
   EXPECT_EQ(access->Identify({})->scopes, Scopes::All());
   EXPECT_EQ(changes_, 1);
 
@@ -280,7 +280,7 @@ TEST_F(AccessLogTest, SaysWhatBecameOfTheFile) {
   EXPECT_THAT(first, HasSubstr("users=1"));
   EXPECT_THAT(first, HasSubstr("certificates=0"));
   ASSERT_TRUE(access.Look().ok());
-  EXPECT_EQ(Said(), "") << "nothing is new";
+  EXPECT_EQ(Said(), "") << "nothing new was logged";
   Put(Token("left", "secret", "\"view\""));
   ASSERT_TRUE(access.Look().ok());
   EXPECT_THAT(Said(), HasSubstr("the grants file was read again"));

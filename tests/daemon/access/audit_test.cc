@@ -213,7 +213,7 @@ TEST_F(AuditTest, WhereItIsRequiredNobodyMayActWhileItCannotBeWritten) {
     EXPECT_TRUE((*optional)->MayAct().ok());
     EXPECT_TRUE((*none)->MayAct().ok());
   }
-  EXPECT_TRUE((*required)->MayAct().ok()) << "it is tried again at once";
+  EXPECT_TRUE((*required)->MayAct().ok()) << "it is retried at once";
   EXPECT_EQ(Lines(path_).size(), 1u);
 }
 
@@ -248,7 +248,7 @@ TEST_F(AuditTest, ALineThatIsCutSpoilsNoOther) {
   std::filesystem::rename(path_, path_ + ".1");
   (*audit)->Reopen();
   record("Fourth");
-  ASSERT_EQ(Lines(path_).size(), 2u) << "a new file begins with the line that waited";
+  ASSERT_EQ(Lines(path_).size(), 2u) << "a new file begins with the waiting line";
 }
 
 TEST_F(AuditTest, ALineThatWasCutBeforeTheFileWasOpenedSpoilsNoOther) {

@@ -96,7 +96,7 @@ TEST_F(SecurityTest, TroubleIsThatOfAll) {
   (*security)->Look();
   const std::string of_tls = (*security)->trouble();
   EXPECT_THAT(of_tls, HasSubstr("private key"));
-  EXPECT_EQ(of_tls.find("; "), std::string::npos) << "one trouble";
+  EXPECT_EQ(of_tls.find("; "), std::string::npos) << "one error";
   PutFile(options_.grants, "also wrong");
   (*security)->Look();
   EXPECT_THAT((*security)->trouble(), HasSubstr("grants.toml"));
@@ -109,7 +109,7 @@ TEST_F(SecurityTest, AReloadReadsEverythingAndWritesAnew) {
   int changes = 0;
   (*security)->access().SetOnChange([&] { ++changes; });
   (*security)->Look();
-  EXPECT_EQ(changes, 0) << "the file is as it was";
+  EXPECT_EQ(changes, 0) << "the file is unchanged";
   (*security)->Reload();
   EXPECT_EQ(changes, 1) << "read again, whatever it looks like";
   std::filesystem::rename(audit_, audit_ + ".1");

@@ -190,7 +190,7 @@ TEST_F(AssetFileKept, WhereTheDiskDoesNotTakeItsName) {
     const DiskCalls fails([](DiskCall call) { return call == DiskCall::kSync ? EIO : 0; });
     ExpectNotKept(absl::StatusCode::kUnavailable, *file);
   }
-  EXPECT_TRUE(file->Keep(whole_).ok()) << "the disk takes it now";
+  EXPECT_TRUE(file->Keep(whole_).ok()) << "the disk accepts it now";
   EXPECT_TRUE(std::filesystem::exists(whole_));
   EXPECT_FALSE(std::filesystem::exists(part_));
   EXPECT_TRUE(file->Keep(part_).ok()) << "and is known by it";

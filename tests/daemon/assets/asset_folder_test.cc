@@ -109,7 +109,7 @@ TEST_F(AssetFolder, WhatIsNoFileIsNoAsset) {
   fs::create_symlink("nowhere", folder_ + "/" + std::string(64, '0'));
   Open();
   EXPECT_THAT(store_->ListAll(), IsEmpty());
-  EXPECT_TRUE(Upload(kAbcDigest, "abc").ok()) << "a link keeps nobody from it";
+  EXPECT_TRUE(Upload(kAbcDigest, "abc").ok()) << "a link does not prevent it";
   EXPECT_TRUE(Find(kAbcDigest, 3).ok());
   EXPECT_EQ(Read("elsewhere"), "abd");
   EXPECT_TRUE(absl::IsUnavailable(Upload(kHelloDigest, "hello"))) << "a folder has its name";

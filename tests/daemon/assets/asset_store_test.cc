@@ -137,7 +137,7 @@ TEST_P(AssetStoreTest, AnUploadThatHasEndedIsNone) {
   store_->Abandon(*first);
   EXPECT_TRUE(absl::IsAborted(store_->Append(*first, 3, "lo")));
   EXPECT_TRUE(absl::IsAborted(store_->Finish(*first).status()));
-  EXPECT_TRUE(store_->Append(*second, 3, "lo").ok()) << "nobody had its place";
+  EXPECT_TRUE(store_->Append(*second, 3, "lo").ok()) << "its place was not taken";
   const std::vector<AssetState> states =
       store_->List(std::vector{kWorld.digest(), kAbc.digest(), kHello.digest()});
   EXPECT_THAT(states, ElementsAre(::testing::FieldsAre(kWorld.digest(), 0u, false),
@@ -177,7 +177,7 @@ TEST_P(AssetStoreTest, WhatWasUsedLeastRecentlyGoes) {
   EXPECT_THAT(Find(kHello), HasSubstr("not here"));
   EXPECT_EQ(Find(kAbc), "abc");
   EXPECT_EQ(Find(kWorld), "world");
-  EXPECT_EQ(kept->bytes, "hello") << "whoever has it keeps it";
+  EXPECT_EQ(kept->bytes, "hello") << "a holder keeps the bytes";
   EXPECT_EQ(store_->figures().evicted, 1u);
   const std::vector<AssetState> all = store_->ListAll();
   ASSERT_EQ(all.size(), 2u);
@@ -193,7 +193,7 @@ TEST_P(AssetStoreTest, UploadsUnderWayAreNotPushedOut) {
   EXPECT_TRUE(absl::IsResourceExhausted(large.status()));
   EXPECT_THAT(std::string(large.status().message()),
               HasSubstr("12288 bytes more do not fit beside 8192 of 1 uploads under way"));
-  EXPECT_EQ(Find(kAbc), "abc") << "what is refused takes nobody's place";
+  EXPECT_EQ(Find(kAbc), "abc") << "a refused upload evicts nothing";
   clock_.Advance(20 * sync::kSecond);
   store_->Heard(*slow);  // bytes have arrived, and wait
   clock_.Advance(20 * sync::kSecond);
@@ -214,7 +214,7 @@ TEST_P(AssetStoreTest, WhatWasPromisedAndDoesNotComeIsNoLongerKept) {
   const auto something = store_->Begin(kHello.digest(), 4 * kSmall, 0);
   ASSERT_TRUE(store_->Append(*something, 0, std::string(kSmall + 1, 'x')).ok());
   store_->Abandon(*something);
-  EXPECT_EQ(store_->figures().bytes, kSmall + 1) << "what came alone";
+  EXPECT_EQ(store_->figures().bytes, kSmall + 1) << "what was stored alone";
   Upload(kAbc);
   EXPECT_EQ(store_->ListAll().size(), 2u);
 }
@@ -333,7 +333,7 @@ TEST_P(AssetFolderTest, WhatWasUsedIsRememberedOverTheEnd) {
   const auto at = std::filesystem::last_write_time(folder_ + "/" + kHello.sha256);
   std::filesystem::last_write_time(folder_ + "/" + kAbc.sha256, at + 1min);
   Open({.max_asset_bytes = 10, .max_bytes = kSmall});
-  EXPECT_THAT(Files(), ElementsAre(kAbc.sha256)) << "less room than there was";
+  EXPECT_THAT(Files(), ElementsAre(kAbc.sha256)) << "less room than before";
   EXPECT_EQ(store_->figures().evicted, 1u);
 }
 
@@ -375,7 +375,7 @@ TEST_P(AssetFolderTest, AnUploadThatWasKilledGoesOn) {
   std::ofstream(folder_ + "/" + kWorld.sha256 + ".part");
   Open();
   EXPECT_EQ(store_->List(std::vector{kHello.digest()}).front().stored, 3u);
-  EXPECT_THAT(Files(), ElementsAre(std::string(kHello.sha256) + ".part")) << "nothing in it: gone";
+  EXPECT_THAT(Files(), ElementsAre(std::string(kHello.sha256) + ".part")) << "empty, so removed";
 }
 
 TEST_P(AssetFolderTest, ADiskThatIsFullIsSaidAndWhatCameStays) {

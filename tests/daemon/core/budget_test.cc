@@ -44,7 +44,7 @@ TEST(Budget, TellsItsPeakSinceItWasAskedLast) {
   ASSERT_TRUE(budget.Charge(Use::kStaged, 60));
   EXPECT_FALSE(budget.Charge(Use::kStaged, 50));
   budget.Release(Use::kStaged, 60);
-  EXPECT_EQ(budget.TakePeakBytes(), 60u) << "what was refused does not count";
+  EXPECT_EQ(budget.TakePeakBytes(), 60u) << "a refused request does not count";
   EXPECT_EQ(budget.TakePeakBytes(), 0u);
   budget.Set(Use::kEngines, 40);
   budget.Set(Use::kEngines, 30);

@@ -59,7 +59,7 @@ TEST(CoreFlow, MustShowWaitsForEveryDisplayAndGivesUpInTime) {
   sim.Send(client, 0, Put("a", "x", 1), MustShow(1));
   sim.Send(client, 2, Put("a", "x", 2));
   EXPECT_TRUE(sim.Show(0));
-  EXPECT_EQ(AcceptedOf(client), 1u) << "the other display has not said";
+  EXPECT_EQ(AcceptedOf(client), 1u) << "the other display has not reported";
   sim.Advance(300 * sync::kMillisecond - 1);
   EXPECT_EQ(AcceptedOf(client), 1u);
   sim.Advance(1);
@@ -119,7 +119,7 @@ TEST(CoreFlow, ATimedCommitIsInTheFirstVolumeWhoseSweepStartsThenOrLater) {
   sim.Send(client, 0, Put("a", "x", 1), At(1, zero + 250 * sync::kMillisecond));
   sim.clock.AdvanceTo(zero + 200 * sync::kMillisecond);
   sim.core->Step();
-  EXPECT_EQ(AcceptedOf(client), 0u) << "not before the sweep of 0.2 has surely begun";
+  EXPECT_EQ(AcceptedOf(client), 0u) << "not before the sweep of 0.2 has certainly begun";
   sim.Advance(2 * sync::kMillisecond);
   EXPECT_EQ(AcceptedOf(client), 1u);
 }

@@ -93,7 +93,8 @@ TEST(CoreOwners, HidingHidesAllLayersAndThoseToComeAndTellsCommits) {
   for (const auto& [id, layer] : sim.engine().scene->layers()) visible += layer.visible != 0;
   EXPECT_EQ(visible, 1) << "the other's";
   EXPECT_TRUE(Owners(sim)[0].hidden);
-  for (const LayerInfo& layer : sim.List().layers) EXPECT_TRUE(layer.visible) << "by its own word";
+  for (const LayerInfo& layer : sim.List().layers)
+    EXPECT_TRUE(layer.visible) << "by its own request";
 
   hide.hidden = false;
   ASSERT_TRUE(Control(sim, hide).ok());

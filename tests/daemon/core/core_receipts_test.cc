@@ -355,8 +355,7 @@ TEST(CoreReceipts, AVolumeThatIsLostDoesNotPutOffTheRetryOfAFailedFrame) {
   sim.core->Step();
   const size_t drawn = sim.engine().frames.size();
   sim.Advance(sync::kSecond);
-  EXPECT_EQ(sim.engine().frames.size(), drawn + 1)
-      << "nobody commits, and still the newest is drawn";
+  EXPECT_EQ(sim.engine().frames.size(), drawn + 1) << "without commits, the newest is still drawn";
   while (sim.Show()) {
   }
   EXPECT_EQ(sim.GetStats().displays[0].volumes_lost, 1u);

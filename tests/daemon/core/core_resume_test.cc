@@ -54,7 +54,7 @@ TEST(CoreResume, TakesOverLayersAndIsToldTheLastCommit) {
   EXPECT_EQ(again.info.last_sequence, client.last_sequence);
   EXPECT_FALSE(sim.List().layers[0].orphaned);
   sim.Advance(3600 * sync::kSecond);
-  EXPECT_EQ(sim.List().total, 2u) << "its layers do not linger any more";
+  EXPECT_EQ(sim.List().total, 2u) << "its layers no longer linger";
   EXPECT_EQ(sim.GetStats().sessions_resumed, 1u);
   EXPECT_EQ(sim.GetStats().sessions_dormant, 0u);
 }
@@ -97,7 +97,7 @@ TEST(CoreResume, WhatEndsOneStreamForAnotherLeavesItsLayers) {
   EXPECT_EQ(sim.List().total, 1u);
   EXPECT_EQ(sim.core->scene_watch().newest()->total.drawables, 1u) << "as watchers see it";
   sim.Close(again);
-  EXPECT_EQ(sim.List().total, 0u) << "its own end is as it asked for";
+  EXPECT_EQ(sim.List().total, 0u) << "it ends with its own policy";
 }
 
 TEST(CoreResume, OutcomesOwedComeToTheNewStream) {
@@ -132,7 +132,7 @@ TEST(CoreResume, OutcomesThatAStreamCouldNotDeliverComeToTheNewOne) {
   sim.core->GiveBack(client.info.session, all);
   auto again = sim.Open(Resuming(client));
   EXPECT_THAT(again.sink->OutcomesOf(1), SizeIs(1));
-  EXPECT_THAT(again.sink->receipts, SizeIs(1)) << "Accepted is told by last_frame_id";
+  EXPECT_THAT(again.sink->receipts, SizeIs(1)) << "Accepted is implied by last_frame_id";
 }
 
 TEST(CoreResume, AfterTenSecondsOutcomesAreCountedAsUndelivered) {

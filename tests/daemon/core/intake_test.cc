@@ -225,7 +225,7 @@ TEST_F(IntakeTest, AnUnfinishedFrameStays) {
   Make(FlowPolicy::kLatest);
   Take(10, Begin("f"), Put("f", "1"), EndCommit(1));
   Take(10, Begin("f"), Put("f", "2"), End("f"), EndCommit(2));
-  EXPECT_THAT(Puts(Pop()), ElementsAre("f/1")) << "it is refused when applied, and told so";
+  EXPECT_THAT(Puts(Pop()), ElementsAre("f/1")) << "it is refused when applied, with an issue";
 }
 
 TEST_F(IntakeTest, TheBudgetIsALimitForAll) {
@@ -297,7 +297,7 @@ TEST_F(IntakeTest, LocalMemoryOfWhatWaitsHoldsReadingBack) {
   named_bytes = 1;
   Take(1, Put("a", "z"));
   EXPECT_FALSE(intake->HasRoom()) << "400 bytes of 400";
-  EXPECT_THAT(sink->credits, IsEmpty()) << "it is no credit";
+  EXPECT_THAT(sink->credits, IsEmpty()) << "this gives no credit back";
 
   WaitingCommit one = Pop();
   EXPECT_EQ(sink->rooms, 0);

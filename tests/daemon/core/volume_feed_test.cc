@@ -67,7 +67,7 @@ TEST(VolumeFeed, WhoDoesNotTakeIsPassedOverThenSleepsAndBeginsAnew) {
   viewer.Show();
   sim.Send(sim.client, 2, Put("a", "x", 2));
   viewer.Show();
-  EXPECT_EQ(viewer.readies, 1) << "told once, though two came";
+  EXPECT_EQ(viewer.readies, 1) << "notified once, though two arrived";
   EXPECT_FALSE(viewer.feed->asleep());
   sim.clock.Advance(VolumeFeed::kPatience);
   sim.Send(sim.client, 3, Put("a", "x", 3));
@@ -76,7 +76,7 @@ TEST(VolumeFeed, WhoDoesNotTakeIsPassedOverThenSleepsAndBeginsAnew) {
   sim.core->Step();
   EXPECT_EQ(sim.GetStats().volume_watches_asleep, 1u);
   sim.Advance(FramePipeline::kWatchLinger);
-  EXPECT_FALSE(sim.display().tapped()) << "nothing is decoded for a sleeper";
+  EXPECT_FALSE(sim.display().tapped()) << "nothing is decoded for a sleeping viewer";
 
   auto change = viewer.feed->Take();  // awake
   ASSERT_TRUE(change.ok());
@@ -101,7 +101,7 @@ TEST(VolumeFeed, TwoWatchOneDisplayAndTheLastToGoEndsIt) {
   first.feed.reset();
   sim.core->Step();
   sim.Advance(FramePipeline::kWatchLinger - 1);
-  EXPECT_TRUE(sim.display().tapped()) << "who comes and goes costs the display nothing";
+  EXPECT_TRUE(sim.display().tapped()) << "a viewer that comes and goes costs the display nothing";
   const int sent = sim.display().sent;
   Viewer third(sim);
   EXPECT_EQ(third.readies, 1) << "the newest, and nothing is sent again for it";

@@ -187,7 +187,7 @@ TEST_F(HttpServer, WithoutDescriptorsItsStartIsAnError) {
                          [](const Request&, const Done&) { return false; })
         .status();
   };
-  ASSERT_TRUE(start().ok()) << "and all that is made once is there";
+  ASSERT_TRUE(start().ok()) << "and what is created once exists";
   bool waits = true, listens = true;  // in every try, each of these got a descriptor
   absl::Status status;
   for (rlim_t more = 0; more < 10; ++more) {

@@ -150,7 +150,7 @@ TEST(Health, IsWellUnlessADisplayIsLostOrAnEngineIsGone) {
               HasSubstr(R"("what":"device","why":"it was lost"})"));
   stats.displays[0].state = display::DisplayState::kLost;
   EXPECT_THAT(HealthResponse(displays, stats, Phase::kServing).body, Not(HasSubstr("it was lost")))
-      << "it is still, and that is told";
+      << "it is still so, and is reported";
   stats.displays[0].state = display::DisplayState::kShowing;
   stats.displays[0].device_trouble = "";
   stats.connections.unreachable = "127.0.0.1:1: no answer came in time";

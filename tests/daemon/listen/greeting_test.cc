@@ -90,7 +90,7 @@ TEST(Greeting, WaitsForWhatIsYetToCome) {
   for (size_t n = 0; n < kBegin.size() + kHeaders.size() + 9 + 5; ++n) {
     Greeting greeting(kMostMessage);
     ASSERT_EQ(greeting.Read(std::string_view(whole).substr(0, n)), Verdict::kMore) << n;
-    EXPECT_GT(greeting.needed(), n) << "else it would be asked again for nothing";
+    EXPECT_GT(greeting.needed(), n) << "otherwise it would be asked again for nothing";
     EXPECT_EQ(greeting.speaks_http2(), n >= kPreface.size());
   }
 }

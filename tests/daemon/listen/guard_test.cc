@@ -89,7 +89,7 @@ TEST_F(GuardTest, CutsAtTheFirstByteBeyondTheLimitAndOnce) {
   guard_.OnMessage(Tcp(1).name);
   EXPECT_EQ(line_.cuts, 1);
   EXPECT_EQ(counters_.Read().cut_for_bytes, 1u);
-  EXPECT_EQ(line_.armed, 1) << "its end is to be told of";
+  EXPECT_EQ(line_.armed, 1) << "its close must be reported";
   EXPECT_FALSE(line_.gone) << "until it is known to be closed";
   guard_.Leave(id);
   EXPECT_TRUE(line_.gone);
@@ -113,7 +113,7 @@ TEST_F(GuardTest, BytesThatNobodyToldOfAreSeenByTheNextLook) {
   Enter(Tcp(1), line_);
   EXPECT_EQ(guard_.Look(), clock_.Now() + Guard::kLookInterval);
   line_.bytes = 1601;
-  EXPECT_EQ(guard_.Look(), sync::kNever) << "nobody is left to be looked at";
+  EXPECT_EQ(guard_.Look(), sync::kNever) << "no connection is left to check";
   EXPECT_EQ(line_.cuts, 1);
 }
 
@@ -121,7 +121,7 @@ TEST_F(GuardTest, WhoEndsItFirstIsCountedAndPunishedTheSame) {
   const ConnectionId id = Enter(Tcp(1), line_);
   line_.bytes = 1601;  // and reset, before Look was called
   guard_.Leave(id);
-  EXPECT_EQ(line_.cuts, 1) << "what gRPC has not read is thrown away";
+  EXPECT_EQ(line_.cuts, 1) << "bytes that gRPC has not read are discarded";
   EXPECT_TRUE(line_.gone);
   EXPECT_EQ(counters_.Read().cut_for_bytes, 1u);
   EXPECT_FALSE(guard_.MayEnter(Tcp(2)).ok());
@@ -233,7 +233,7 @@ TEST_F(GuardTest, TheAddressOfWhatWasCutIsRefusedTwiceAsLongEachTime) {
   clock_.Advance(length);  // as long as it was last refused
   guard_.OnWrongGreeting(Enter(Tcp(1), line_), "");
   clock_.Advance(kLimits.cut_penalty_ns);
-  EXPECT_TRUE(guard_.MayEnter(Tcp(8)).ok()) << "it begins anew";
+  EXPECT_TRUE(guard_.MayEnter(Tcp(8)).ok()) << "the penalty starts again";
 }
 
 TEST_F(GuardTest, WhatIsCutTogetherIsPunishedOnce) {
@@ -320,20 +320,20 @@ TEST_F(GuardTest, BusyAreThoseWhoseBytesWereToldOfAndNobodyElseIsLookedAt) {
   const ConnectionId first = Enter(Tcp(1), line_);
   const ConnectionId second = Enter(Tcp(2), lines_[0]);
   line_.bytes = lines_[0].bytes = 100;
-  EXPECT_THAT(guard_.TakeBusy(), IsEmpty()) << "nobody told of bytes";
+  EXPECT_THAT(guard_.TakeBusy(), IsEmpty()) << "no bytes were reported";
   guard_.OnBytes(first);
   guard_.OnBytes(second);
   EXPECT_EQ(told, 1) << "once until they are taken";
   EXPECT_THAT(Names(guard_.TakeBusy()), ElementsAre(Tcp(1).name, Tcp(2).name));
   EXPECT_THAT(guard_.TakeBusy(), IsEmpty());
-  EXPECT_EQ(line_.armed, 0) << "the unauthorised tell of all bytes";
+  EXPECT_EQ(line_.armed, 0) << "unauthorised connections report all bytes";
 
   guard_.OnAnswer(Tcp(1).name, true);
   EXPECT_EQ(line_.armed, 1);
   line_.bytes = 200;
   guard_.OnBytes(first);
   EXPECT_EQ(told, 2);
-  EXPECT_EQ(line_.armed, 1) << "no more is told of before they are taken";
+  EXPECT_EQ(line_.armed, 1) << "no further bytes are reported before these are taken";
   const std::vector<Guard::Busy> busy = guard_.TakeBusy();
   ASSERT_THAT(Names(busy), ElementsAre(Tcp(1).name));
   EXPECT_EQ(busy[0].bytes, 200u);
@@ -410,7 +410,7 @@ TEST_F(GuardTest, EachConnectionHasTimeForItsFirstCall) {
   Pass(Guard::kFirstCall + Guard::kLookInterval);
   int cuts = 0;
   for (int i = 0; i < 6; ++i) cuts += lines_[i].cuts;
-  EXPECT_EQ(cuts, 3) << "no more than the limit have stayed";
+  EXPECT_EQ(cuts, 3) << "at most the limit have stayed";
   EXPECT_EQ(lines_[5].cuts, 0) << "the youngest";
 }
 

@@ -200,7 +200,7 @@ TEST_F(ListenerTest, AUnixSocketIsForUserAndGroupAndGoesWithTheListener) {
   const SocketName name = names[0];
   Descriptor late(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
   EXPECT_NE(connect(late.get(), name.get(), name.length), 0);
-  EXPECT_EQ(send(client.get(), "x", 1, MSG_NOSIGNAL), 1) << "what is open stays";
+  EXPECT_EQ(send(client.get(), "x", 1, MSG_NOSIGNAL), 1) << "open connections stay";
 }
 
 TEST_F(ListenerTest, AFileThatIsNotItsOwnStays) {
@@ -217,7 +217,7 @@ TEST_F(ListenerTest, AStrangerIsServedOnceACallBeginsAndAllItSaidIsThere) {
   const Descriptor client = Connect(names[0]);
   Send(client.get(), kPreface);
   EXPECT_EQ(ReadBytes(client.get(), 9), Greeting::kServerSettings)
-      << "which clients wait for before they call";
+      << "clients wait for these before they call";
   Send(client.get(), kSettings);
   for (const char byte : kCall.substr(0, kCall.size() - 4)) {
     EXPECT_EQ(served(), 0u);
@@ -430,7 +430,7 @@ TEST_F(ListenerTest, AcceptsAgainWhenDescriptorsComeBack) {
     EXPECT_EQ(counters_.Read().accept_trouble, "") << "without a time";
     const auto begin = steady_clock::now();
     EXPECT_TRUE(Await([&] { return served() == kClients; }))
-        << served() << ": nobody is lost; in cycle " << cycle << ", accepted " << accepted()
+        << served() << ": no client is lost; in cycle " << cycle << ", accepted " << accepted()
         << ", open " << counters_.Read().open << ", failures " << counters_.Read().accept_failures
         << ", cut for time " << counters_.Read().cut_for_time;
     EXPECT_LT(steady_clock::now() - begin, std::chrono::seconds(1));

@@ -84,7 +84,7 @@ TEST(Peer, NothingIsReadBehindTheName) {
   EXPECT_EQ(PeerName(std::string_view(text).substr(0, 1)), "%");
   EXPECT_EQ(PeerName(std::string_view(text).substr(0, 2)), "%4");
   EXPECT_EQ(PeerName(std::string_view(text).substr(0, 5)), "A%4");
-  EXPECT_EQ(PeerName(text), "AA") << "up to its end";
+  EXPECT_EQ(PeerName(text), "AA") << "the whole text";
 }
 
 TEST(Peer, NamesThatAreNoneStayAsTheyAre) {

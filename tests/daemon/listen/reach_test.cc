@@ -59,7 +59,7 @@ class ReachTest : public ::testing::Test {
 
 TEST_F(ReachTest, WhoAnswersTheCallIsReached) {
   EXPECT_TRUE(With(std::string(kSettings).append(kAnswer), kLong).ok());
-  EXPECT_TRUE(was_own_) << "the listener is to know it";
+  EXPECT_TRUE(was_own_) << "the listener must recognise it";
 }
 
 TEST_F(ReachTest, WhoNeverAcceptsIsDeaf) {

@@ -89,13 +89,13 @@ TEST_F(WatcherTest, OneThatCannotBeArmedIsArmedTheSecondTime) {
   }
   EXPECT_EQ(send(client_.get(), "x", 1, MSG_NOSIGNAL), 1);
   std::vector<Guard::Busy> busy;
-  ASSERT_TRUE(Await([&] { return !(busy = guard_.TakeBusy()).empty(); })) << "bytes are told of";
+  ASSERT_TRUE(Await([&] { return !(busy = guard_.TakeBusy()).empty(); })) << "bytes are reported";
   EXPECT_EQ(busy[0].peer, peer_.name);
   char byte = 0;
-  EXPECT_EQ(recv(served_.get(), &byte, 1, 0), 1) << "it was not cut";
+  EXPECT_EQ(recv(served_.get(), &byte, 1, 0), 1) << "it was not disconnected";
   client_.Reset(-1);
   shutdown(served_.get(), SHUT_RDWR);
-  EXPECT_TRUE(AllHaveLeft()) << "its end is told of";
+  EXPECT_TRUE(AllHaveLeft()) << "the close is reported";
 }
 
 TEST_F(WatcherTest, OneThatCannotBeArmedAtAllIsCutAndLeaves) {
@@ -120,7 +120,7 @@ TEST_F(WatcherTest, OneThatIsNotWatchedYetIsNotCut) {
   }
   EXPECT_EQ(send(client_.get(), "x", 1, MSG_NOSIGNAL), 1);
   char byte = 0;
-  EXPECT_EQ(recv(served_.get(), &byte, 1, 0), 1) << "it was not cut";
+  EXPECT_EQ(recv(served_.get(), &byte, 1, 0), 1) << "it was not disconnected";
   EXPECT_EQ(counters_.Read().open, 1u);
 }
 

@@ -212,7 +212,7 @@ TEST(LocalMemory, WhatIsMappedIsChargedToTheBudget) {
     EXPECT_THAT(std::string(status.message()),
                 HasSubstr("memory 2 of 11 bytes would be held beside 90 of all clients; "
                           "max_memory_bytes allows 100"));
-    EXPECT_EQ(budget->used_bytes(kLocal), 60u) << "what is refused costs nothing";
+    EXPECT_EQ(budget->used_bytes(kLocal), 60u) << "a refused memory costs nothing";
     EXPECT_EQ(other.memory.memories(), 1u);
     EXPECT_TRUE(absl::IsAlreadyExists(other.Hold(1, "b")));
     EXPECT_TRUE(absl::IsInvalidArgument(other.memory.Hold(3, 4, MakeMemfd("four", 0).get())));

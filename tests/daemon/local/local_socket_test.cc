@@ -322,7 +322,7 @@ TEST_F(LocalSocketTest, OutOfDescriptorsItRefusesAndRecovers) {
     ASSERT_EQ(send(made.get(), hello.data(), hello.size(), 0), static_cast<ssize_t>(hello.size()));
     client.RoundTrips();
     pollfd ready = {made.get(), POLLIN, 0};
-    EXPECT_EQ(poll(&ready, 1, 0), 0) << "there was none to accept it with";
+    EXPECT_EQ(poll(&ready, 1, 0), 0) << "no descriptor was left to accept it";
   }
   EXPECT_TRUE(client.Call(MemoryMessage(1, 4), {fd.get()}).has_held());
   pollfd ready = {made.get(), POLLIN, 0};

@@ -29,7 +29,7 @@ TEST_F(NoRandomBytesTest, ASessionIsOfferedNothing) {
   client.Send(HelloMessage(std::string(Tokens::kBytes, '\0')));
   std::optional<v1::LocalAnswer> answer = client.Read();
   ASSERT_TRUE(answer.has_value());
-  EXPECT_FALSE(answer->has_welcome()) << "the token that was not filled is nobody's";
+  EXPECT_FALSE(answer->has_welcome()) << "an unfilled token is not used";
 
   const LocalSession next(&socket, 7);
   EXPECT_EQ(next.path(), path());
@@ -42,7 +42,7 @@ TEST_F(NoRandomBytesTest, NoTokenIsMade) {
   const absl::Status status = socket.tokens()->Register(1).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kUnavailable);
   EXPECT_THAT(status.message(), HasSubstr("no random bytes: Function not implemented"));
-  EXPECT_EQ(refused.made(), 1) << "it is not asked for again";
+  EXPECT_EQ(refused.made(), 1) << "it is not requested again";
 }
 
 TEST_F(NoRandomBytesTest, WhoIsInterruptedAsksAgain) {

@@ -83,7 +83,7 @@ TEST_F(Locked, AllAreOrderedOnceAllHold) {
   EXPECT_EQ(orders[0].ahead, 2u);
   EXPECT_EQ(orders[0].at, 102 * kPeriod);
   for (size_t m = 0; m < 2; ++m) genlock_.Ordered(m, 1, orders[m].at, true);
-  EXPECT_EQ(genlock_.Step(), sync::kNever) << "nothing more is to be done";
+  EXPECT_EQ(genlock_.Step(), sync::kNever) << "nothing more is due";
   clock_.AdvanceTo(200 * kPeriod);
   genlock_.Step();
   EXPECT_EQ(genlock_.figures().postponed, 0u);
@@ -92,7 +92,7 @@ TEST_F(Locked, AllAreOrderedOnceAllHold) {
   EXPECT_EQ(genlock_.shown(), 1u);
   EXPECT_EQ(genlock_.figures().volumes, 1u);
   EXPECT_EQ(genlock_.figures().slips, 0u);
-  EXPECT_FALSE(genlock_.ToDraw(0).has_value()) << "nobody wants another";
+  EXPECT_FALSE(genlock_.ToDraw(0).has_value()) << "no further volume is wanted";
 }
 
 TEST_F(Locked, AnOrderThatOneHasNotTakenInTimeIsPutOffForAll) {

@@ -20,7 +20,7 @@ TEST(LinkWatch, FailuresAreToldAtOnceThenTogether) {
   EXPECT_EQ(watch.Failed(3, kStart + 1), 0u) << "too soon";
   EXPECT_EQ(watch.Failed(7, kStart + LinkWatch::kQuiet - 1), 0u);
   EXPECT_EQ(watch.Failed(7, kStart + LinkWatch::kQuiet), 5u) << "those that had to wait";
-  EXPECT_EQ(watch.Failed(7, kStart + LinkWatch::kQuiet + 1), 0u) << "told";
+  EXPECT_EQ(watch.Failed(7, kStart + LinkWatch::kQuiet + 1), 0u) << "reported";
   EXPECT_EQ(watch.Failed(8, kStart + LinkWatch::kQuiet + 1), 0u) << "too soon after the last";
   EXPECT_EQ(watch.Failed(8, kStart + 2 * LinkWatch::kQuiet), 1u);
 }

@@ -121,7 +121,7 @@ TEST(RiderBook, AgreesWithAFlatListOverRandomEvents) {
     RiderBook book("d", [&](const Rider& rider, const CommitOutcome& outcome) {
       EXPECT_EQ(outcome.display, "d");
       EXPECT_TRUE(told.emplace(rider.frame_id, Flatten(rider, outcome)).second)
-          << "told twice, frame " << rider.frame_id;
+          << "reported twice, frame " << rider.frame_id;
     });
     FlatModel model;
     uint64_t frame = 0, volume = 0, newest = 0;

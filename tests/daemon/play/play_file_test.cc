@@ -51,7 +51,7 @@ TEST(PlayFile, IsForItsOwnerAloneAndGoesWithItsFolder) {
     ASSERT_TRUE(other.ok());
     EXPECT_NE(other->path(), path);
     moved = *std::move(other);
-    EXPECT_NE(access(path.c_str(), F_OK), 0) << "what it was is gone";
+    EXPECT_NE(access(path.c_str(), F_OK), 0) << "the earlier file is removed";
     path = moved.path();
     folder = moved.prefix();
   }
@@ -127,7 +127,7 @@ TEST_F(LeftFolders, GoOnceTheirProcessIsGone) {
   EXPECT_TRUE(Is(path)) << "it is being played";
   kill(other, SIGKILL);
   ASSERT_EQ(waitpid(other, nullptr, 0), other);
-  EXPECT_TRUE(Is(path)) << "nobody was there to remove it";
+  EXPECT_TRUE(Is(path)) << "there was no process to remove it";
   EXPECT_EQ(PrivateFolder::RemoveLeft(), 1u);
   EXPECT_FALSE(Is(std::filesystem::path(path).parent_path()));
   EXPECT_TRUE(Is(moved.path()));
@@ -172,7 +172,7 @@ TEST(SafeNames, AreOneWordOfAPath) {
   EXPECT_EQ(SafeName("/etc/passwd"), "passwd");
   EXPECT_EQ(SafeName("..\\..\\x.stl"), "x.stl");
   EXPECT_EQ(SafeName("a\n\x1b[1m\x7f.stl"), "a__[1m_.stl");
-  EXPECT_EQ(SafeName("frame_%04d.obj"), "frame__04d.obj") << "no sequence";
+  EXPECT_EQ(SafeName("frame_%04d.obj"), "frame__04d.obj") << "not a sequence";
   EXPECT_EQ(SafeName("frame_####.obj"), "frame_____.obj");
   for (const char* none : {"", ".", "..", "...", "a/", "/"}) EXPECT_EQ(SafeName(none), "file");
 }

@@ -122,10 +122,10 @@ TEST_F(PlayerTest, RunsVoxelctlWithTheFileAndNothingOfTheDaemons) {
                                           "--other-files", "none", path));
   EXPECT_THAT(lines("contents"), ElementsAre("solid"));
   EXPECT_THAT(lines("environment"), Not(::testing::Contains(HasSubstr("secret"))));
-  EXPECT_THAT(lines("descriptors"), ElementsAre("0", "1", "2", "3")) << "3 is of ls itself";
+  EXPECT_THAT(lines("descriptors"), ElementsAre("0", "1", "2", "3")) << "3 belongs to ls itself";
   ASSERT_EQ(lines("group").size(), 1u);
   EXPECT_NE(std::stoi(lines("group")[0]), getpgrp());
-  EXPECT_NE(access(path.c_str(), F_OK), 0) << "the file has gone with it";
+  EXPECT_NE(access(path.c_str(), F_OK), 0) << "the file was removed with it";
 }
 
 TEST_F(PlayerTest, StopsAndIsReplaced) {

@@ -85,7 +85,7 @@ TEST_F(TimeWatchTest, TellsThatTheWallClockStepped) {
   EXPECT_EQ(figures().clock_steps, 1u);
   EXPECT_EQ(figures().time_trouble, "the wall clock stepped by +3600.0 s 0 s ago");
   Turn(TimeWatch::kTurn);
-  EXPECT_EQ(Logged(), "") << "it goes on from there";
+  EXPECT_EQ(Logged(), "") << "it continues from there";
 
   Turn(TimeWatch::kTurn, -TimeWatch::kStep);
   EXPECT_THAT(Logged(), HasSubstr("seconds=-0.5"));

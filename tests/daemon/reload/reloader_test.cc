@@ -226,7 +226,7 @@ TEST_F(ReloaderTest, WhoMayDoWhatWaitsWithWhoCanCome) {
   ASSERT_TRUE(changes.ok()) << changes.status();
   EXPECT_THAT(changes->at_once, IsEmpty());
   EXPECT_THAT(changes->at_restart, ElementsAre("server.listen", "security.anonymous_scopes"));
-  EXPECT_EQ(AnonymousScopes(), "view") << "the old address is open still";
+  EXPECT_EQ(AnonymousScopes(), "view") << "the old address is still open";
 }
 
 TEST_F(ReloaderTest, DisplaysThatAreToComeAreLookedAtToo) {

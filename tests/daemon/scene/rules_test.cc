@@ -113,7 +113,7 @@ TEST(Rules, WhatIsGuardedKeepsItsLayer) {
   Operation all = DeleteAllMine();
   std::get<Delete>(all.op).guard_sequence = guard;
   f.Commit(std::move(all));
-  EXPECT_EQ(f.Scene(), "b: new") << "what came after it, in its layer";
+  EXPECT_EQ(f.Scene(), "b: new") << "what followed it in its layer";
   EXPECT_EQ(CheckIndices(*f.store.snapshot()), "");
 }
 
@@ -277,7 +277,7 @@ TEST(PutClip, KnowsWhatIsNotSound) {
   EXPECT_TRUE(boxes({good, good}));
   EXPECT_FALSE(boxes({far}));
   EXPECT_FALSE(boxes({small}));
-  EXPECT_FALSE(boxes({far, good})) << "whatever comes after it";
+  EXPECT_FALSE(boxes({far, good})) << "regardless of what follows";
   EXPECT_FALSE(boxes({good, far}));
 
   const auto cylinders = [&](const std::vector<ClipCylinder>& all) {
@@ -290,7 +290,7 @@ TEST(PutClip, KnowsWhatIsNotSound) {
   const ClipCylinder beyond = {{1.5e308, 1.5e308, 0}, {1.5e308 + 1e300, 1.5e308 + 1e300, 0}, 1};
   EXPECT_TRUE(cylinders({sound, sound}));
   EXPECT_FALSE(cylinders({beyond}));
-  EXPECT_FALSE(cylinders({beyond, sound})) << "whatever comes after it";
+  EXPECT_FALSE(cylinders({beyond, sound})) << "regardless of what follows";
   EXPECT_FALSE(cylinders({sound, {{0, 0, 0}, {0, 0, 1}, 1e-200}}));
   EXPECT_FALSE(cylinders({{{kInfinity, 0, 0}, {0, 0, 1}, 1}}));
 }

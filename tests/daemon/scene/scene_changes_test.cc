@@ -69,7 +69,7 @@ class Watcher final : public SceneChangeVisitor {
     const auto it = layers.find(key);
     if (it != layers.end()) {
       EXPECT_EQ(it->second.look.number, layer.number);
-      EXPECT_FALSE(it->second.look == LookOf(layer)) << "no news of " << key.name;
+      EXPECT_FALSE(it->second.look == LookOf(layer)) << "not a change of " << key.name;
     }
     layers[key].look = LookOf(layer);
     if (std::exchange(removed_, {}) == key) ++room_;  // the two are removed together
@@ -83,11 +83,11 @@ class Watcher final : public SceneChangeVisitor {
   bool OnEntity(const OwnedName& layer, const std::string& id, const Entity& entity) override {
     const auto it = layers.find(layer);
     if (it == layers.end()) {
-      ADD_FAILURE() << "an entity of the layer " << layer.name << ", which was not told";
+      ADD_FAILURE() << "an entity of the layer " << layer.name << ", which was not reported";
       return false;
     }
     const Entity*& held = it->second.entities[id];
-    EXPECT_NE(held, &entity) << "no news of " << id;
+    EXPECT_NE(held, &entity) << "not a change of " << id;
     held = &entity;
     return Room();
   }
@@ -118,7 +118,7 @@ class Watcher final : public SceneChangeVisitor {
  private:
   bool Room() {
     ++changes_told;
-    EXPECT_GT(room_, 0u) << "told without room";
+    EXPECT_GT(room_, 0u) << "reported without room";
     if (room_ > 0) --room_;
     return room_ > 0;
   }

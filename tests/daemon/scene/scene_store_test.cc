@@ -424,7 +424,7 @@ TEST(SceneStore, OfManyIssuesTheFirstAreKept) {
       f.Commit(Begin("b"), Move("a", "1", Shift(1)), Move("a", "2", Shift(1)),
                Move("a", "3", Shift(1)), Put("a", "x"));
   EXPECT_EQ(result.issues.size(), 2u);
-  EXPECT_EQ(result.more_issues, 2u) << "a third move, and the frame without its end";
+  EXPECT_EQ(result.more_issues, 2u) << "a third move, and the unfinished frame";
   EXPECT_EQ(result.refused_operations, 4u);
   EXPECT_EQ(f.Scene(), "a: x");
 }

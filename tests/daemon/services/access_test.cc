@@ -290,12 +290,12 @@ TEST_F(ServicesAccess, LayersThatEraseAndOthersLayersTakeControl) {
     return std::pair(status.error_code(), response.entities());
   };
   EXPECT_EQ(daemon_->Entities().entities_size(), 2);
-  EXPECT_EQ(clear("artist", 0), std::pair(StatusCode::OK, uint64_t{1})) << "its own alone";
-  EXPECT_EQ(clear("artist", 0), std::pair(StatusCode::OK, uint64_t{0})) << "it has none any more";
+  EXPECT_EQ(clear("artist", 0), std::pair(StatusCode::OK, uint64_t{1})) << "only its own";
+  EXPECT_EQ(clear("artist", 0), std::pair(StatusCode::OK, uint64_t{0})) << "it has no layers left";
   ASSERT_EQ(daemon_->Entities().entities_size(), 1);
   const uint64_t painters = daemon_->Entities().entities(0).key().owner();
   EXPECT_EQ(clear("artist", painters).first, StatusCode::PERMISSION_DENIED);
-  EXPECT_EQ(clear("boss", painters).first, StatusCode::PERMISSION_DENIED) << "it has control alone";
+  EXPECT_EQ(clear("boss", painters).first, StatusCode::PERMISSION_DENIED) << "it has only control";
   PutFile(grants_, Grant("boss", "draw\", \"control"));
   ASSERT_TRUE(access_->Look(true).ok());
   EXPECT_EQ(clear("boss", painters), std::pair(StatusCode::OK, uint64_t{1}));
@@ -352,7 +352,7 @@ TEST_F(ServicesAccess, ATokenThatIsTakenAwayEndsItsCallsAndNobodyElses) {
   const grpc::Status cut = upload->Finish();
   EXPECT_EQ(cut.error_code(), StatusCode::UNAUTHENTICATED);
   EXPECT_THAT(cut.error_message(), HasSubstr("revoked"));
-  EXPECT_EQ(store_->List({&hash, 1}).front().stored, 4u) << "whoever may can go on with it";
+  EXPECT_EQ(store_->List({&hash, 1}).front().stored, 4u) << "an authorised caller can continue it";
   while (stats.connections().calls_revoked() < 2) ASSERT_TRUE(watch->Read(&stats));
   EXPECT_EQ(stats.connections().calls_revoked(), 2u);
   EXPECT_EQ(stats.sessions(), 0u);

@@ -61,7 +61,7 @@ TEST_F(ActiveCallsTest, OneIsKeptUntilItIsRemoved) {
   calls_.Remove(key);
   EXPECT_TRUE(kept.expired());
   calls_.Remove(key);
-  EXPECT_EQ(left(), 1u) << "who is not there is not removed, nor is another";
+  EXPECT_EQ(left(), 1u) << "removing an unknown call removes no other";
 }
 
 TEST_F(ActiveCallsTest, ThoseWhoMayNotAnyMoreAreEnded) {

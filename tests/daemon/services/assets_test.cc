@@ -155,7 +155,7 @@ TEST_F(Assets, AreBroughtInPiecesAndDrawnByManyRequests) {
   EXPECT_EQ(daemon_->Stats().assets().uploaded(), 1u);
   EXPECT_EQ(daemon_->Stats().entities(), 2u);
 
-  EXPECT_TRUE(Upload(kPointHash, 12, {{kPoint.substr(0, 5), 0}}).ok()) << "it is here already";
+  EXPECT_TRUE(Upload(kPointHash, 12, {{kPoint.substr(0, 5), 0}}).ok()) << "it is already stored";
   EXPECT_EQ(response_.stored(), 12u);
 }
 
@@ -230,7 +230,7 @@ TEST_F(Assets, AnUploadThatFallsSilentEnds) {
   EXPECT_EQ(silent.error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
   EXPECT_THAT(silent.error_message(), HasSubstr("upload_silence_limit_ns"));
   EXPECT_EQ(List(kPointHash).assets(0).stored(), 4u);
-  EXPECT_TRUE(Upload(kPointHash, 12, {{kPoint.substr(4), 4}}).ok()) << "another call goes on";
+  EXPECT_TRUE(Upload(kPointHash, 12, {{kPoint.substr(4), 4}}).ok()) << "another call continues";
 }
 
 TEST_F(Assets, AFullDiskIsSaidAndTheServerGoesOn) {
@@ -246,7 +246,7 @@ TEST_F(Assets, AFullDiskIsSaidAndTheServerGoesOn) {
   ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
   EXPECT_EQ(full.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
   EXPECT_THAT(full.error_message(), HasSubstr(absl::BytesToHexString(kPointHash)));
-  EXPECT_EQ(List(kPointHash).assets(0).stored(), 4u) << "what came before it was full";
+  EXPECT_EQ(List(kPointHash).assets(0).stored(), 4u) << "what arrived before it was full";
   EXPECT_TRUE(Upload(kPointHash, 12, {{kPoint.substr(4), 4}}).ok()) << "there is room again";
 }
 
@@ -310,7 +310,8 @@ TEST_F(Assets, ManyCallsAreNotHeld) {
   for (const auto& open : calls) open->call->WritesDone();
   for (std::thread& thread : waiting) thread.join();
   EXPECT_EQ(refused, kCalls - kMost);
-  EXPECT_TRUE(Upload(kPointHash, 12, {{kPoint, 0}}).ok()) << "they have ended, and others come in";
+  EXPECT_TRUE(Upload(kPointHash, 12, {{kPoint, 0}}).ok())
+      << "they have ended, and others are accepted";
 }
 
 TEST_F(Assets, WhatIsAskedForIsLookedAt) {

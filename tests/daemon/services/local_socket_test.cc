@@ -160,7 +160,7 @@ TEST(LocalSocket, AnUnknownMemoryIsAnIssueAndTheStreamGoesOn) {
     each->ReadOutcomes(1);
   }
   EXPECT_THAT(other.issues, SizeIs(0));
-  ASSERT_THAT(client.issues, SizeIs(1)) << "a session's memory is its own";
+  ASSERT_THAT(client.issues, SizeIs(1)) << "memory belongs to its session";
   EXPECT_EQ(client.issues[0].reason(), v1::REASON_NOT_FOUND);
   EXPECT_EQ(client.issues[0].field(),
             "upsert.entity.primitive.segments.vertices.positions_in.memory");

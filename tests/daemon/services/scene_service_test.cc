@@ -71,7 +71,7 @@ TEST(ApplyUpdate, StrictIsRefusedWhole) {
       StartsWith("the session is strict and 1 operation was refused, so nothing of the "
                  "commit was applied; the first: layer/bad, "
                  "operations[1].upsert.entity.primitive.sphere.radius: radius is -1; give"));
-  EXPECT_EQ(Occurrences("is -1", status.error_message()), 1) << "said once";
+  EXPECT_EQ(Occurrences("is -1", status.error_message()), 1) << "reported once";
   EXPECT_EQ(daemon.Entities().total(), 0u);
 }
 

@@ -224,7 +224,7 @@ TEST(WatchScene, WhoTakesNothingForTooLongHoldsNothing) {
   for (int tries = 0; !first.expired() && tries < 1'000'000; ++tries) daemon.Stats();
   EXPECT_TRUE(first.expired());
   Watcher third(daemon.scene());
-  EXPECT_TRUE(third.Read()) << "its place is another's, though it has not read that it ended";
+  EXPECT_TRUE(third.Read()) << "its place is free, though it has not read its end";
   third.Cancel();
   const grpc::Status ended = idle.Finish();
   EXPECT_EQ(ended.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);

@@ -238,7 +238,7 @@ TEST_F(Addresses, BusyOnesAreErrors) {
     const auto second = Start({address.ToString()});
     EXPECT_TRUE(absl::IsAlreadyExists(second.status())) << second.status();
     EXPECT_THAT(std::string(second.status().message()), HasSubstr(address.ToString()));
-    EXPECT_TRUE(Serves(address.ToString())) << "the first goes on";
+    EXPECT_TRUE(Serves(address.ToString())) << "the first continues";
   }
 }
 

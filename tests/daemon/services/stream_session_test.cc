@@ -154,7 +154,7 @@ TEST_F(StreamSessionTest, WhatWasReadAheadIsNotHandedToAFullIntake) {
 
   sim_->core->Step();
   EXPECT_EQ(Applied(), 1u);
-  EXPECT_EQ(port_.posts, 1) << "a thread of the port's goes on";
+  EXPECT_EQ(port_.posts, 1) << "a thread of the port continues";
   EXPECT_GT(Arriving(), 200u) << "not the core's";
   TakeTurns();
   EXPECT_EQ(Arriving(), 0u);
@@ -232,7 +232,7 @@ TEST_F(StreamSessionTest, WhatWaitsWhenTheClientIsGoneIsDroppedAndGivenBack) {
   session_->OnTurn();  // late ones have no effect
   session_->OnAlarm();
   sim_->core->Step();
-  EXPECT_EQ(Applied(), 1u) << "what had been handed over";
+  EXPECT_EQ(Applied(), 1u) << "the commit that was handed over";
   session_ = nullptr;
 }
 

@@ -48,7 +48,8 @@ TEST(Stream, OpensAppliesAndTellsWhatBecameOfIt) {
   client.HalfClose();
   const grpc::Status status = client.Finish();
   EXPECT_TRUE(status.ok()) << status.error_message();
-  EXPECT_EQ(daemon.Entities().total(), 0u) << "CLEAR is the default, and done when the call ends";
+  EXPECT_EQ(daemon.Entities().total(), 0u)
+      << "CLEAR is the default, and applied when the call ends";
   EXPECT_EQ(daemon.Stats().sessions(), 0u);
 }
 

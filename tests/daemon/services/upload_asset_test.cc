@@ -159,7 +159,7 @@ TEST_F(UploadAsset, ToldToEndWhileAPieceIsWrittenItReadsNoMore) {
   disk.GoOn();
   const grpc::Status status = call.writer->Finish();
   EXPECT_EQ(status.error_code(), StatusCode::UNAUTHENTICATED) << status.error_message();
-  EXPECT_EQ(State().stored, 3u) << "what came before";
+  EXPECT_EQ(State().stored, 3u) << "what arrived before";
 }
 
 TEST_F(UploadAsset, ToldToEndAsItIsWholeItEndsOnce) {
@@ -173,7 +173,7 @@ TEST_F(UploadAsset, ToldToEndAsItIsWholeItEndsOnce) {
   disk.GoOn();
   EXPECT_EQ(call.writer->Finish().error_code(), StatusCode::UNAUTHENTICATED);
   EXPECT_EQ(call.response.stored(), 0u);
-  EXPECT_TRUE(State().complete) << "it was brought all the same";
+  EXPECT_TRUE(State().complete) << "it was stored all the same";
 }
 
 TEST_F(UploadAsset, BegunWhileTheServerEndsItEndsToo) {
@@ -225,7 +225,7 @@ TEST_F(UploadAsset, WhatMemoryCannotHoldIsRefused) {
   AwaitStored(kHello.size());
   budget->ChargeAnyway(Budget::Use::kOwed, all + 1);
   const grpc::Status ended = call.End();
-  EXPECT_TRUE(ended.ok()) << "an end takes no memory: " << ended.error_message();
+  EXPECT_TRUE(ended.ok()) << "ending takes no memory: " << ended.error_message();
   EXPECT_TRUE(State().complete);
   budget->Release(Budget::Use::kOwed, all + 1);
 }

@@ -33,7 +33,7 @@ TEST(WatchSlots, NobodyHasMoreThanThreeQuarters) {
   const absl::Status refused = slots.Take("user 1").status();
   EXPECT_TRUE(absl::IsResourceExhausted(refused));
   EXPECT_THAT(refused.message(), HasSubstr("user 1 has 6 watches of volumes open"));
-  EXPECT_TRUE(slots.Take("user 2").ok()) << "others are kept away";
+  EXPECT_TRUE(slots.Take("user 2").ok()) << "others get none";
   taken.pop_back();
   EXPECT_TRUE(slots.Take("user 1").ok());
 }

@@ -84,7 +84,7 @@ class KeeperTest : public ::testing::Test {
 TEST_F(KeeperTest, WhatComesTogetherIsWrittenTogether) {
   Begin(3600 * sync::kSecond);
   for (int i = 0; i < 100; ++i) Commit(absl::StrCat("e", i), false);
-  EXPECT_EQ(keeper_->figures().transactions, 0u) << "nobody waits for it";
+  EXPECT_EQ(keeper_->figures().transactions, 0u) << "no caller waits for it";
   Commit("last", true);
   AwaitDurable(newest());
   EXPECT_EQ(keeper_->figures().transactions, 1u);

@@ -234,7 +234,7 @@ TEST_F(KeptScene, WhatIsMadeLaterLiesAboveWhatCameBack) {
   const uint64_t a = restored->FindLayer({1, "a"})->number,
                  b = restored->FindLayer({1, "b"})->number;
   EXPECT_LT(b, a) << "in the order in which they were made";
-  EXPECT_GT(b, f.store.snapshot()->FindLayer({1, "a"})->number) << "above all that the file has";
+  EXPECT_GT(b, f.store.snapshot()->FindLayer({1, "a"})->number) << "greater than all in the file";
 }
 
 TEST_F(KeptScene, OwnersComeBackWithTheirTokensQuotasAndNames) {

@@ -187,7 +187,7 @@ void OneFailure::Live(CrashDisk& disk, int* failed, Rows* model) const {
       absl::Status status = Apply(*file, changes);
       if (status.ok()) return status;
       if (absl::Status found = RowsOf(*file, &rows); found.ok()) {
-        EXPECT_EQ(rows, *model) << "part of what failed is there: " << status;
+        EXPECT_EQ(rows, *model) << "part of what failed was applied: " << status;
       }
       return status;
     }));
@@ -221,14 +221,14 @@ void OneFailure::ExpectKept(CrashDisk& disk, const Rows& model) {
   EXPECT_EQ((*file)->quarantined(), "");
   Rows rows;
   ASSERT_TRUE(RowsOf(**file, &rows).ok());
-  EXPECT_EQ(rows, model) << "after it was opened anew";
+  EXPECT_EQ(rows, model) << "after it was opened again";
 }
 
 // Checks that a life makes enough calls, and that enough of the failures were reported to its
 // caller.
 void OneFailure::ExpectTold(uint64_t asked, int failed) const {
   EXPECT_GE(asked, GetParam().least_calls);
-  EXPECT_GT(failed, static_cast<int>(asked / kStep / 3)) << "they fail, and nobody is told";
+  EXPECT_GT(failed, static_cast<int>(asked / kStep / 3)) << "calls fail without being reported";
 }
 
 TEST_P(OneFailure, EachCallOfTheDisk) {
@@ -248,7 +248,7 @@ TEST_P(OneFailure, EachCallOfTheDisk) {
     // Data reported as being on the disk also survives a power failure.
     disk.PowerCycle(static_cast<uint32_t>(n));
     ExpectKept(disk, model);
-    EXPECT_EQ(now > 1, false) << "one failure was two";
+    EXPECT_EQ(now > 1, false) << "one failure was reported as two";
     failed += now;
   }
   std::cout << calls << " calls, " << failed << " of them told to the caller when they failed\n";
@@ -312,8 +312,8 @@ TEST_P(OneFailure, EachAllocationOfSqlite) {
     if (n == 0) allocations = memory.count;
     sqlite.Fail(0);
     ExpectKept(disk, model);
-    EXPECT_EQ(now > 1, false) << "one failure was two";
-    EXPECT_EQ(sqlite3_memory_used(), 0) << "what it asked for is held";
+    EXPECT_EQ(now > 1, false) << "one failure was reported as two";
+    EXPECT_EQ(sqlite3_memory_used(), 0) << "memory leaked";
     failed += now;
   }
   std::cout << allocations << " allocations, " << failed

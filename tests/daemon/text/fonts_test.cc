@@ -114,7 +114,7 @@ TEST_F(FontsTest, WhatNoFontHasIsSaid) {
   // U+10FFFE is a noncharacter.
   EXPECT_EQ(fonts_.Lay("a\xF4\x8F\xBF\xBE", {}).status(),
             absl::InvalidArgumentError("has U+10fffe, which no font of the server has"));
-  EXPECT_EQ(Lay("a\xE2\x80\x8D\tb").glyphs.size(), 2u) << "joiners and tabs are not seen";
+  EXPECT_EQ(Lay("a\xE2\x80\x8D\tb").glyphs.size(), 2u) << "joiners and tabs are invisible";
   EXPECT_TRUE(absl::IsResourceExhausted(fonts_.Lay("abc", {.most = 2}).status()));
 }
 

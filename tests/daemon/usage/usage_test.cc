@@ -63,7 +63,7 @@ TEST_F(UsageTest, TheTableHasWhatIsNotHidden) {
   ASSERT_EQ(put.arguments.size(), 1u);
   EXPECT_EQ(put.arguments[0].argument, "FILE");
   EXPECT_TRUE(put.arguments[0].repeated);
-  ASSERT_EQ(put.options.size(), 2u) << "help is the program's";
+  ASSERT_EQ(put.options.size(), 2u) << "help belongs to the program";
   EXPECT_EQ(put.options[0].value, "fast|slow|TIME");
   EXPECT_THAT(put.options[0].choices, ElementsAre("fast", "slow"));
   EXPECT_EQ(put.options[0].fallback, "fast");

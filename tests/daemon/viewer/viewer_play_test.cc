@@ -223,7 +223,7 @@ TEST_F(ViewerPlayTest, NothingIsPlayedWhileARequiredAuditLogCannotBeWritten) {
   EXPECT_EQ(answer.result_int(), 503u);
   EXPECT_THAT(answer.body(), HasSubstr("No space left on device"));
   EXPECT_EQ(player_->state(), play::Playing());
-  EXPECT_EQ(audit_->stats().pending, 2u) << "what was refused is recorded as well";
+  EXPECT_EQ(audit_->stats().pending, 2u) << "refused actions are recorded as well";
 }
 
 TEST_F(ViewerPlayTest, IsForPagesOfThisOriginWithControl) {
@@ -378,7 +378,7 @@ TEST_F(ViewerPlayTest, WhereNoFileCanBeMadeItIsSaid) {
     EXPECT_THAT(answer.body(), HasSubstr("no folder for files to be played can be made"));
   }
   EXPECT_EQ(player_->state(), play::Playing());
-  EXPECT_EQ(Post("/play?name=a.obj").result_int(), 202u) << "it can be made now";
+  EXPECT_EQ(Post("/play?name=a.obj").result_int(), 202u) << "now it can be created";
 }
 
 TEST_F(ViewerPlayTest, WhereThereIsNoThreadItIsSaid) {
@@ -390,7 +390,7 @@ TEST_F(ViewerPlayTest, WhereThereIsNoThreadItIsSaid) {
     EXPECT_THAT(answer.body(), HasSubstr("no thread"));
     EXPECT_EQ(player_->state(), play::Playing());
   }
-  EXPECT_EQ(Post("/play?name=a.obj").result_int(), 202u) << "there is one now";
+  EXPECT_EQ(Post("/play?name=a.obj").result_int(), 202u) << "now there is one";
 }
 
 // A page that runs a function when it is notified.
@@ -452,7 +452,7 @@ TEST_F(ViewerPlayTest, WhatIsGivenUpIsNotPlayed) {
   EXPECT_EQ(player_->state(), play::Playing());
   EXPECT_EQ(Audited(), "");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temporary->path()), {}), 1)
-      << "that of the second alone";
+      << "only that of the second";
   second.receiver.reset();
   play.reset();
   EXPECT_TRUE(std::filesystem::is_empty(temporary->path()));

@@ -239,7 +239,7 @@ TEST_F(ViewerSocketTest, AllPagesTogetherHaveSoManyWatches) {
   EXPECT_EQ(page_.Heard("error").size(), 1u) << "room for one";
   pages.pop_back();
   for (uint16_t id = 2; id < 17; ++id) Watch(id);
-  EXPECT_THAT(page_.Heard("error"), IsEmpty()) << "a page that goes leaves its room";
+  EXPECT_THAT(page_.Heard("error"), IsEmpty()) << "a page that leaves frees its room";
   EXPECT_EQ(shared_->watches, 63u);
 }
 
@@ -264,7 +264,7 @@ TEST_F(ViewerSocketTest, AWatchThatIsTakenBackBeforeItBeginsDoesNot) {
   Watch(1, "display1");
   Answer();
   const std::vector<Json> watching = page_.Heard("watching");
-  ASSERT_EQ(watching.size(), 1u) << "the one that was asked for last";
+  ASSERT_EQ(watching.size(), 1u) << "the one that was requested last";
   EXPECT_EQ(watching[0]["display"]["name"], "display1");
 }
 
@@ -395,7 +395,7 @@ TEST_F(ViewerSocketTest, ControlIsRefusedWhileARequiredAuditLogCannotBeWritten) 
     ASSERT_EQ(errors.size(), 1u) << action;
     EXPECT_THAT(errors[0].get<std::string>(), HasSubstr("No space left on device")) << action;
   }
-  EXPECT_EQ(audit->stats().pending, 4u) << "what was refused is recorded as well";
+  EXPECT_EQ(audit->stats().pending, 4u) << "refused actions are recorded as well";
 }
 
 TEST_F(ViewerSocketTest, AClearedLayerIsFollowedByThoseThatAreLeft) {

@@ -277,7 +277,7 @@ TEST_F(ViewerTest, ControlIsForTheAddressThatServesOnce) {
                        .host = "localhost",
                        .head = true},
                       [&](const http::Response& answer) { status = answer.status; }));
-  EXPECT_EQ(status, 405u) << "HEAD leaves the address as it was";
+  EXPECT_EQ(status, 405u) << "HEAD does not use up the address";
   const std::string cookie = Cookie();
   EXPECT_EQ(viewer_->ControlAddress(server_->address()), "");
   EXPECT_EQ(Get(used.substr(used.find("/control"))).result_int(), 403u) << "it has been used";
@@ -336,7 +336,7 @@ TEST_F(ViewerTest, FilesAreTakenFromPagesThatControlAlone) {
                         .host = "localhost:8088",
                         .origin = "http://localhost:8088",
                         .cookie = cookie};
-  EXPECT_THAT(refusal(request), Not(HasSubstr("page"))) << "as far as nothing is played";
+  EXPECT_THAT(refusal(request), Not(HasSubstr("page"))) << "unless a file is played";
   request.path = "/other";
   EXPECT_EQ(refusal(request), "not its own");
   request.path = "/play";

@@ -128,8 +128,8 @@ TEST(Boundaries, SmoothOnesAreCutWithinTheirError) {
     for (const v1::Boundary::Axis axis : {v1::Boundary::Z, v1::Boundary::X}) {
       const std::vector<Point> lines = LinesOf(Bounded(kOutline, c.form, axis));
       EXPECT_LT(Farthest(curve, lines), kBoundaryError * kExtent);
-      EXPECT_GT(Farthest(kOutline, lines) + Farthest(curve, kOutline), 0.1) << "no polygon";
-      EXPECT_LT(lines.size(), 200u) << "and no more than are needed";
+      EXPECT_GT(Farthest(kOutline, lines) + Farthest(curve, kOutline), 0.1) << "not a polygon";
+      EXPECT_LT(lines.size(), 200u) << "and only as many as necessary";
       for (const Point& end : lines) EXPECT_LT(Farthest({end}, curve), 1e-4) << "they end on it";
     }
   }

@@ -199,7 +199,7 @@ TEST_F(CurvesTest, FramesHaveTheirEdgesAndCorners) {
   EXPECT_EQ(Geometry(mesh).record.index_count, 10u);
   EXPECT_EQ(Geometry(mesh).record.kind, gpu::PrimitiveKind::kSegments);
   mesh.mutable_mesh()->set_fill(v1::FILL_DOTS);
-  EXPECT_EQ(Geometry(mesh).record.index_count, 4u) << "the fifth is no triangle's";
+  EXPECT_EQ(Geometry(mesh).record.index_count, 4u) << "the fifth belongs to no triangle";
 }
 
 TEST_F(CurvesTest, FramesOfPlaneThingsAndArrows) {

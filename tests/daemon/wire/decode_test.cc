@@ -234,7 +234,7 @@ TEST(Decode, SequencesAscendOrAreCounted) {
   request.mutable_commit();
   decoded = Decode(request, {}, 41);
   EXPECT_THAT(decoded.refused.issues, SizeIs(1));
-  EXPECT_THAT(decoded.operations, SizeIs(1)) << "a commit is answered whatever is wrong with it";
+  EXPECT_THAT(decoded.operations, SizeIs(1)) << "a commit is answered, whatever is wrong with it";
   // No sequence follows the greatest number.
   request.set_sequence(0);
   EXPECT_THAT(Decode(request, {}, UINT64_MAX).refused.issues, SizeIs(1));
@@ -324,7 +324,7 @@ TEST(Decode, SolidMeshesAreFilledIfTheyAreClosed) {
   EXPECT_EQ(GeometryOf(decoded).record.kind, gpu::PrimitiveKind::kTriangles);
   ASSERT_THAT(decoded.refused.issues, SizeIs(1));
   const Issue& issue = decoded.refused.issues[0];
-  EXPECT_TRUE(issue.applied) << "it is no refusal";
+  EXPECT_TRUE(issue.applied) << "it is not a refusal";
   EXPECT_EQ(issue.field, "upsert.entity.primitive.mesh.fill");
   EXPECT_EQ(issue.id, "id");
   EXPECT_EQ(issue.reason, Reason::kInvalidValue);

@@ -243,7 +243,7 @@ TEST_F(FarCorners, TextThatFacesAlongYHasItsUpAlongZ) {
   const GeometryData& data = Geometry(text);
   EXPECT_EQ(data.min[1], 0);
   EXPECT_EQ(data.max[1], 0);
-  EXPECT_NEAR(data.max[2] - data.min[2], 2, 1e-6) << "a capital is as high as told";
+  EXPECT_NEAR(data.max[2] - data.min[2], 2, 1e-6) << "a capital has the given height";
 }
 
 TEST_F(FarCorners, StrokesAreAlignedAndBroken) {
@@ -270,7 +270,7 @@ TEST_F(FarCorners, StrokesAreAlignedAndBroken) {
   EXPECT_EQ(broken.record.vertex_count, left.record.vertex_count);
   text.mutable_text()->clear_width();
   text.mutable_text()->set_font("futuram");
-  EXPECT_GT(Geometry(text).record.vertex_count, left.record.vertex_count) << "of two strokes each";
+  EXPECT_GT(Geometry(text).record.vertex_count, left.record.vertex_count) << "two strokes for each";
 }
 
 TEST_F(FarCorners, LettersAreLimited) {

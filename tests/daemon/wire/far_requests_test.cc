@@ -289,7 +289,7 @@ TEST(FarLayers, HaveEveryBlendAndAMaskThatCanBeTakenAway) {
   EXPECT_FALSE(std::get<LayerState>(Decode(request).operations.at(0).op).mask.has_value());
   request.mutable_layer_state()->set_mask_layer("");
   EXPECT_EQ(std::get<LayerState>(Decode(request).operations.at(0).op).mask, "")
-      << "no mask any more";
+      << "the mask is removed";
   request.mutable_layer_state()->set_mask_layer("m");
   EXPECT_EQ(std::get<LayerState>(Decode(request).operations.at(0).op).mask, "m");
 }
@@ -343,7 +343,7 @@ TEST(FarConversions, DisplaysHaveAPowerLimitAndAView) {
   const absl::StatusOr<DisplayUpdate> update = FromWire(request);
   ASSERT_TRUE(update.ok()) << update.status();
   EXPECT_EQ(update->power_limit_w, 12.5);
-  EXPECT_EQ(update->view->mode, ViewOptions::Mode::kFit) << "if nothing is said";
+  EXPECT_EQ(update->view->mode, ViewOptions::Mode::kFit) << "if it is not set";
   request.mutable_view()->set_mode(static_cast<v1::View::Mode>(9));
   EXPECT_THAT(std::string(FromWire(request).status().message()),
               HasSubstr("view.mode has the unknown value 9"));

@@ -165,7 +165,7 @@ TEST(Grids, TransferFunctionsAreTables) {
   };
   EXPECT_EQ(look(8), look(100)) << "as the last";
   EXPECT_EQ(look(8), 0x808000u | gpu::SampleHead::kDrawn);
-  EXPECT_EQ(look(0), 0u) << "as the first, which is nothing";
+  EXPECT_EQ(look(0), 0u) << "as the first, which is transparent";
   EXPECT_EQ(look(-100), 0u);
   EXPECT_EQ(look(4) >> 24, 1u);
   EXPECT_NEAR(look(4) >> 16 & 255, 255, 3);

@@ -131,7 +131,7 @@ TEST(Kept, AnEntityLivesAsLongAsItHasLeft) {
   EXPECT_EQ(lifetime(1001), 1);
   EXPECT_EQ(lifetime(1000), -1) << "it is over";
   EXPECT_EQ(lifetime(1), -1);
-  EXPECT_EQ(lifetime(std::numeric_limits<int64_t>::min()), -1) << "from a file that is damaged";
+  EXPECT_EQ(lifetime(std::numeric_limits<int64_t>::min()), -1) << "from a damaged file";
   row.set_expires_unix_ns(0);
   row.mutable_entity()->mutable_primitive()->mutable_sphere()->set_radius(0);
   const absl::Status wrong =
@@ -155,7 +155,7 @@ TEST(Kept, ALifetimeOfCenturiesIsNotOverAfterwards) {
   entity.expires_ns = kLast - 1;
   const absl::StatusOr<std::string> kept = EncodeKept(entity, now);
   ASSERT_TRUE(kept.ok()) << kept.status();
-  EXPECT_EQ(decoded(*kept).lifetime_ns, kLast - now.unix_ns) << "until the last time that there is";
+  EXPECT_EQ(decoded(*kept).lifetime_ns, kLast - now.unix_ns) << "until the greatest possible time";
 }
 
 }  // namespace kept_test

@@ -329,7 +329,7 @@ TEST(NamedRanges, OneRequestReadsAtMostWhatMayBeUncommitted) {
   const Decoded decoded = DecodeWith(request, &memory, {.max_uncommitted_bytes = 36 * 7 + 35});
   EXPECT_THAT(decoded.operations, SizeIs(7));
   EXPECT_EQ(decoded.named_bytes, 36u * 7);
-  EXPECT_EQ(memory.asked, 7) << "beyond, nothing is even looked for";
+  EXPECT_EQ(memory.asked, 7) << "if out of range, it is not even requested";
   EXPECT_EQ(decoded.refused.issues.size(), 993u);
   EXPECT_EQ(decoded.refused.issues[0].reason, Reason::kQuotaExceeded);
   EXPECT_EQ(decoded.refused.issues[0].field,
@@ -406,7 +406,7 @@ TEST(NamedRanges, StandForSamplesHeightsAndColoursToo) {
   ASSERT_THAT(got_volume.refused.issues, IsEmpty());
   ExpectSame(got_heights, wanted_heights);
   EXPECT_EQ(Kept(got_volume).SerializeAsString(), Kept(wanted_volume).SerializeAsString())
-      << "what is kept has the bytes, and no names of assets that may go";
+      << "the stored form has the bytes, not names of assets that may be removed";
   EXPECT_EQ(Kept(got_heights).SerializeAsString(), Kept(wanted_heights).SerializeAsString());
   EXPECT_EQ(got_volume.named_bytes, 16u);
 }

@@ -85,7 +85,7 @@ TEST_F(DisplayTest, ACancelledCaptureGoesAndOthersStay) {
   display_.CancelCapture(7);
   ASSERT_TRUE(gone.has_value());
   EXPECT_TRUE(absl::IsCancelled(gone->status()));
-  EXPECT_EQ(display_.Tick(), clock_.Now() + kSecond) << "nothing but the driver's own";
+  EXPECT_EQ(display_.Tick(), clock_.Now() + kSecond) << "only the driver's own time";
   Capture(stays);
   display_.Done();
   EXPECT_TRUE(display_.tapped());
@@ -173,7 +173,7 @@ TEST_F(DisplayTest, AWatchBeginsWholeAndGoesOnWithWhatChanges) {
   EXPECT_EQ(display_.sent.back(), (ScriptedDisplay::Sent{4, false}));
   display_.Done();
   EXPECT_EQ(seen.back(), 3u);
-  EXPECT_EQ(log_.outcomes.size(), 4u) << "of each volume one, and none of what was sent again";
+  EXPECT_EQ(log_.outcomes.size(), 4u) << "one for each volume, and none for what was sent again";
 }
 
 }  // namespace

@@ -59,7 +59,7 @@ TEST(Assembler, BeginsWithWhatFits) {
     ASSERT_EQ(assembler.Begin(Header(1), whole, nullptr), ErrorCode::kNone);
     EXPECT_TRUE(assembler.filling());
     EXPECT_EQ(assembler.Begin(header, payload, std::move(base)), code);
-    EXPECT_FALSE(assembler.filling()) << "what was being filled is gone";
+    EXPECT_FALSE(assembler.filling()) << "the volume being filled is dropped";
   };
   refused(ErrorCode::kBadLength, Header(1), Bytes(whole.begin(), whole.end() - 1), nullptr);
   refused(ErrorCode::kBadBegin, Header(0), whole, nullptr);
@@ -79,14 +79,14 @@ TEST(Assembler, BeginsWithWhatFits) {
 TEST(Assembler, TellsWhatIsMissingInRuns) {
   VolumeAssembler assembler(kSixPictures);
   EXPECT_EQ(Missing(assembler), Runs{});
-  EXPECT_EQ(assembler.Finish(), nullptr) << "of nothing";
+  EXPECT_EQ(assembler.Finish(), nullptr) << "nothing is being filled";
   ASSERT_EQ(assembler.Begin(Header(7), BeginOf(0, 6), nullptr), ErrorCode::kNone);
   EXPECT_EQ(Missing(assembler), (Runs{{0, 6}}));
   const Bytes all(24), half(12);
   EXPECT_EQ(assembler.Slice(Header(7, 1, 0), all), ErrorCode::kNone);
   EXPECT_EQ(Missing(assembler), (Runs{{0, 2}, {3, 3}}));
   EXPECT_EQ(assembler.Slice(Header(7, 2, 1), half), ErrorCode::kNone);
-  EXPECT_EQ(Missing(assembler), (Runs{{0, 2}, {3, 3}})) << "half of one is none";
+  EXPECT_EQ(Missing(assembler), (Runs{{0, 2}, {3, 3}})) << "half of one does not count";
   EXPECT_EQ(assembler.Slice(Header(7, 2, 1, 12), half), ErrorCode::kNone);
   EXPECT_EQ(Missing(assembler), (Runs{{0, 2}, {3, 2}}));
   EXPECT_EQ(assembler.Finish(), nullptr);

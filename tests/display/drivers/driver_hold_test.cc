@@ -79,7 +79,7 @@ TEST_F(Driver, HoldsVolumesUntilTheyAreOrderedShown) {
   EXPECT_EQ(Newest().kind, Kind::kPresented);
   EXPECT_NEAR(static_cast<double>(Newest().time_ns), static_cast<double>(coming[4]), 1000);
   EXPECT_TRUE(SeesFrame());
-  EXPECT_EQ(rig_->display().stats().volumes_late, 0u) << "it was not late but held";
+  EXPECT_EQ(rig_->display().stats().volumes_late, 0u) << "it was held, not late";
 }
 
 TEST_F(Driver, WhatIsHeldOrOnItsWayCanBeDropped) {
@@ -123,7 +123,7 @@ TEST_F(Driver, WhatIsHeldOrOnItsWayCanBeDropped) {
   ASSERT_TRUE(rig_->display().SetBlank(false).ok());
   rig_->RunFor(2 * kSecond);
   EXPECT_EQ(rig_->display().state(), DisplayState::kShowing);
-  EXPECT_FALSE(rig_->device().Seen().has_value()) << "its old volume comes to light";
+  EXPECT_FALSE(rig_->device().Seen().has_value()) << "its old volume is lit";
   show();
 }
 

@@ -65,7 +65,7 @@ class Torture : public testing::TestWithParam<Case> {
       last_shown_ = shown;
       const DecodedVolume light{.layout = rig.display().info().layout, .pictures = shown->pictures};
       const auto it = by_light_.find(Key(light.Rgb()));
-      ASSERT_NE(it, by_light_.end()) << "the device shows what nobody submitted";
+      ASSERT_NE(it, by_light_.end()) << "the device shows what was not submitted";
       seen_volume_ = it->second;
       seen_.insert(it->second);
     }

@@ -228,7 +228,7 @@ TEST_F(Device, AnOrderAheadIsTakenInTimeOnly) {
   bench_.SendWhole(1, 7, false);
   PassAlive(250 * kMillisecond);  // sweep 2 has begun
   EXPECT_FALSE(order(3, 2));
-  EXPECT_FALSE(order(2, 0) && order(1, 0)) << "past ones, whatever they ask for";
+  EXPECT_FALSE(order(2, 0) && order(1, 0)) << "past ones, whatever they request";
   PassAlive(100 * kMillisecond);
   EXPECT_EQ(bench_.Seen(0), 7) << "0 ahead: the sweep that runs is not past";
 }
@@ -245,7 +245,7 @@ TEST_F(Device, ALaterOrderTakesTheFirstOnesPlaceInTime) {
   PassAlive(250 * kMillisecond);  // sweep 2 has begun
   EXPECT_TRUE(order(5));
   PassAlive(200 * kMillisecond);  // sweep 4
-  EXPECT_FALSE(order(5)) << "too late, and nothing changes by it";
+  EXPECT_FALSE(order(5)) << "too late, and it has no effect";
   EXPECT_EQ(bench_.Seen(0), -1);
   PassAlive(100 * kMillisecond);
   EXPECT_EQ(bench_.Seen(0), 7);

@@ -95,7 +95,7 @@ TEST(SweepClock, SilenceIsALossOnce) {
   EXPECT_EQ(clock.lock().state, State::kLocked);
   clock.Restart();
   EXPECT_EQ(clock.lock().state, State::kUnknown);
-  EXPECT_EQ(clock.lock().losses, 1u) << "a session's end is none";
+  EXPECT_EQ(clock.lock().losses, 1u) << "the end of a session is not a loss";
 }
 
 TEST(SweepClock, NonsenseIsPassedOver) {

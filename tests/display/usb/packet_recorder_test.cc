@@ -221,7 +221,7 @@ TEST_F(RecordingFile, ThatCannotBeMadeIsNamed) {
 }
 
 TEST_F(RecordingFile, OnAFullDeviceFailsOnceAndStaysFailed) {
-  ASSERT_EQ(::access("/dev/full", W_OK), 0) << "Linux has it";
+  ASSERT_EQ(::access("/dev/full", W_OK), 0) << "Linux provides it";
   auto sink = OpenFileSink("/dev/full");
   ASSERT_TRUE(sink.ok()) << sink.status();
   PacketRecorder recorder(*std::move(sink), {});

@@ -58,7 +58,7 @@ class Hostile : public ::testing::Test {
   v1::ConnectionStats Await(const std::function<bool(const v1::ConnectionStats&)>& right) {
     const auto stats =
         AwaitStats(*local_, [&](const v1::Stats& stats) { return right(stats.connections()); });
-    EXPECT_TRUE(stats.has_value()) << "the figures never came to be right";
+    EXPECT_TRUE(stats.has_value()) << "the statistics never became right";
     return stats.has_value() ? stats->connections() : v1::ConnectionStats();
   }
   v1::ConnectionStats Now() {
@@ -221,7 +221,7 @@ TEST(Promises, AreJudgedByWhatWasMeasured) {
   EXPECT_THAT(broken(false, worse),
               ElementsAre("cut", "bytes", "seconds", "growth_kib_a_peer", "others_p99_ms"));
   EXPECT_THAT(broken(true, worse), ElementsAre("cut"));
-  EXPECT_THAT(broken(false, AttackFigures()), ElementsAre("cut")) << "nobody was";
+  EXPECT_THAT(broken(false, AttackFigures()), ElementsAre("cut")) << "no connection was";
 }
 
 v1::StreamRequest Large(int number) {
@@ -389,7 +389,7 @@ TEST(Limits, TooManyConnectionsFromOneAddressMakeRoomOldestFirst) {
       limited.stub(), [](const v1::Stats& stats) { return stats.uptime_ns() > 500'000'000; });
   ASSERT_TRUE(stats.has_value());
   EXPECT_EQ(stats->connections().probe_failures(), 0u);
-  EXPECT_EQ(stats->connections().accepted(), 4u) << "three over TCP, and the figures' own";
+  EXPECT_EQ(stats->connections().accepted(), 4u) << "three over TCP, and that of the statistics";
   for (const int descriptor : held) close(descriptor);
   ExpectServes(limited.daemon().unix_target());
 }

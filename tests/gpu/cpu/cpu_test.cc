@@ -88,7 +88,7 @@ TEST(Executor, WhatABodyThrowsComesOutOnceNoneRuns) {
                                      --running;
                                    }),
                      std::bad_alloc);
-        EXPECT_EQ(running, 0) << "it came out while others ran";
+        EXPECT_EQ(running, 0) << "it returned while others ran";
       }
       ExpectEachIndexOnce(*executor);
     }

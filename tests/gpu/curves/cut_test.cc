@@ -117,7 +117,7 @@ TEST(CutCurves, SegmentsStayWithinTheStatedErrorAndMeet) {
     }
   }
   EXPECT_LE(worst, kCurveError + kSnapped);
-  EXPECT_GT(worst, kCurveError / 4) << "finer than anyone needs";
+  EXPECT_GT(worst, kCurveError / 4) << "finer than necessary";
 }
 
 TEST(CutCurves, ErrorIsOfVoxelsWhateverTheTransform) {
@@ -242,7 +242,7 @@ TEST(CutPatches, TrianglesStayWithinTheStatedErrorAndNeighboursMeet) {
     }
   }
   EXPECT_LE(worst, kPatchError + kSnapped);
-  EXPECT_GT(worst, kPatchError / 20) << "finer than anyone needs";
+  EXPECT_GT(worst, kPatchError / 20) << "finer than necessary";
 }
 
 // Returns any rotation, stretch and shear that keeps places within 1 of the origin in the volume.
@@ -276,7 +276,7 @@ TEST(CutNeeds, HoldWhatCuttingTakesUnderAnyMap) {
     all_said += said;
     all_made += made;
   }
-  EXPECT_LT(all_said, 3 * all_made) << "much more than it takes";
+  EXPECT_LT(all_said, 3 * all_made) << "far more than necessary";
 }
 
 TEST(CutNeeds, AreNotMetWhereCuttingComesToAnEnd) {

@@ -98,7 +98,7 @@ TEST(Spans, SplinesPassWhereTheySayAndAreSmooth) {
         EXPECT_LT(implicit::Length((p[3] - p[2]) - (next[1] - next[0])), 1e-12) << "without a kink";
         if (form == SplineForm::kBSpline) {
           const Vector bend = p[3] - 2 * p[2] + p[1], after = next[2] - 2 * next[1] + next[0];
-          EXPECT_LT(implicit::Length(bend - after), 1e-12) << "nor a change in how it bends";
+          EXPECT_LT(implicit::Length(bend - after), 1e-12) << "nor a change in curvature";
         }
       }
       if (!closed) {

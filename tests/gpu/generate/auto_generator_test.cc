@@ -67,7 +67,7 @@ TEST_F(AutoGeneratorTest, FewVoxelsAreMadeNearManyFarAndWhereTheyCrossItChanges)
       << "a third of the bytes";
   EXPECT_EQ(generator_->Choose(4 * crossing, 1, {Sampling::kThin, Output::kPacked}), 1u);
   EXPECT_EQ(generator_->Choose(1000, 1, {Sampling::kCover, Output::kI32x3}), 1u)
-      << "which costs otherwise";
+      << "whose cost differs";
   EXPECT_EQ(generator_->Choose(2000, 100'000), 1u) << "many segments count too";
 }
 

@@ -228,7 +228,7 @@ TEST(FormulaText, GivesWhatRunningTheProgramGives) {
     EXPECT_EQ(differing, 0u) << "program " << i << ":\n" << FormulaText(programs[i]);
     if (differing != 0) return;
   }
-  EXPECT_GT(numbers, kPrograms * 50 * kLanes / 2) << "most are to be numbers";
+  EXPECT_GT(numbers, kPrograms * 50 * kLanes / 2) << "most should be numbers";
 }
 
 std::vector<uint32_t> WaveOf(double wave, double shift, bool add) {

@@ -276,7 +276,7 @@ TEST_F(CudaRanks, AKilledOneHoldsNobodyUp) {
     const absl::Status status = answer.get_future().get();
     EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss) << status;
     EXPECT_EQ(ranks.Frame().status().code(), absl::StatusCode::kDataLoss);
-    EXPECT_LT(clock.Now() - start, kDeadline / 3) << "somebody waited for the deadline";
+    EXPECT_LT(clock.Now() - start, kDeadline / 3) << "a rank waited for the deadline";
   }
 }
 

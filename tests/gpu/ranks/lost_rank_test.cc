@@ -83,7 +83,7 @@ TEST_F(LostRank, TakesTheOthersAlongAndIsToldOnce) {
         EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss);
         EXPECT_THAT(std::string(status.message()), StartsWith("GPU "));
         EXPECT_FALSE(IsLate(status));
-        EXPECT_FALSE(std::filesystem::exists(file_)) << "nobody failed";
+        EXPECT_FALSE(std::filesystem::exists(file_)) << "no rank failed";
         const absl::Status again = engine.Frame().status();
         EXPECT_EQ(again.code(), absl::StatusCode::kDataLoss);
         EXPECT_EQ(engine.SetTarget(target_).code(), absl::StatusCode::kDataLoss);

@@ -119,7 +119,7 @@ TEST(RankedEngine, IsNotToBeHadIfOneRankIsNot) {
   unsetenv("VOXELD_FAULT_LINK");
   EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(status.message(), HasSubstr("GPU 1: it does not come"));
-  EXPECT_FALSE(told) << "what never was is not lost";
+  EXPECT_FALSE(told) << "an engine that never existed is not lost";
   options = RankOptions(2);
   options.worker = "/nowhere/engine";
   EXPECT_THAT(CreateEngine(options).status().message(),

@@ -146,7 +146,7 @@ TEST(SimtGrid, LaunchesAreLimitedAsADevicesAre) {
   uint32_t next = 0;
   Launch(NoteOrder, 0, 64)(&next, out.data());
   EXPECT_EQ(cudaGetLastError(), cudaErrorInvalidConfiguration);
-  EXPECT_EQ(cudaGetLastError(), cudaSuccess) << "told once";
+  EXPECT_EQ(cudaGetLastError(), cudaSuccess) << "reported once";
   Launch(NoteOrder, 1, 1025)(&next, out.data());
   EXPECT_EQ(cudaGetLastError(), cudaErrorInvalidConfiguration);
   Launch(NoteOrder, 1, 64, 100'000)(&next, out.data());

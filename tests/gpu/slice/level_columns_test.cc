@@ -201,7 +201,7 @@ void ExpectPictures(const Case& c, const Scene& scene, const display::FootprintT
       }
     }
   }
-  EXPECT_GT(lit, 0u) << "something was to be seen";
+  EXPECT_GT(lit, 0u) << "something was visible";
 }
 
 TEST(LevelColumns, DrawWhatTheFootprintsSay) {
@@ -269,7 +269,8 @@ TEST(LevelColumns, AreForSharedListsOfOneRowAVoxelInRgb332Alone) {
   }
   lights.cell_mm = {0.1, 0.1, 0.1};
   const Case lattice = {"", {lights, {4, 4, 4, {1, 1, 1}, {0, 0, 0}}}};
-  EXPECT_FALSE(create(lattice, PixelFormat::kRgb332, Sampling::kMax)) << "no rows to go along";
+  EXPECT_FALSE(create(lattice, PixelFormat::kRgb332, Sampling::kMax))
+      << "there are no rows to follow";
   Case fine = rotor;
   fine.geometry.grid.nz *= 2;
   fine.geometry.grid.pitch_mm.z = 0.5;
@@ -359,7 +360,7 @@ TEST(LevelColumns, AWholeEngineShowsThemAndTellsWhatChanged) {
       display::BuildFootprints(target.geometry, display::Sampling::kMax);
   ASSERT_TRUE(LevelColumns::Create(table, TileGrid::Of(22, 22, 24, Sampler::FastestAxis(table)),
                                    target.layout, target.tone, 0, target.layout.slices))
-      << "else it is not these that are looked at";
+      << "otherwise these are not used";
   RotorEngine engine(target);
   engine.ExpectFrame();  // nothing is drawn
   const auto put = [&](uint64_t geometry, uint64_t drawable, int lines) {

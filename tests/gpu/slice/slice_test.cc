@@ -259,7 +259,7 @@ std::vector<uint32_t> Sampled(const TileStore& tiles, display::Sampling sampling
   std::vector<uint32_t> colors(static_cast<size_t>(table.width * table.height));
   for (const auto& [rgb, u, v] : pixels.lit) {
     uint32_t& color = colors[v * static_cast<uint32_t>(table.width) + u];
-    EXPECT_EQ(color, 0u) << "told twice";
+    EXPECT_EQ(color, 0u) << "reported twice";
     EXPECT_NE(rgb, 0u);
     color = rgb;
   }
@@ -340,7 +340,7 @@ TEST(Sampler, RowsOfLightsTakeTheirOwnVoxels) {
     std::vector<uint32_t> got(40), want(40);
     for (const auto& [color, u, v] : pixels.lit) {
       EXPECT_EQ(v, 0u);
-      EXPECT_EQ(std::exchange(got[u], color), 0u) << "told twice";
+      EXPECT_EQ(std::exchange(got[u], color), 0u) << "reported twice";
     }
     for (int32_t u = 0; u < table.width; ++u) {
       if (const auto v = voxel(slice, u))

@@ -130,7 +130,7 @@ TEST_F(CallChannelTest, ADescriptorThatComesWithAnAnswerIsClosed) {
   close(pipe[1]);
   EXPECT_TRUE(told.get().ok());
   char byte = 0;
-  EXPECT_EQ(read(pipe[0], &byte, 1), 0) << "nobody has its other end open";
+  EXPECT_EQ(read(pipe[0], &byte, 1), 0) << "the other end is not open anywhere";
   close(pipe[0]);
 }
 
@@ -146,7 +146,7 @@ TEST_F(CallChannelTest, AfterItsEndCallsAndWorkAreAnsweredAtOnceAndNothingIsSaid
   EXPECT_TRUE(worked);
   const auto segment = *Segment::Create(4096);
   channel_->Tell(Ask(2), segment);
-  EXPECT_EQ(segment.use_count(), 1) << "what would go with it is not kept";
+  EXPECT_EQ(segment.use_count(), 1) << "the accompanying segment is not kept";
 }
 
 TEST_F(CallChannelTest, ClosingAnswersWhatIsOwedCancelledAndIsNoLoss) {

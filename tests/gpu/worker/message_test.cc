@@ -121,7 +121,7 @@ TEST_F(MessageTest, ADescriptorMayHaveAnyNumber) {
   close(STDIN_FILENO);
   SendBytes("no message", {ends_[0]});
   EXPECT_FALSE(ReceiveMessage(ends_[1]).ok());
-  EXPECT_EQ(fcntl(STDIN_FILENO, F_GETFD), -1) << "closed, as it came with what is no message";
+  EXPECT_EQ(fcntl(STDIN_FILENO, F_GETFD), -1) << "closed, since it came with an invalid message";
   ASSERT_EQ(dup2(standard_input, STDIN_FILENO), STDIN_FILENO);
   close(standard_input);
 }
@@ -172,11 +172,11 @@ TEST_F(MessageTest, OtherThingsToldBesideAreNoDescriptor) {
 }
 
 TEST_F(MessageTest, TheEndIsToldAtBothEnds) {
-  EXPECT_TRUE(absl::IsUnavailable(ReceiveMessage(ends_[1]).status())) << "nothing has come";
+  EXPECT_TRUE(absl::IsUnavailable(ReceiveMessage(ends_[1]).status())) << "nothing has arrived";
   const Message message = MakeDone(1, absl::OkStatus());
   absl::Status sent;
   for (int i = 0; i < 1'000'000 && sent.ok(); ++i) sent = SendMessage(ends_[0], message);
-  EXPECT_TRUE(absl::IsResourceExhausted(sent)) << "nobody reads: " << sent;
+  EXPECT_TRUE(absl::IsResourceExhausted(sent)) << "the peer does not read: " << sent;
   close(ends_[1]);
   ends_[1] = -1;
   sent = SendMessage(ends_[0], message);

@@ -195,7 +195,7 @@ TEST_F(WorkerAnswers, OfDataLossAreTheEndAndOthersAreNot) {
   engine_->ReadVoxels({0, 0, 0, 4, 4, 4}, voxels, second.done());
   worker_.SayDone(worker_.Hear(), absl::DataLossError("the GPU has a fault"));
   EXPECT_EQ(second.get(), absl::DataLossError("the GPU has a fault"));
-  EXPECT_THAT(voxels, Each(7u)) << "nothing is taken of an answer that is an error";
+  EXPECT_THAT(voxels, Each(7u)) << "nothing of an error answer is used";
   ExpectGone("the GPU has a fault");
 }
 
@@ -287,7 +287,7 @@ TEST_F(WorkerAnswers, ASegmentHoldsAFrameForTheNextUntilThereIsAnotherTarget) {
   worker_.SayDone(target);
   ASSERT_TRUE(set.get().ok());
   Submit(4, after);
-  EXPECT_EQ(Draw(std::byte{4}).holds, 0u) << "what it holds is another target's";
+  EXPECT_EQ(Draw(std::byte{4}).holds, 0u) << "it holds pictures of another target";
   ASSERT_TRUE(after.get().ok());
 }
 
@@ -309,7 +309,7 @@ TEST_F(WorkerAnswers, ABufferThatIsGreaterHasASegmentOfItsSize) {
   ToldFrame next;
   Submit(3, next);
   Draw(std::byte{3});
-  EXPECT_TRUE(next.get().ok()) << "the engine is as it was";
+  EXPECT_TRUE(next.get().ok()) << "the engine is unchanged";
 }
 
 TEST_F(WorkerAnswers, AFrameForABufferOfTheWrongSizeIsNotBelieved) {
@@ -462,7 +462,7 @@ TEST_F(WorkerAnswers, WhatTheWorkerCouldNotReadIsNotSent) {
   block = *engine_->AcquireStaging(sizeof(delta));
   std::memcpy(block.bytes().data(), &delta, sizeof(delta));
   engine_->Apply(std::move(block), sizeof(delta), alone.done());
-  EXPECT_EQ(alone.get().code(), absl::StatusCode::kInvalidArgument) << "its block did not come";
+  EXPECT_EQ(alone.get().code(), absl::StatusCode::kInvalidArgument) << "its block was not sent";
   engine_->Apply(*engine_->AcquireStaging(64), 0, next.done());
   const Message asked = worker_.Hear();
   EXPECT_EQ(asked.type, MessageType::kApply);

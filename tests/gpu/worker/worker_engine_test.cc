@@ -84,7 +84,7 @@ TEST_F(FaultyWorker, ThatLiesIsNotBelieved) {
   }
   conformance::EngineDriver honest = MakeWith({.lie = "not at all"});
   ASSERT_TRUE(honest.SetTarget(target_).ok());
-  EXPECT_TRUE(honest.Frame().ok()) << "whoever stands between passes on what is true";
+  EXPECT_TRUE(honest.Frame().ok()) << "the liar passes on true answers";
 }
 
 TEST_F(FaultyWorker, ThatHangsIsGivenUp) {
@@ -224,7 +224,7 @@ TEST(DefaultWorkerProgram, IsTheNearestThatExistsAndWithCudaIfBothDo) {
       fs::path(::testing::TempDir()) / ("voxeld_worker_program_" + std::to_string(getpid()));
   const fs::path running = root / "usr/bin/voxeld";
   const fs::path installed = root / "usr/libexec/voxeld/voxeld-engine";
-  EXPECT_EQ(DefaultWorkerProgram(running), installed) << "what a message names if none is there";
+  EXPECT_EQ(DefaultWorkerProgram(running), installed) << "the name for messages if none exists";
   for (const fs::path& nearer :
        {installed, root / "usr/libexec/voxeld/voxeld-engine-cuda", root / "usr/voxeld-engine",
         root / "usr/voxeld-engine-cuda", root / "usr/bin/voxeld-engine",

@@ -262,7 +262,7 @@ TEST(FrameBench, RowsHaveTheirFields) {
     EXPECT_EQ(row["gpus"], 0);
     EXPECT_EQ(row["rounds"], 3);
     EXPECT_EQ(row["voxels_are"], "drawn");
-    EXPECT_EQ(row["lit_voxels"], row["voxels"]) << "one line, in whichever place";
+    EXPECT_EQ(row["lit_voxels"], row["voxels"]) << "one line, in either place";
     EXPECT_GE(row["voxels"], 30);
     for (const char* times : {"device_ms", "host_ms", "apply_ms"}) {
       EXPECT_GT(double(row[times]["least"]), 0) << times;
@@ -296,10 +296,10 @@ TEST(FrameBench, EveryVoxelInReachOfTheRotorIsLitInEveryFrame) {
   for (const int rounds : {1, 2}) {
     const auto report = Measured({.scene = "rotor", .threads = 2, .rounds = rounds});
     ASSERT_TRUE(report.ok()) << report.status();
-    ASSERT_THAT((*report)["rows"], SizeIs(1)) << "as many threads as were asked for";
+    ASSERT_THAT((*report)["rows"], SizeIs(1)) << "as many threads as requested";
     const nlohmann::json& row = (*report)["rows"][0];
     EXPECT_EQ(row["lit_voxels"], 128 * 128 * 64 - 4 * 16 * 16 * 64)
-        << "but the tiles in the corners, which no pixel reaches";
+        << "except the tiles in the corners, which no pixel reaches";
     EXPECT_TRUE(row["slicing_only"]);
     EXPECT_THAT(std::string(row["ceiling"]["name"]), HasSubstr("memcpy of 5046272 bytes"))
         << "half of what is read and written";

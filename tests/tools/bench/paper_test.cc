@@ -117,7 +117,7 @@ TEST(PaperFigures, HaveThePapersMachinesAndOurs) {
   EXPECT_EQ(figures[0].first, "paper-figure-5.svg");
   EXPECT_THAT(figures[0].second, HasSubstr("Core 2 Quad Q9550 (2008)"));
   EXPECT_THAT(figures[0].second, HasSubstr("ours, CUDA with the copy"));
-  EXPECT_THAT(figures[1].second, Not(HasSubstr("Core 2 Quad"))) << "GPUs alone";
+  EXPECT_THAT(figures[1].second, Not(HasSubstr("Core 2 Quad"))) << "GPUs only";
   EXPECT_EQ(figures[4].first, "paper-figure-9.svg");
   EXPECT_THAT(figures[4].second, HasSubstr("4587"));
 }

@@ -194,7 +194,7 @@ TEST_F(Clouds, PcdPackedColoursWhateverTheirTypeSays) {
   EXPECT_THAT(colors("U", "4294901760", "4278223103"), two);
   EXPECT_THAT(colors("U", "16711680", "33023"), two);
   EXPECT_THAT(colors("F", "nan", "2.3418052e-38"), ElementsAre(Rgb{255, 255, 255}, Rgb{255, 0, 0}))
-      << "\"nan\" does not say which";
+      << "\"nan\" does not identify the element";
 }
 
 TEST_F(Clouds, PcdColoursByTheirGreatestValue) {
@@ -345,7 +345,8 @@ TEST_F(Clouds, PropertiesOfPlyAreAttributes) {
   ASSERT_THAT(cloud, IsOk());
   ASSERT_EQ(cloud->parts[0].attributes.size(), 2u);
   EXPECT_EQ(cloud->parts[0].attributes[0], (Attribute{"quality", {1, 2, 4}}));
-  EXPECT_EQ(cloud->parts[0].attributes[1], (Attribute{"red", {1, 2, 4}})) << "there is no green";
+  EXPECT_EQ(cloud->parts[0].attributes[1], (Attribute{"red", {1, 2, 4}}))
+      << "the file has no green";
   EXPECT_EQ(cloud->left_out, (std::vector<LeftOut>{{"points that are not a number", 1},
                                                    {"other properties of vertices", 1}}));
   // Two vertices at one place have different values.
@@ -471,7 +472,7 @@ TEST_F(Clouds, LasColoursHaveTheBitsOfTheBrightest) {
               ElementsAre(Rgb{255, 0, 0}, Rgb{1, 1, 0}));
   EXPECT_THAT(colors({{0, 0, 0, 1, 0, {255, 200, 0}}, {1, 0, 0, 1, 0, {0, 256, 0}}}),
               ElementsAre(Rgb{1, 1, 0}, Rgb{0, 1, 0}))
-      << "one beyond 8 bits is enough, wherever it is";
+      << "one above 8 bits is enough, anywhere";
   EXPECT_THAT(colors({{0, 0, 0, 1, 0, {255, 200, 0}}, {1, 0, 0, 1, 0, {0, 64, 1}}}),
               ElementsAre(Rgb{255, 200, 0}, Rgb{0, 64, 1}));
 }

@@ -291,7 +291,7 @@ class Damage : public testing::Test {
       EXPECT_TRUE(absl::StartsWith(message, folder_.Path(name)) ||
                   (!beside.empty() && absl::StartsWith(message, folder_.Path(beside))))
           << model.status();
-      EXPECT_LT(message.size(), 1000u) << "is it for people?";
+      EXPECT_LT(message.size(), 1000u) << "is it readable?";
     }
     return model;
   }

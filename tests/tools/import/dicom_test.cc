@@ -413,7 +413,7 @@ TEST_F(Volumes, AFolderOfSlicesInTheirOrder) {
   ASSERT_THAT(model, IsOk());
   const SampledVolume& volume = model->volumes.at(0);
   EXPECT_THAT(volume.size, ElementsAre(3, 2, 2));
-  EXPECT_EQ(volume.samples.front(), 0) << "500 times 2 less 1000";
+  EXPECT_EQ(volume.samples.front(), 0) << "500 times 2, minus 1000";
   EXPECT_EQ(volume.samples[6], 200);
   EXPECT_EQ(volume.corners[0], (Point3{0.875, 1.75, 0}));
   EXPECT_EQ(volume.corners[7], (Point3{1.625, 2.75, 12}));
@@ -436,7 +436,7 @@ TEST_F(Volumes, OfSeveralTimesTheFirstIsShown) {
   const auto model = ReadHere(folder_.Path(""), {});
   ASSERT_THAT(model, IsOk());
   EXPECT_THAT(model->volumes.at(0).size, ElementsAre(3, 2, 2));
-  EXPECT_EQ(model->volumes[0].samples[0], 0) << "500 times 2 less 1000";
+  EXPECT_EQ(model->volumes[0].samples[0], 0) << "500 times 2, minus 1000";
   EXPECT_EQ(model->volumes[0].samples[6], 200);
   EXPECT_THAT(model->left_out, ElementsAre(LeftOut{"further times", 2}));
   EXPECT_EQ(model->note, "");

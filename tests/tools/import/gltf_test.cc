@@ -147,7 +147,7 @@ TEST_F(GltfFiles, EveryModeOfPrimitives) {
   };
   const Part points = read(0);
   EXPECT_EQ(points.kind, Kind::kPoints);
-  EXPECT_EQ(points.positions.size(), 4u) << "what no index refers to is not drawn";
+  EXPECT_EQ(points.positions.size(), 4u) << "vertices without an index are not drawn";
   EXPECT_THAT(read(1).indices, ElementsAre(0, 1, 2, 3));
   EXPECT_THAT(read(2).indices, ElementsAre(0, 1, 1, 2, 2, 3, 3, 0));
   EXPECT_THAT(read(3).indices, ElementsAre(0, 1, 1, 2, 2, 3));
@@ -446,7 +446,7 @@ TEST_F(GltfFiles, InstancesAndHiddenNodes) {
   ASSERT_EQ(model.parts.size(), 1u);
   EXPECT_THAT(model.parts[0].positions, ElementsAre(IsAt(0, 0, 0), IsAt(4, 0, 0), IsAt(0, 1, 0),
                                                     IsAt(10, 0, 0), IsAt(2, 0, 0), IsAt(10, 2, 0)));
-  EXPECT_THAT(model.parts[0].normals[5], IsAt(0, 0, 1)) << "not turned round by a mirror";
+  EXPECT_THAT(model.parts[0].normals[5], IsAt(0, 0, 1)) << "not reversed by a mirror";
   EXPECT_THAT(model.left_out, ElementsAre(LeftOut{"hidden nodes", 1}));
 }
 

@@ -176,7 +176,7 @@ TEST_F(ObjFiles, ColoursOfVerticesAreFactorsOfTheMaterial) {
   const auto plain = [&](const std::string& rest) {
     return Good(absl::StrCat(kQuad, "mtllib m.mtl\n", rest)).parts[0].colors;
   };
-  EXPECT_EQ(plain("usemtl one\nf 1 2 3 4")[0], (Rgb{128, 128, 128})) << "one number is for all";
+  EXPECT_EQ(plain("usemtl one\nf 1 2 3 4")[0], (Rgb{128, 128, 128})) << "one number applies to all";
   EXPECT_THAT(plain("usemtl plain\nf 1 2 3 4"), IsEmpty()) << "the file gives no colour";
   EXPECT_THAT(plain("f 1 2 3 4"), IsEmpty());
   // Up to 255; with an opacity.

@@ -113,7 +113,7 @@ TEST_F(OtherFilesTest, ABufferOfGltfIsReadWithinTheFolder) {
     ASSERT_FALSE(model.ok()) << name;
     EXPECT_EQ(absl::StrReplaceAll(std::string(model.status().message()), {{name + ".bin", "NAME"}}),
               missing)
-        << "one message for what is missing and what is forbidden";
+        << "one message for missing and for forbidden files";
   }
 }
 

@@ -50,7 +50,7 @@ TEST(PackedVolumes, AreReducedToWhatTheServerTakes) {
   EXPECT_LE(packed->samples, 4096u);
   EXPECT_EQ(uint64_t{grid.size_a} * grid.size_b * grid.size_c, packed->samples);
   EXPECT_EQ(grid.size_a * 2u, 34u);
-  EXPECT_EQ(grid.edge_a.x, 34) << "a cell that is cut by the end keeps its length";
+  EXPECT_EQ(grid.edge_a.x, 34) << "a cell that the end divides keeps its length";
   EXPECT_THAT(packed->note, HasSubstr("33 by 16 by 16 samples are more than the server takes"));
 }
 

@@ -635,7 +635,7 @@ TEST_F(Drawings, CompressedOnesAreRead) {
     ASSERT_THAT(model, IsOk()) << name;
     EXPECT_EQ(At(*model, 0.5, 0.5), kRed);
   }
-  EXPECT_THAT(ReadHere(folder_.Write("b.svgz", text)), IsOk()) << "that is none";
+  EXPECT_THAT(ReadHere(folder_.Write("b.svgz", text)), IsOk()) << "which it is not";
   EXPECT_THAT(Error(gzip(text).substr(0, 40)), HasSubstr("a.svg: "));
   EXPECT_THAT(Error(gzip(std::string(70'000'000, ' '))),
               HasSubstr("has more than 67108864 bytes of text"));

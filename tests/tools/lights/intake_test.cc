@@ -236,7 +236,7 @@ TEST(Intake, AWordToShowIsOfItsSynchronisationAlone) {
   ASSERT_TRUE(intake.AddDatagram(sender.Sync(), 0).ok());
   EXPECT_TRUE(intake.Take().has_value());
   ASSERT_TRUE(intake.AddDatagram(sender.Sync(), 0).ok());
-  EXPECT_FALSE(intake.waiting()) << "nothing has come since";
+  EXPECT_FALSE(intake.waiting()) << "nothing has arrived since";
   EXPECT_EQ(intake.tally().shows, 2u);
   ExpectSound(intake.tally(), intake);
 }

@@ -214,7 +214,7 @@ TEST_F(McapTest, WhatIsNoneSaysSo) {
   EXPECT_THAT(std::string(McapReader::Open(path_).status().message()),
               HasSubstr("is no MCAP file"));
   EXPECT_TRUE(absl::IsAlreadyExists(McapWriter::Create(path_, "").status()))
-      << "nothing is written over";
+      << "nothing is overwritten";
 }
 
 TEST_F(McapTest, RandomBytesHurtNobody) {

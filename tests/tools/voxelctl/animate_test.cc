@@ -130,7 +130,7 @@ Shown ReadGif(const std::string& path) {
   int error = 0;
   GifFileType* gif = DGifOpenFileName(path.c_str(), &error);
   if (gif == nullptr || DGifSlurp(gif) != GIF_OK) {
-    ADD_FAILURE() << path << " is no GIF: " << error;
+    ADD_FAILURE() << path << " is not a GIF: " << error;
     return shown;
   }
   Image canvas{gif->SWidth, gif->SHeight, {}};

@@ -204,7 +204,7 @@ TEST_F(CommandsTest, PlayEndsATestPatternThatIsUp) {
   EXPECT_FALSE(server_.log().updates[1].has_brightness());
 
   EXPECT_THAT(RunTool({"play", DataFile("points.ply")}).err, Not(HasSubstr("pattern")));
-  EXPECT_EQ(server_.log().updates.size(), 2u) << "none was up";
+  EXPECT_EQ(server_.log().updates.size(), 2u) << "none was present";
 }
 
 TEST_F(CommandsTest, ARefusedSceneLeavesTheTestPatternUp) {
@@ -232,7 +232,7 @@ TEST_F(CommandsTest, LargeCloudsGoInManyMessages) {
   const FakeServer::Log log = server_.log();
   EXPECT_LE(log.largest_message, 256u << 10);
   EXPECT_GE(log.objects.size(), 7u);
-  EXPECT_GE(log.commits, 3u) << "no more than max_uncommitted_bytes at a time";
+  EXPECT_GE(log.commits, 3u) << "at most max_uncommitted_bytes at a time";
 }
 
 TEST_F(CommandsTest, SpinningSendsTransformsOnly) {
@@ -419,7 +419,8 @@ TEST_F(CommandsTest, ASnapshotIsOfAllThatIsUp) {
   const std::string path = folder_.Path("a.png");
   EXPECT_EQ(RunJson({"snapshot", path})["up_to_date"], true);
   ASSERT_EQ(server_.log().captures.size(), 1u);
-  EXPECT_EQ(server_.log().captures[0].at_least_snapshot(), 4u) << "what the scene's watch says";
+  EXPECT_EQ(server_.log().captures[0].at_least_snapshot(), 4u)
+      << "the number that the scene's watch reports";
 
   server_.Set({.behind = true});
   EXPECT_EQ(RunJson({"snapshot", path})["up_to_date"], false);
@@ -451,7 +452,8 @@ TEST_F(CommandsTest, ClearAndPatternAskForWhatTheySay) {
   EXPECT_EQ(log.updates[0].test_pattern(), v1::TEST_PATTERN_WHITE);
   EXPECT_EQ(log.updates[1].test_pattern(), v1::TEST_PATTERN_NONE);
   EXPECT_EQ(log.clears.back().layer(), "voxelctl");
-  EXPECT_EQ(log.clears.back().owner(), 7u) << "layer by layer, so that one's own goes in any case";
+  EXPECT_EQ(log.clears.back().owner(), 7u)
+      << "layer by layer, so that one's own is removed in any case";
   EXPECT_EQ(RunTool({"clear", "--all"}).code, 0);
   log = server_.log();
   ASSERT_EQ(log.clears.size(), 3u);

@@ -338,7 +338,7 @@ TEST(Contained, EndsWithWhoAsked) {
   ASSERT_EQ(::kill(asks, SIGKILL), 0);
   ASSERT_EQ(::waitpid(asks, nullptr, 0), asks);
   pollfd ended = {.fd = reader, .events = POLLIN, .revents = 0};
-  EXPECT_EQ(::poll(&ended, 1, 30'000), 1) << "it runs on";
+  EXPECT_EQ(::poll(&ended, 1, 30'000), 1) << "it still runs";
   ::close(reader);
 }
 
@@ -451,7 +451,7 @@ TEST(ContainedFrames, HalfAnAnswerKeepsTheParentWaitingNoLongerThanItsLimits) {
     EXPECT_THAT((*frames)->Read(0), IsOk());
     const absl::Status late = (*frames)->Read(1).status();
     EXPECT_THAT(std::string(late.message()), HasSubstr("timed out after 0.5 s"));
-    EXPECT_EQ((*frames)->Read(0).status(), late) << "it is not asked again";
+    EXPECT_EQ((*frames)->Read(0).status(), late) << "it is not called again";
   }
 }
 

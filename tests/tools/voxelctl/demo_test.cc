@@ -299,7 +299,7 @@ TEST(Volumes, AreCroppedToWhatIsSeenOfThem) {
   EXPECT_THAT(cropped.samples, ElementsAre(5, 0, 0, 7));
   EXPECT_EQ(cropped.corners[0], (Point3{1, 11, 0}));
   EXPECT_EQ(cropped.corners[7], (Point3{3, 13, 1}));
-  EXPECT_EQ(Cropped(volume, 100).samples.size(), 24u) << "nothing is seen: all of it stays";
+  EXPECT_EQ(Cropped(volume, 100).samples.size(), 24u) << "nothing is visible: all of it stays";
 }
 
 TEST(Data, IsLookedForWhereItMayBe) {
@@ -334,7 +334,7 @@ TEST(Data, TheFirstThatIsThereIsTaken) {
   const std::string fine = make(first / "fine.json");
   EXPECT_EQ(*FindSceneFile(file, roots), fine);
   std::filesystem::create_directories(first / "atlas/fine.json");
-  EXPECT_EQ(*FindSceneFile(file, roots), fine) << "a folder is no file";
+  EXPECT_EQ(*FindSceneFile(file, roots), fine) << "a folder is not a file";
 }
 
 TEST(Scenes, AreTheOnesThatAreNamed) {
@@ -349,7 +349,7 @@ TEST(Scenes, AreTheOnesThatAreNamed) {
     EXPECT_STRNE(scene.source, "");
     by_code += scene.needs.empty() ? 1 : 0;
   }
-  EXPECT_GE(by_code, 4u) << "that play wherever voxelctl is";
+  EXPECT_GE(by_code, 4u) << "they play wherever voxelctl is";
 }
 
 TEST(Scenes, OfCodeAreMadeForAnyRoom) {

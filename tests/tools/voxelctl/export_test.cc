@@ -114,7 +114,7 @@ TEST(WriteVox, IsSplitWhereAModelWouldBeTooLarge) {
     SetPixel(&volume, z, x, y, {static_cast<uint8_t>(1 + x % 255), 2, 3});
   ExportSummary summary;
   ASSERT_THAT(WriteVox(folder.Path("a.vox"), volume, &summary), IsOk());
-  EXPECT_EQ(summary.models, 4u) << "blocks without light are none";
+  EXPECT_EQ(summary.models, 4u) << "dark blocks are left out";
   const auto file = ReadSourceFile(folder.Path("a.vox"));
   ASSERT_THAT(file, IsOk());
   const auto scene = ReadVoxChunks(*file);

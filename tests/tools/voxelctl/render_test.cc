@@ -401,7 +401,8 @@ TEST(Palette, KeepsAFewColoursAndMeansOfMany) {
     // Four colours for each of the two rows of 128 levels: 64 levels for a colour, whose mean is in
     // their middle.
     EXPECT_NEAR(color[0], image.rgb[i * 3], 32) << i;
-    EXPECT_EQ(color[1], image.rgb[i * 3 + 1]) << i << ": what differs most is told apart first";
+    EXPECT_EQ(color[1], image.rgb[i * 3 + 1])
+        << i << ": the colours that differ most are distinguished first";
     EXPECT_EQ(color[2], 7);
   }
   EXPECT_EQ(ReduceColors({2, 1, {1, 2, 3, 1, 2, 3}}, 1).indices, (std::vector<uint8_t>{0, 0}));

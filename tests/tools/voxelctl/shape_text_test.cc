@@ -205,7 +205,7 @@ TEST(ShapeText, ClipsAreNoShapes) {
             "clip_plane has no q; known are a, b, c, d");
   EXPECT_EQ(ParseClipText("clip_plane a", &clip).status().message(),
             "after clip_plane is \"a\"; NAME=VALUE would be right");
-  EXPECT_FALSE(ParseClipText("clip_cylinder at=1", &clip).ok()) << "its ends say where it is";
+  EXPECT_FALSE(ParseClipText("clip_cylinder at=1", &clip).ok()) << "its ends determine its place";
   EXPECT_EQ(ParseClipText("clip_plane a=1 a=2", &clip).status().message(),
             "clip_plane has a twice, \"1\" and \"2\"; one of them would be right");
 }
@@ -268,7 +268,7 @@ TEST(Drawings, ObjectsMasksAndClipsComeWithTheShapes) {
   ASSERT_EQ(request->operations_size(), 6);
   const v1::DefineObject& object = request->operations(0).define_object();
   EXPECT_EQ(object.object(), "o");
-  ASSERT_EQ(object.definition().parts_size(), 2) << "which instances find";
+  ASSERT_EQ(object.definition().parts_size(), 2) << "which instances can find";
   EXPECT_EQ(object.definition().parts(0).transform().m(7), 2);
   EXPECT_EQ(request->operations(1).upsert().layer(), kMaskLayer);
   EXPECT_EQ(request->operations(2).upsert().entity().primitive().instance().object(), "o");

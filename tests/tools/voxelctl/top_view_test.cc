@@ -72,7 +72,7 @@ TEST(TopView, RatesAreOfWhatCameSinceTheLast) {
   view.Take(StatsAt(12), Owners(1), "");
   EXPECT_THAT(Text(view), HasSubstr("commits 100.0/s of 1,200 accepted, 0 refused; 5.00 kB/s in"));
   view.Take(StatsAt(11), Owners(1), "");
-  EXPECT_THAT(Text(view), HasSubstr("commits 0.0/s")) << "a server that began anew";
+  EXPECT_THAT(Text(view), HasSubstr("commits 0.0/s")) << "a server that was restarted";
 }
 
 TEST(TopView, WhatTheServerSaysIsMadeFitForATerminal) {
@@ -112,7 +112,7 @@ TEST(TopView, DisplaysAreChosenRoundAndRound) {
   v1::Stats fewer = StatsAt(2);
   fewer.mutable_displays()->DeleteSubrange(1, 1);
   view.Take(fewer, Owners(1), "");
-  EXPECT_THAT(Text(view), HasSubstr("LATENCY of one")) << "the one that was chosen is gone";
+  EXPECT_THAT(Text(view), HasSubstr("LATENCY of one")) << "the selected one is removed";
   view.Take(StatsAt(3), Owners(1), "");
   EXPECT_THAT(Text(view), HasSubstr("LATENCY of two")) << "and is back";
   view.Take(v1::Stats(), Owners(0), "");

@@ -104,7 +104,7 @@ TEST(FadecandyTorture, NothingTornNothingStaleNothingForgotten) {
           ++captured;
         });
       }
-      ASSERT_FALSE(strange) << "a board lights what nobody submitted";
+      ASSERT_FALSE(strange) << "a board lights what was not submitted";
     }
     EXPECT_TRUE(rig.RunUntil(
         [&] { return rig.Sees(*newest) && rig.recorder().Of(newest->volume) != nullptr; },

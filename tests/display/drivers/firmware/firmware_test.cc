@@ -446,7 +446,7 @@ TEST_F(FirmwareRig, OverABadCableIsNeverHalfSeenAndComesRight) {
     ASSERT_TRUE(RunUntil([&] {
       if (!device_->Light().empty()) {
         const bool whole = std::ranges::any_of(all, [&](const auto& f) { return Shows(*f); });
-        EXPECT_TRUE(whole) << "what is lit is none of the " << all.size() << " volumes";
+        EXPECT_TRUE(whole) << "the lit picture is none of the " << all.size() << " volumes";
         if (!whole) return true;
       }
       return recorder_.Of(all.back()->volume) != nullptr;

@@ -40,9 +40,9 @@ TEST_P(Decoders, GiveBackWhatWasSentInTheLightsOrder) {
   const StreamOptions stream = StreamOf(GetParam(), GetParam() == Protocol::kE131 ? 7 : 0);
   PacketWriter writer(stream, 2);
   NetworkDecoder decoder(kLayout, stream, {2, 0, 1});  // sent as B, R, G
-  EXPECT_FALSE(decoder.TakeVolume().has_value()) << "nothing has come";
+  EXPECT_FALSE(decoder.TakeVolume().has_value()) << "nothing has arrived";
   ASSERT_TRUE(decoder.OnBytes(0, writer.Pixels(0, Light(10), false), 0).ok());
-  EXPECT_FALSE(decoder.TakeVolume().has_value()) << "half of it has come";
+  EXPECT_FALSE(decoder.TakeVolume().has_value()) << "half of it has arrived";
   ASSERT_TRUE(decoder.OnBytes(0, writer.Pixels(1, Light(20), true), 0).ok());
   const auto volume = decoder.TakeVolume();
   ASSERT_TRUE(volume.has_value());
@@ -159,7 +159,7 @@ TEST(Packets, OfOpcEachFieldCounts) {
   Bytes before = good;
   before[0] = std::byte{4};
   EXPECT_FALSE(Read(stream, 2, 2, before).has_value()) << "of the channel before the first";
-  EXPECT_TRUE(writer.Sync().empty()) << "there is no such packet";
+  EXPECT_TRUE(writer.Sync().empty()) << "the protocol has no such packet";
   EXPECT_TRUE(PacketWriter(StreamOf(Protocol::kDdp, 1), 2).Sync().empty());
 }
 
