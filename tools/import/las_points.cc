@@ -1,7 +1,6 @@
 #include "tools/import/clouds.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -273,13 +272,14 @@ absl::StatusOr<Model> ReadLasPoints(const SourceFile& file, bool attributes) {
       brightest = std::max(brightest, Take<uint16_t>(points, i * header->record + color + 2 * c));
     }
   }
-  std::array<bool, kPointColumns> has = {true, true, true};
-  const bool colored = brightest > 0;  // some have space for colours but none in it
-  for (const PointColumn c : {PointColumn::kRed, PointColumn::kGreen, PointColumn::kBlue}) {
-    has[static_cast<size_t>(c)] = colored;
+  PointColumns columns = {PointColumn::kX, PointColumn::kY, PointColumn::kZ,
+                          PointColumn::kIntensity};
+  const bool colored = brightest > 0;  // some have the room for colours and none in it
+  if (colored) {
+    columns.insert(columns.end(), {PointColumn::kRed, PointColumn::kGreen, PointColumn::kBlue});
   }
-  has[static_cast<size_t>(PointColumn::kIntensity)] = !colored;
-  absl::StatusOr<PointTable> table = PointTable::Make(file, has, brightest > 255 ? 65535 : 255);
+  const PointLayout layout = PointLayout::Of(std::move(columns));
+  absl::StatusOr<PointTable> table = PointTable::Make(file, layout, brightest > 255 ? 65535 : 255);
   if (!table.ok()) return table.status();
   table->Reserve(header->count);
   std::vector<double> values;
@@ -325,7 +325,8 @@ absl::StatusOr<Model> ReadLasPoints(const SourceFile& file, bool attributes) {
   if (!attributes) {
     const auto others = std::count_if(
         header->dimensions.begin(), header->dimensions.end(), [&](const Dimension& one) {
-          return one.IsUsed(any) && (colored || one.name != "intensity");
+          const bool is_shown = one.at == kIntensity && layout.Has(PointColumn::kIntensity);
+          return one.IsUsed(any) && !is_shown;
         });
     AddLeftOut("other dimensions", static_cast<uint64_t>(others), &model);
   }

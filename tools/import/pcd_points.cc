@@ -2,9 +2,9 @@
 
 #include <liblzf/lzf.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <optional>
@@ -27,10 +27,12 @@ static_assert(std::endian::native == std::endian::little, "values are read in pl
 
 struct Field {
   std::string name;
-  uint32_t size = 0;                // of one value, in bytes
-  char type = 'F';                  // I, U, F
-  uint32_t count = 1;               // values per point
-  std::optional<size_t> attribute;  // index of the point attribute that its first value sets
+  uint32_t size = 0;   // of one value
+  char type = 'F';     // I, U, F
+  uint32_t count = 1;  // values of each point
+  // What its first value is, and which of a point's attributes.
+  std::optional<PointColumn> shown;
+  std::optional<size_t> attribute;
 };
 
 // The values of a point.
@@ -38,6 +40,9 @@ struct PcdPoint {
   PointRow row = {};
   std::vector<double> attributes;
 };
+
+// PCL fills the gaps of a record with fields of this name.
+bool IsPadding(const Field& field) { return field.name == "_"; }
 
 enum class Data : uint8_t { kAscii, kBinary, kCompressed };
 
@@ -59,9 +64,9 @@ absl::Status Wrong(const SourceFile& file, size_t line, absl::string_view found,
   return FileError(file, absl::StrCat("line ", line, " ", found), expected);
 }
 
-// Reads one line of the header. Sets `done` if it is the last.
-absl::Status TakeLine(const SourceFile& file, size_t line, const Words& words, PcdHeader* out,
-                      uint64_t* width, uint64_t* height, bool* done) {
+// One line of the header. `done`: it was the last.
+absl::Status TakeHeaderLine(const SourceFile& file, size_t line, const Words& words, PcdHeader* out,
+                            uint64_t* width, uint64_t* height, bool* done) {
   const absl::string_view key = words[0];
   const auto each = [&](auto&& take) -> absl::Status {
     if (words.size() != out->fields.size() + 1) {
@@ -132,7 +137,7 @@ absl::StatusOr<PcdHeader> ReadPcdHeader(const SourceFile& file) {
     out.body = end + 1;
     if (text.empty() || text.front() == '#') continue;
     const Words words = absl::StrSplit(text, absl::ByAnyChar(" \t"), absl::SkipEmpty());
-    if (absl::Status status = TakeLine(file, line, words, &out, &width, &height, &done);
+    if (absl::Status status = TakeHeaderLine(file, line, words, &out, &width, &height, &done);
         !status.ok()) {
       return status;
     }
@@ -180,21 +185,22 @@ bool IsPacked(const Field& field) {
   return (field.name == "rgb" || field.name == "rgba") && field.size == 4;
 }
 
-void SetPacked(uint32_t word, PointRow* row) {
-  (*row)[static_cast<size_t>(PointColumn::kRed)] = word >> 16 & 0xFF;
-  (*row)[static_cast<size_t>(PointColumn::kGreen)] = word >> 8 & 0xFF;
-  (*row)[static_cast<size_t>(PointColumn::kBlue)] = word & 0xFF;
+// `word`: nothing if the colour is not known.
+void SetPacked(std::optional<uint32_t> word, PointRow* row) {
+  for (const auto& [column, shift] :
+       {std::pair(PointColumn::kRed, 16), {PointColumn::kGreen, 8}, {PointColumn::kBlue, 0}}) {
+    (*row)[static_cast<size_t>(column)] = word ? *word >> shift & 0xFF : std::nan("");
+  }
 }
 
 void SetNumber(const Field& field, double value, PcdPoint* point) {
   if (field.attribute) point->attributes[*field.attribute] = value;
-  if (const auto column = PointColumnOf(field.name))
-    point->row[static_cast<size_t>(*column)] = value;
+  if (field.shown) point->row[static_cast<size_t>(*field.shown)] = value;
 }
 
 // Stores a field's first value in the point.
 void Take(const Field& field, const char* at, PcdPoint* point) {
-  if (IsPacked(field)) {
+  if (field.shown == PointColumn::kPackedColor) {
     uint32_t word;
     std::memcpy(&word, at, sizeof(word));
     SetPacked(word, &point->row);
@@ -206,22 +212,19 @@ void Take(const Field& field, const char* at, PcdPoint* point) {
 // Stores a word of ascii data. A packed colour may be written as the float with the same bits, or
 // as an integer.
 bool TakeWord(const Field& field, absl::string_view word, PcdPoint* point) {
-  double value = 0;
-  if (word == "nan" || word == "NaN" || word == "-nan") {
-    value = std::nan("");
-  } else {
-    const auto read = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (read.ec != std::errc() || read.ptr != word.data() + word.size()) return false;
-  }
-  if (IsPacked(field)) {
-    // With its alpha, the word of most colours is negative as a signed integer and not a number as
-    // a float: then the text does not determine the colour.
-    const bool unknown = std::isnan(value) || value < INT32_MIN || value > UINT32_MAX;
-    SetPacked(field.type == 'F' && !std::isnan(value)
-                  ? std::bit_cast<uint32_t>(static_cast<float>(value))
-              : unknown ? 0xFFFFFF
-                        : static_cast<uint32_t>(static_cast<int64_t>(value)),
-              &point->row);
+  const std::optional<double> number = NumberOfWord(word);
+  if (!number) return false;
+  const double value = *number;
+  if (field.shown == PointColumn::kPackedColor) {
+    // With its alpha the word of most colours is negative as a signed number, and not a number as a float: then the text does not
+    // say which colour it is.
+    std::optional<uint32_t> bits;
+    if (field.type == 'F' && !std::isnan(value)) {
+      bits = std::bit_cast<uint32_t>(static_cast<float>(value));
+    } else if (value >= INT32_MIN && value <= UINT32_MAX) {
+      bits = static_cast<uint32_t>(static_cast<int64_t>(value));
+    }
+    SetPacked(bits, &point->row);
   } else {
     SetNumber(field, value, point);
   }
@@ -320,28 +323,32 @@ absl::StatusOr<std::string> Decompress(const SourceFile& file, const PcdHeader& 
 absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file, bool attributes) {
   absl::StatusOr<PcdHeader> header = ReadPcdHeader(file);
   if (!header.ok()) return header.status();
-  std::array<bool, kPointColumns> has = {};
-  bool floats = false, wide = false;  // colours whose scale depends on their maximum
+  std::vector<std::string> field_names;
+  for (const Field& field : header->fields) field_names.push_back(field.name);
+  PointColumns columns = PointColumnsByName(field_names);
+  if (const auto packed =
+          std::ranges::find_if(header->fields, [](const Field& field) { return IsPacked(field); });
+      packed != header->fields.end()) {
+    columns[static_cast<size_t>(packed - header->fields.begin())] = PointColumn::kPackedColor;
+  }
+  const PointLayout layout = PointLayout::Of(std::move(columns));
+  bool floats = false, wide = false;  // colours whose scale depends on their greatest value
   std::vector<std::string> names;
+  for (size_t f = 0; attributes && f < layout.attributes.size(); ++f) {
+    Field& field = header->fields[layout.attributes[f]];
+    if (IsPadding(field)) continue;
+    field.attribute = names.size();
+    names.push_back(field.name);
+  }
   uint64_t others = 0;
-  for (Field& field : header->fields) {
-    const std::optional<PointColumn> known =
-        IsPacked(field) ? PointColumn::kRed : PointColumnOf(field.name);
-    if (!known && field.name != "_") ++others;
-    if (attributes && field.name != "_" && (!known || *known == PointColumn::kIntensity)) {
-      field.attribute = names.size();
-      names.push_back(field.name);
-    }
-    if (IsPacked(field)) {
-      for (const PointColumn c : {PointColumn::kRed, PointColumn::kGreen, PointColumn::kBlue}) {
-        has[static_cast<size_t>(c)] = true;
-      }
-    } else if (const auto column = PointColumnOf(field.name)) {
-      has[static_cast<size_t>(*column)] = true;
-      if (IsColor(*column)) {
-        floats |= field.type == 'F';
-        wide |= field.type != 'F' && field.size > 1;
-      }
+  for (size_t f = 0; f < header->fields.size(); ++f) {
+    Field& field = header->fields[f];
+    field.shown = layout.shown[f];
+    if (IsPadding(field)) continue;
+    if (!field.shown && !field.attribute) ++others;
+    if (field.shown && IsColor(*field.shown)) {
+      floats |= field.type == 'F';
+      wide |= field.type != 'F' && field.size > 1;
     }
   }
   std::string decompressed;
@@ -357,17 +364,17 @@ absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file, bool attributes) {
                       by_field ? decompressed : absl::string_view(file.bytes).substr(header->body),
                       by_field, take);
   };
-  double greatest = floats ? 0 : 255;
+  ChannelRange range;
+  if (!floats) range.Add(255);
   if (floats || wide) {
     const absl::Status looked = read([&](const PcdPoint& point, uint64_t) {
-      for (const PointColumn c : {PointColumn::kRed, PointColumn::kGreen, PointColumn::kBlue}) {
-        greatest = std::max(greatest, point.row[static_cast<size_t>(c)]);
-      }
+      for (const PointColumn c : {PointColumn::kRed, PointColumn::kGreen, PointColumn::kBlue})
+        range.Add(point.row[static_cast<size_t>(c)]);
       return absl::OkStatus();
     });
     if (!looked.ok()) return looked;
   }
-  absl::StatusOr<PointTable> table = PointTable::Make(file, has, FullScaleOf(greatest));
+  absl::StatusOr<PointTable> table = PointTable::Make(file, layout, range.FullScale());
   if (!table.ok()) return table.status();
   table->SetAttributes(std::move(names));
   uint64_t nowhere = 0;
@@ -383,7 +390,7 @@ absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file, bool attributes) {
   }
   Model model = std::move(*table).Finish(file, "PCD points");
   AddLeftOut("points that are not finite", nowhere, &model);
-  if (!attributes) AddLeftOut("other fields", others, &model);
+  AddLeftOut("other fields", others, &model);
   return model;
 }
 

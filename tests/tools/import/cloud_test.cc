@@ -287,7 +287,8 @@ TEST_F(Clouds, PcdPointsThatAreNowhereAreLeftOut) {
       Import("a.pcd", PcdHeader("2", "binary") + PcdPoint(nan, 0, 0, 0) + PcdPoint(1, 1, 1, 0));
   ASSERT_THAT(model, IsOk());
   EXPECT_THAT(model->parts[0].positions, ElementsAre(Point3{1, 1, 1}));
-  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"points that are not finite", 1}}));
+  EXPECT_EQ(model->left_out,
+            (std::vector<LeftOut>{{"points that are not finite", 1}, {"other fields", 1}}));
 }
 
 // Returns the attributes with which a file is read, as "NAME: NUMBERS" each.
@@ -371,7 +372,8 @@ TEST_F(Clouds, FieldsOfPcdAreAttributes) {
       folder_.Write("a.pcd", AsciiPcd("x y z label intensity rgb", "F F F U F U",
                                       "0 0 0 3 0.5 16711680\n1 0 0 4 nan 255\n"));
   EXPECT_THAT(AttributesOf(path), ElementsAre("label: 3 4", "intensity: 0.5 nan"));
-  EXPECT_EQ(ReadHere(path)->left_out, (std::vector<LeftOut>{{"other fields", 1}}));
+  EXPECT_EQ(ReadHere(path)->left_out, (std::vector<LeftOut>{{"other fields", 2}}))
+      << "the intensity is not shown beside a colour";
 }
 
 TEST_F(Clouds, PcdThatIsWrong) {
@@ -706,6 +708,145 @@ TEST_F(Clouds, PointsWhoseNumbersAreMissing) {
   EXPECT_THAT(Points("a.xyz", "nan nan nan\n1 2 3\n").positions, ElementsAre(Point3{1, 2, 3}));
   EXPECT_THAT(Error("a.csv", "x,y,z\nNA,NA,NA\n"),
               HasSubstr("no point whose x, y and z are numbers"));
+}
+
+// A cloud of two points in each format that has names for its numbers.
+struct NamedCloud {
+  const char* file;
+  const char* others;  // what numbers that are not shown are counted as
+  std::string (*bytes)(const std::vector<std::string>& names, const std::vector<std::string>& first,
+                       const std::vector<std::string>& second);
+};
+const NamedCloud kNamedClouds[] = {
+    {"a.csv", "other columns",
+     [](const auto& names, const auto& first, const auto& second) {
+       return absl::StrCat(absl::StrJoin(names, ","), "\n", absl::StrJoin(first, ","), "\n",
+                           absl::StrJoin(second, ","), "\n");
+     }},
+    {"a.pcd", "other fields",
+     [](const auto& names, const auto& first, const auto& second) {
+       std::string types = "F";
+       for (size_t i = 1; i < names.size(); ++i) types += " F";
+       return AsciiPcd(absl::StrJoin(names, " "), types,
+                       absl::StrCat(absl::StrJoin(first, " "), "\n", absl::StrJoin(second, " ")));
+     }},
+    {"a.ply", "other properties of vertices",
+     [](const auto& names, const auto& first, const auto& second) {
+       return absl::StrCat("ply\nformat ascii 1.0\nelement vertex 2\nproperty float ",
+                           absl::StrJoin(names, "\nproperty float "), "\nend_header\n",
+                           absl::StrJoin(first, " "), "\n", absl::StrJoin(second, " "), "\n");
+     }},
+};
+
+// Text, PCD and PLY decide alike what is shown and what is a number for --color-by.
+TEST_F(Clouds, NumbersThatAreNotShownAreAttributesInEveryFormat) {
+  const struct {
+    std::vector<std::string> names, first, second;
+    std::vector<std::string> attributes;
+    uint64_t others;
+  } cases[] = {
+      {{"x", "y", "z", "r"}, {"0", "0", "0", "7"}, {"1", "0", "0", "9"}, {"r: 7 9"}, 1},
+      {{"x", "y", "z", "red", "blue"},
+       {"0", "0", "0", "7", "8"},
+       {"1", "0", "0", "9", "6"},
+       {"red: 7 9", "blue: 8 6"},
+       2},
+      {{"x", "y", "z", "ny", "nz"},
+       {"0", "0", "0", "1", "0"},
+       {"1", "0", "0", "0", "1"},
+       {"ny: 1 0", "nz: 0 1"},
+       2},
+      {{"x", "y", "z", "intensity", "r", "g", "b"},
+       {"0", "0", "0", "5", "1", "1", "0"},
+       {"1", "0", "0", "6", "0", "1", "1"},
+       {"intensity: 5 6"},
+       1},
+      {{"x", "y", "z", "intensity"},
+       {"0", "0", "0", "5"},
+       {"1", "0", "0", "6"},
+       {"intensity: 5 6"},
+       0},
+      // A radius beside a colour that is complete without it.
+      {{"r", "x", "y", "z", "red", "green", "blue"},
+       {"3", "0", "0", "0", "1", "1", "0"},
+       {"4", "1", "0", "0", "0", "1", "1"},
+       {"r: 3 4"},
+       1},
+      {{"height", "x", "y", "z"}, {"5", "0", "0", "0"}, {"6", "1", "0", "0"}, {"height: 5 6"}, 1},
+      {{"lat", "z", "elevation", "x", "y"},
+       {"50", "0", "7", "0", "0"},
+       {"51", "0", "8", "1", "0"},
+       {"lat: 50 51", "elevation: 7 8"},
+       2},
+  };
+  for (const NamedCloud& cloud : kNamedClouds) {
+    for (const auto& one : cases) {
+      const std::string path =
+          folder_.Write(cloud.file, cloud.bytes(one.names, one.first, one.second));
+      EXPECT_EQ(AttributesOf(path), one.attributes) << cloud.file;
+      const auto plain = ReadHere(path);
+      ASSERT_THAT(plain, IsOk());
+      EXPECT_THAT(plain->parts.at(0).positions, ElementsAre(Point3{0, 0, 0}, Point3{1, 0, 0}));
+      const std::vector<LeftOut> others = {{cloud.others, one.others}};
+      EXPECT_EQ(plain->left_out, one.others > 0 ? others : std::vector<LeftOut>()) << cloud.file;
+      if (one.names.size() == 7) {
+        EXPECT_THAT(plain->parts[0].colors, ElementsAre(Rgb{255, 255, 0}, Rgb{0, 255, 255}));
+      } else if (one.others == 0) {
+        EXPECT_THAT(plain->parts[0].colors, ElementsAre(Rgb{0, 0, 0}, Rgb{255, 255, 255}));
+      } else {
+        EXPECT_THAT(plain->parts[0].colors, IsEmpty()) << cloud.file;
+      }
+      EXPECT_THAT(plain->parts[0].normals, IsEmpty());
+    }
+  }
+}
+
+TEST_F(Clouds, ColoursThatAreNotFiniteAreWhiteInEveryFormat) {
+  for (const NamedCloud& cloud : kNamedClouds) {
+    for (const char* bad : {"nan", "inf", "-inf"}) {
+      const auto model = Import(cloud.file, cloud.bytes({"x", "y", "z", "red", "green", "blue"},
+                                                        {"0", "0", "0", "1", bad, "0"},
+                                                        {"1", "0", "0", "0", "0.5", "1"}));
+      ASSERT_THAT(model, IsOk()) << cloud.file << " " << bad;
+      EXPECT_THAT(model->parts[0].colors, ElementsAre(Rgb{255, 255, 255}, Rgb{0, 128, 255}))
+          << cloud.file << " " << bad;
+      EXPECT_EQ(model->left_out,
+                (std::vector<LeftOut>{
+                    {"colours and intensities that are not a number (shown white)", 1}}));
+      const auto grey = Import(cloud.file, cloud.bytes({"x", "y", "z", "intensity"},
+                                                       {"0", "0", "0", bad}, {"1", "0", "0", "3"}));
+      ASSERT_THAT(grey, IsOk());
+      EXPECT_EQ(grey->left_out, model->left_out);
+    }
+    // A point that is nowhere has no colour to count.
+    const auto nowhere = Import(cloud.file, cloud.bytes({"x", "y", "z", "red", "green", "blue"},
+                                                        {"nan", "0", "0", "nan", "0", "0"},
+                                                        {"1", "0", "0", "1", "0", "0"}));
+    ASSERT_THAT(nowhere, IsOk());
+    EXPECT_THAT(nowhere->parts[0].colors, ElementsAre(Rgb{255, 0, 0}));
+    EXPECT_EQ(nowhere->left_out.size(), 1u);
+  }
+}
+
+TEST_F(Clouds, NumbersMayHaveAPlusInEveryFormat) {
+  for (const NamedCloud& cloud : kNamedClouds) {
+    EXPECT_THAT(
+        Points(cloud.file, cloud.bytes({"x", "y", "z"}, {"+1", "-2", "+3e+1"}, {"+.5", "0", "+0"}))
+            .positions,
+        ElementsAre(Point3{1, -2, 30}, Point3{0.5, 0, 0}));
+    EXPECT_THAT(
+        Import(cloud.file, cloud.bytes({"x", "y", "z"}, {"+-1", "0", "0"}, {"1", "0", "0"})),
+        testing::Not(IsOk()));
+  }
+}
+
+TEST_F(Clouds, PcdColoursThatAreNotKnownAreCounted) {
+  const auto model = Import("a.pcd", AsciiPcd("x y z rgb", "F F F F", "0 0 0 nan\n1 0 0 0\n"));
+  ASSERT_THAT(model, IsOk());
+  EXPECT_THAT(model->parts[0].colors, ElementsAre(Rgb{255, 255, 255}, Rgb{0, 0, 0}));
+  EXPECT_EQ(
+      model->left_out,
+      (std::vector<LeftOut>{{"colours and intensities that are not a number (shown white)", 1}}));
 }
 
 }  // namespace cloud_test

@@ -224,6 +224,15 @@ TEST(PlyMesh, AFacesColorGoesBeforeItsVertices) {
     EXPECT_EQ(part.colors[part.indices[i]], i < 3 ? (Rgb{255, 0, 0}) : (Rgb{0, 0, 255}));
 }
 
+TEST(PlyMesh, IntensitiesOfVerticesAreOtherProperties) {
+  const absl::StatusOr<Model> model =
+      Ply(AsciiPly(VertexElement(4) + "property float intensity\n" + kFace,
+                   "0 0 0 1\n4 0 0 2\n4 0 1 3\n0 0 1 4\n4 0 1 2 3\n"));
+  ExpectSquare(model);
+  EXPECT_TRUE(model->parts.at(0).colors.empty());
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"other properties of vertices", 1}}));
+}
+
 TEST(PlyMesh, FloatColorsOfFacesGoTo1OrTo255) {
   const auto color = [](const std::string& numbers) -> absl::StatusOr<Rgb> {
     absl::StatusOr<Model> model =

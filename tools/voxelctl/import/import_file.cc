@@ -171,7 +171,7 @@ const std::vector<Format>& OwnFormats() {
        "–", "assimp-testmodels: 8"},
       {"meshes, points", "PLY", ".ply", "",
        "ASCII and binary of either byte order, faces and strips, colours of vertices and faces, "
-       "normals; other properties by --color-by",
+       "normals, intensities of points; other properties by --color-by",
        "pictures, other elements (edges, materials)", "assimp-testmodels: 7 of 8 (one is damaged)"},
       {"voxels", "MagicaVoxel", ".vox", "", "models where the scene's nodes put them, the palette",
        "key frames after the first, hidden nodes and layers, materials", "–"},

@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "common/text/printable.h"
 #include "tools/voxelctl/import/ply_values.h"
+#include "tools/voxelctl/import/point_table.h"
 #include "tools/voxelctl/import/surface_builder.h"
 #include "tools/voxelctl/import/triangulate.h"
 
@@ -29,8 +30,9 @@ struct PlyTriangles {
 // The lists of vertices of an element, one per entry, with colors.
 struct PlyFaces {
   std::vector<uint32_t> vertices;  // of all faces
-  std::vector<uint32_t> sizes;     // per face
-  std::vector<Rgb> colors;         // may be empty
+  std::vector<uint32_t> sizes;     // of each
+  std::vector<Rgb> colors;         // or none
+  std::vector<uint32_t> unknown;   // which colors are not finite in the file
   uint64_t others = 0;             // properties that are neither indices nor colours
 };
 
@@ -74,24 +76,25 @@ absl::StatusOr<PlyFaces> ReadFaces(const SourceFile& file, const PlyElement& ele
                      "\"property list uchar int vertex_indices\" is expected");
   }
   if (element.count > kMaxModelIndices) return TooManyIndices(file);
-  PlyColors colors(element);
+  const PointLayout layout = PointLayout::Of(PlyColumns(element));
+  PlyColors colors(element, layout.shown);
   PlyFaces faces;
   for (size_t p = 0; p < element.properties.size(); ++p) {
-    if (p != *list && colors.ChannelOf(p) < 0) ++faces.others;
+    if (p != *list && !(layout.shown[p] && IsColor(*layout.shown[p]))) ++faces.others;
   }
+  PointRow row = {};
   const auto cut = [&](uint64_t number) {
     return FaceError(file, element, number, "is cut off or no number",
                      "the file is truncated or damaged");
   };
   for (uint64_t i = 0; i < element.count; ++i) {
-    double color[3] = {};
     for (size_t p = 0; p < element.properties.size(); ++p) {
       const PlyProperty& property = element.properties[p];
       double value = 0;
       if (!values->Next(property.is_list ? property.count_type : property.type, &value))
         return cut(i);
       if (!property.is_list) {
-        if (const int channel = colors.ChannelOf(p); channel >= 0) color[channel] = value;
+        if (layout.shown[p]) row[static_cast<size_t>(*layout.shown[p])] = value;
         continue;
       }
       if (!(value >= 0 && value <= kMostListed && value == std::floor(value))) {
@@ -114,9 +117,9 @@ absl::StatusOr<PlyFaces> ReadFaces(const SourceFile& file, const PlyElement& ele
         faces.vertices.push_back(restart ? kRestart : static_cast<uint32_t>(index));
       }
     }
-    if (colors.found()) colors.Add(color);
+    if (colors.found()) colors.Add(row);
   }
-  faces.colors = std::move(colors).Finish();
+  faces.colors = std::move(colors).Finish(&faces.unknown);
   return faces;
 }
 
@@ -282,7 +285,7 @@ absl::StatusOr<Model> ReadPlyMesh(const SourceFile& file, const PlyHeader& heade
   for (const PlyElement& element : header.elements) {
     absl::Status status;
     if (&element == vertex) {
-      vertices = ReadPlyVertices(file, element, attributes, &values);
+      vertices = ReadPlyVertices(file, element, attributes, false, &values);
       status = vertices.status();
     } else if (&element == header.Find("face")) {
       faces = ReadFaces(file, element, vertex->count, false, &values);

@@ -1,11 +1,13 @@
 #include "tools/voxelctl/import/ply_points.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "tools/voxelctl/import/ply_values.h"
+#include "tools/voxelctl/import/point_table.h"
 
 namespace voxeld::voxelctl {
 
@@ -17,7 +19,7 @@ absl::StatusOr<Model> ReadPlyPoints(const SourceFile& file, const PlyHeader& hea
     if (&element == vertex) break;
     if (absl::Status status = SkipPlyElement(file, element, &values); !status.ok()) return status;
   }
-  absl::StatusOr<PlyVertices> vertices = ReadPlyVertices(file, *vertex, attributes, &values);
+  absl::StatusOr<PlyVertices> vertices = ReadPlyVertices(file, *vertex, attributes, true, &values);
   if (!vertices.ok()) return vertices.status();
 
   // Scanners write NaN for points that they did not measure.
@@ -25,6 +27,7 @@ absl::StatusOr<Model> ReadPlyPoints(const SourceFile& file, const PlyHeader& hea
   part.kind = Kind::kPoints;
   const size_t count = vertices->positions.size();
   size_t kept = 0;
+  uint64_t uncolored = 0;
   for (size_t i = 0; i < count; ++i) {
     const Point3 p = vertices->positions[i];
     if (std::isnan(p.x) || std::isnan(p.y) || std::isnan(p.z)) continue;
@@ -35,6 +38,8 @@ absl::StatusOr<Model> ReadPlyPoints(const SourceFile& file, const PlyHeader& hea
     vertices->positions[kept] = p;
     if (!vertices->normals.empty()) vertices->normals[kept] = vertices->normals[i];
     if (!vertices->colors.empty()) vertices->colors[kept] = vertices->colors[i];
+    if (!vertices->intensities.empty()) vertices->intensities[kept] = vertices->intensities[i];
+    uncolored += std::ranges::binary_search(vertices->unknown, i) ? 1 : 0;
     for (Attribute& attribute : vertices->attributes) attribute.values[kept] = attribute.values[i];
     ++kept;
   }
@@ -45,9 +50,14 @@ absl::StatusOr<Model> ReadPlyPoints(const SourceFile& file, const PlyHeader& hea
   vertices->positions.resize(kept);
   if (!vertices->normals.empty()) vertices->normals.resize(kept);
   if (!vertices->colors.empty()) vertices->colors.resize(kept);
+  if (!vertices->intensities.empty()) {
+    vertices->intensities.resize(kept);
+    vertices->colors = GreysOf(vertices->intensities, &uncolored);
+  }
   for (Attribute& attribute : vertices->attributes) attribute.values.resize(kept);
   Model model;
   AddLeftOut("points that are not a number", count - kept, &model);
+  AddLeftOut(kUnknownColors, uncolored, &model);
   AddLeftOut("other properties of vertices", vertices->others, &model);
   AddLeftOut("entries of other elements", header.OtherEntries(), &model);
   AddLeftOut("pictures", header.pictures, &model);

@@ -8,9 +8,9 @@
 
 namespace voxeld::voxelctl {
 
-// Reads the points. Requires: `header` is of `file`, and has vertices. Colors are scaled as
-// PlyColors says. Points that are not a number are left out, and the model's note says how many.
-// Returns: InvalidArgument with the number of a vertex that is truncated, not a number or infinite.
+// Requires: `header` is of `file`, and has vertices. Colors go as far as PlyColors says; without them intensities are greys. Points that are not a number are left out, and
+// the model's note says how many.
+// Returns: InvalidArgument with the number of the vertex that is cut off, no number or infinite.
 absl::StatusOr<Model> ReadPlyPoints(const SourceFile& file, const PlyHeader& header,
                                     bool attributes = false);
 

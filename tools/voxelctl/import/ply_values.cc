@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <optional>
+#include <string>
 #include <utility>
 
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "common/text/printable.h"
 #include "tools/voxelctl/import/surface_builder.h"
@@ -18,28 +17,6 @@ namespace voxeld::voxelctl {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "values are read in place");
-
-absl::string_view WithoutPrefix(absl::string_view name) {
-  if (absl::StartsWith(name, "diffuse_")) name.remove_prefix(8);
-  return name;
-}
-
-int ChannelByName(absl::string_view name) {
-  name = WithoutPrefix(name);
-  if (name == "red" || name == "r") return 0;
-  if (name == "green" || name == "g") return 1;
-  if (name == "blue" || name == "b") return 2;
-  return -1;
-}
-
-// Returns 0 to 2 for a coordinate; 3 to 5 for one of the normal; −1 for neither.
-int CoordinateByName(absl::string_view name) {
-  static constexpr absl::string_view kCoordinates[6] = {"x", "y", "z", "nx", "ny", "nz"};
-  for (int i = 0; i < 6; ++i) {
-    if (name == kCoordinates[i]) return i;
-  }
-  return -1;
-}
 
 bool IsFloating(PlyType type) { return type == PlyType::kF32 || type == PlyType::kF64; }
 
@@ -64,13 +41,8 @@ double LargestOf(PlyType type) {
   return 1;
 }
 
-uint8_t PlyChannel(double value, double full_scale) {
-  const double scaled = value / full_scale * 255 + 0.5;
-  return static_cast<uint8_t>(std::isfinite(scaled) ? std::clamp(scaled, 0.0, 255.0) : 0.0);
-}
-
-// Reads one property of one entry. A list is skipped, and its value is its length: a count that is
-// too large ends with the data, after at most a file's length.
+// Reads one property of one entry. A list is passed over, and its value is its length: a count that is too great ends
+// with the data, after at most a file's length.
 bool ReadProperty(const PlyProperty& property, PlyValues* values, double* value) {
   if (!values->Next(property.is_list ? property.count_type : property.type, value)) return false;
   if (!property.is_list) return true;
@@ -98,11 +70,11 @@ bool PlyValues::NextWord(double* value) {
   if (begin == absl::string_view::npos) return false;
   rest_.remove_prefix(begin);
   const size_t end = std::min(rest_.find_first_of(" \t\r\n"), rest_.size());
-  absl::string_view word = rest_.substr(0, end);
+  const absl::string_view word = rest_.substr(0, end);
   rest_.remove_prefix(end);
-  if (absl::StartsWith(word, "+")) word.remove_prefix(1);
-  const auto result = std::from_chars(word.data(), word.data() + word.size(), *value);
-  return result.ec == std::errc() && result.ptr == word.data() + word.size();
+  const std::optional<double> number = NumberOfWord(word);
+  if (number) *value = *number;
+  return number.has_value();
 }
 
 template <typename T>
@@ -148,34 +120,37 @@ bool PlyValues::NextBinary(PlyType type, double* value) {
   return true;
 }
 
-PlyColors::PlyColors(const PlyElement& element) {
-  for (size_t p = 0; p < element.properties.size(); ++p) {
-    const PlyProperty& property = element.properties[p];
-    const int channel = property.is_list ? -1 : ChannelByName(property.name);
-    if (channel < 0 || at_[channel] >= 0) continue;
-    at_[channel] = static_cast<int>(p);
-    full_scale_[channel] = LargestOf(property.type);
-    scales_[channel] = IsFloating(property.type)    ? Scale::kFractions
-                       : PlySize(property.type) > 1 ? Scale::kWholeNumbers
-                                                    : Scale::kOfType;
-    is_known_ &= scales_[channel] == Scale::kOfType;
-  }
+PointColumns PlyColumns(const PlyElement& element) {
+  std::vector<std::string> names;
+  for (const PlyProperty& property : element.properties)
+    names.push_back(property.is_list ? "" : property.name);
+  return PointColumnsByName(names);
 }
 
-int PlyColors::ChannelOf(size_t property) const {
-  for (int channel = 0; channel < 3; ++channel) {
-    if (at_[channel] == static_cast<int>(property)) return channel;
+PlyColors::PlyColors(const PlyElement& element, const PointColumns& columns) {
+  for (size_t p = 0; p < columns.size(); ++p) {
+    if (!columns[p] || !IsColor(*columns[p])) continue;
+    found_ = true;
+    const PlyType type = element.properties[p].type;
+    const size_t channel =
+        static_cast<size_t>(*columns[p]) - static_cast<size_t>(PointColumn::kRed);
+    full_scale_[channel] = LargestOf(type);
+    scales_[channel] = IsFloating(type)    ? Scale::kFractions
+                       : PlySize(type) > 1 ? Scale::kWholeNumbers
+                                           : Scale::kOfType;
+    is_known_ &= scales_[channel] == Scale::kOfType;
   }
-  return -1;
 }
 
 void PlyColors::Reserve(size_t entries) {
   is_known_ ? colors_.reserve(entries) : numbers_.reserve(3 * entries);
 }
 
-void PlyColors::Add(const double (&channels)[3]) {
+void PlyColors::Add(const PointRow& row) {
+  const size_t red = static_cast<size_t>(PointColumn::kRed);
+  const double channels[3] = {row[red], row[red + 1], row[red + 2]};
   if (is_known_) {
-    colors_.push_back(ColorOf(channels));
+    AddColor(channels);
     return;
   }
   for (int c = 0; c < 3; ++c) {
@@ -186,76 +161,69 @@ void PlyColors::Add(const double (&channels)[3]) {
   }
 }
 
-Rgb PlyColors::ColorOf(const double (&channels)[3]) const {
-  return {PlyChannel(channels[0], full_scale_[0]), PlyChannel(channels[1], full_scale_[1]),
-          PlyChannel(channels[2], full_scale_[2])};
+void PlyColors::AddColor(const double (&channels)[3]) {
+  const std::optional<Rgb> color = ColorOfChannels(
+      channels[0] / full_scale_[0], channels[1] / full_scale_[1], channels[2] / full_scale_[2]);
+  if (!color) unknown_.push_back(static_cast<uint32_t>(colors_.size()));
+  colors_.push_back(color.value_or(kUnknownColor));
 }
 
-std::vector<Rgb> PlyColors::Finish() && {
-  if (is_known_) return std::move(colors_);
+std::vector<Rgb> PlyColors::Finish(std::vector<uint32_t>* unknown) && {
   for (int c = 0; c < 3; ++c) {
     if (scales_[c] == Scale::kFractions && most_fraction_ > 1) full_scale_[c] = 255;
     if (scales_[c] != Scale::kWholeNumbers) continue;
     if (most_whole_ <= 65535) full_scale_[c] = std::min(full_scale_[c], 65535.0);
     if (most_whole_ <= 255) full_scale_[c] = 255;
   }
-  colors_.reserve(numbers_.size() / 3);
+  if (!is_known_) colors_.reserve(numbers_.size() / 3);
   for (size_t i = 0; i + 2 < numbers_.size(); i += 3)
-    colors_.push_back(ColorOf({numbers_[i], numbers_[i + 1], numbers_[i + 2]}));
+    AddColor({numbers_[i], numbers_[i + 1], numbers_[i + 2]});
+  *unknown = std::move(unknown_);
   return std::move(colors_);
 }
 
 absl::StatusOr<PlyVertices> ReadPlyVertices(const SourceFile& file, const PlyElement& vertex,
-                                            bool attributes, PlyValues* values) {
-  PlyColors colors(vertex);
+                                            bool attributes, bool may_be_grey, PlyValues* values) {
+  const PointLayout layout = PointLayout::Of(PlyColumns(vertex), may_be_grey);
+  PlyColors colors(vertex, layout.shown);
   const size_t count = vertex.properties.size();
-  std::vector<int> coordinates(count, -1);
-  bool has[6] = {};
-  for (size_t p = 0; p < count; ++p) {
-    const int coordinate =
-        vertex.properties[p].is_list ? -1 : CoordinateByName(vertex.properties[p].name);
-    if (coordinate < 0 || has[coordinate]) continue;
-    coordinates[p] = coordinate;
-    has[coordinate] = true;
-  }
-  const bool normals = has[3] && has[4] && has[5];
+  const bool normals = layout.Has(PointColumn::kNormalX);
+  const bool intensities = layout.Has(PointColumn::kIntensity);
 
   PlyVertices out;
-  std::vector<size_t> numbers;  // indices of the properties that are attributes
-  for (size_t p = 0; p < count; ++p) {
+  std::vector<size_t> numbers;  // the properties that are attributes
+  for (const size_t p : layout.attributes) {
     const PlyProperty& property = vertex.properties[p];
-    // A single channel or half of a normal is treated as any other number.
-    if ((colors.found() && colors.ChannelOf(p) >= 0) ||
-        (coordinates[p] >= 0 && (coordinates[p] < 3 || normals))) {
-      continue;
-    }
-    if (property.is_list || !attributes) {
-      ++out.others;
-      continue;
-    }
+    if (property.is_list || !attributes) continue;
     numbers.push_back(p);
     out.attributes.push_back({property.name, {}});
     out.attributes.back().values.reserve(vertex.count);
   }
+  for (const size_t p : layout.others)
+    out.others += attributes && !vertex.properties[p].is_list ? 0 : 1;
   out.positions.reserve(vertex.count);
   if (normals) out.normals.reserve(vertex.count);
+  if (intensities) out.intensities.reserve(vertex.count);
   if (colors.found()) colors.Reserve(vertex.count);
+  PointRow row = {};
   for (uint64_t i = 0; i < vertex.count; ++i) {
-    double at[6] = {}, color[3] = {};
     for (size_t p = 0, number = 0; p < count; ++p) {
       double value = 0;
       if (!ReadProperty(vertex.properties[p], values, &value))
         return CutOff(file, "vertex", i, vertex.count);
-      if (coordinates[p] >= 0) at[coordinates[p]] = value;
+      if (layout.shown[p]) row[static_cast<size_t>(*layout.shown[p])] = value;
       if (number < numbers.size() && numbers[number] == p)
         out.attributes[number++].values.push_back(value);
-      if (const int channel = colors.ChannelOf(p); channel >= 0) color[channel] = value;
     }
-    out.positions.push_back({at[0], at[1], at[2]});
-    if (normals) out.normals.push_back(UnitOrZero({at[3], at[4], at[5]}));
-    if (colors.found()) colors.Add(color);
+    out.positions.push_back({row[0], row[1], row[2]});
+    if (normals) out.normals.push_back(UnitOrZero({row[3], row[4], row[5]}));
+    if (intensities) {
+      out.intensities.push_back(
+          static_cast<float>(row[static_cast<size_t>(PointColumn::kIntensity)]));
+    }
+    if (colors.found()) colors.Add(row);
   }
-  out.colors = std::move(colors).Finish();
+  out.colors = std::move(colors).Finish(&out.unknown);
   return out;
 }
 

@@ -11,6 +11,7 @@
 #include "absl/strings/string_view.h"
 #include "tools/voxelctl/import/model.h"
 #include "tools/voxelctl/import/ply_header.h"
+#include "tools/voxelctl/import/point_table.h"
 #include "tools/voxelctl/import/source_file.h"
 
 namespace voxeld::voxelctl {
@@ -40,45 +41,49 @@ class PlyValues {
 // exporters write 0 to 255 in any type.
 class PlyColors {
  public:
-  explicit PlyColors(const PlyElement& element);
-  // Returns whether all three channels exist.
-  bool found() const { return at_[0] >= 0 && at_[1] >= 0 && at_[2] >= 0; }
-  // Returns 0 to 2; −1 if the property is not a channel.
-  int ChannelOf(size_t property) const;
+  // `columns`: of each property of the element. Requires: all channels or none.
+  PlyColors(const PlyElement& element, const PointColumns& columns);
+  // Whether there are all three channels.
+  bool found() const { return found_; }
   void Reserve(size_t entries);
-  // Adds the color of the next entry.
-  void Add(const double (&channels)[3]);
-  // Returns: the colors of all entries.
-  std::vector<Rgb> Finish() &&;
+  // Takes the color of the next entry.
+  void Add(const PointRow& row);
+  // Returns: the colors of all entries. `unknown`: those whose color is not finite, which have kUnknownColor.
+  std::vector<Rgb> Finish(std::vector<uint32_t>* unknown) &&;
 
  private:
   // Which value means full brightness.
   enum class Scale : uint8_t { kOfType, kWholeNumbers, kFractions };
 
-  Rgb ColorOf(const double (&channels)[3]) const;
+  void AddColor(const double (&channels)[3]);
 
-  int at_[3] = {-1, -1, -1};  // per channel, the property's index
+  bool found_ = false;
   Scale scales_[3] = {};
   double full_scale_[3] = {1, 1, 1};
   double most_whole_ = 0, most_fraction_ = 0;  // over all entries
   bool is_known_ = true;                       // whether all scales are determined by the types
   std::vector<Rgb> colors_;
-  std::vector<float> numbers_;  // until the scales are known, instead of `colors_`
+  std::vector<float> numbers_;     // until the scales are known, instead of `colors_`
+  std::vector<uint32_t> unknown_;  // indices of `colors_`
 };
 
 struct PlyVertices {
-  std::vector<Point3> positions;      // not necessarily finite
-  std::vector<Point3> normals;        // unit vectors, or zero; may be empty
-  std::vector<Rgb> colors;            // may be empty
-  std::vector<Attribute> attributes;  // the other properties that are not lists, if requested
-  uint64_t others = 0;                // properties that are not read
+  std::vector<Point3> positions;      // not all finite
+  std::vector<Point3> normals;        // of unit length, or zero; or none
+  std::vector<Rgb> colors;            // or none
+  std::vector<uint32_t> unknown;      // which colors are not finite in the file, in ascending order
+  std::vector<float> intensities;     // or none
+  std::vector<Attribute> attributes;  // the other properties that are no lists, if they are wanted
+  uint64_t others = 0;                // properties that are not there
 };
 
-// Reads the entries of "vertex": x, y, z; nx, ny, nz; red, green, blue (also r, g, b and diffuse_…)
-// of any type. Returns: InvalidArgument with the number of a vertex that is truncated or not a
-// number.
+// Returns: what each property of an element is. Lists are nothing.
+PointColumns PlyColumns(const PlyElement& element);
+
+// Reads the entries of "vertex": the columns of point_table.h, of any type; intensities only if colours `may_be_grey`.
+// Returns: InvalidArgument with the number of the vertex that is cut off or no number.
 absl::StatusOr<PlyVertices> ReadPlyVertices(const SourceFile& file, const PlyElement& vertex,
-                                            bool attributes, PlyValues* values);
+                                            bool attributes, bool may_be_grey, PlyValues* values);
 
 // Skips the entries of an element. Returns: InvalidArgument with the truncated entry.
 absl::Status SkipPlyElement(const SourceFile& file, const PlyElement& element, PlyValues* values);

@@ -1,81 +1,160 @@
 #include "tools/voxelctl/import/point_table.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
+#include <initializer_list>
+#include <limits>
+#include <system_error>
 #include <utility>
 
 #include "absl/strings/ascii.h"
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/strip.h"
 #include "tools/voxelctl/import/surface_builder.h"
 
 namespace voxeld::voxelctl {
 namespace {
 
-struct Known {
-  absl::string_view name;
-  PointColumn column;
+// Names that belong together; earlier ones are preferred.
+struct Family {
+  std::array<PointColumn, 3> columns;
+  std::array<absl::string_view, 3> names;  // empty: it has fewer
 };
-constexpr Known kNames[] = {
-    {"x", PointColumn::kX},
-    {"easting", PointColumn::kX},
-    {"lon", PointColumn::kX},
-    {"longitude", PointColumn::kX},
-    {"y", PointColumn::kY},
-    {"northing", PointColumn::kY},
-    {"lat", PointColumn::kY},
-    {"latitude", PointColumn::kY},
-    {"z", PointColumn::kZ},
-    {"height", PointColumn::kZ},
-    {"elevation", PointColumn::kZ},
-    {"altitude", PointColumn::kZ},
-    {"nx", PointColumn::kNormalX},
-    {"normal_x", PointColumn::kNormalX},
-    {"ny", PointColumn::kNormalY},
-    {"normal_y", PointColumn::kNormalY},
-    {"nz", PointColumn::kNormalZ},
-    {"normal_z", PointColumn::kNormalZ},
-    {"r", PointColumn::kRed},
-    {"red", PointColumn::kRed},
-    {"g", PointColumn::kGreen},
-    {"green", PointColumn::kGreen},
-    {"b", PointColumn::kBlue},
-    {"blue", PointColumn::kBlue},
-    {"i", PointColumn::kIntensity},
-    {"intensity", PointColumn::kIntensity},
-    {"reflectance", PointColumn::kIntensity},
-};
+constexpr std::array<PointColumn, 3> kPlaceColumns = {PointColumn::kX, PointColumn::kY,
+                                                      PointColumn::kZ};
+constexpr std::array<PointColumn, 3> kHeightColumn = {PointColumn::kZ};
+constexpr std::array<PointColumn, 3> kNormalColumns = {PointColumn::kNormalX, PointColumn::kNormalY,
+                                                       PointColumn::kNormalZ};
+constexpr std::array<PointColumn, 3> kColorColumns = {PointColumn::kRed, PointColumn::kGreen,
+                                                      PointColumn::kBlue};
+constexpr std::array<PointColumn, 3> kGreyColumn = {PointColumn::kIntensity};
+constexpr Family kFamilies[] = {{kPlaceColumns, {"x", "y", ""}},
+                                {kPlaceColumns, {"easting", "northing", ""}},
+                                {kPlaceColumns, {"lon", "lat", ""}},
+                                {kPlaceColumns, {"longitude", "latitude", ""}},
+                                {kHeightColumn, {"z", "", ""}},
+                                {kHeightColumn, {"height", "", ""}},
+                                {kHeightColumn, {"elevation", "", ""}},
+                                {kHeightColumn, {"altitude", "", ""}},
+                                {kNormalColumns, {"nx", "ny", "nz"}},
+                                {kNormalColumns, {"normal_x", "normal_y", "normal_z"}},
+                                {kColorColumns, {"red", "green", "blue"}},
+                                {kColorColumns, {"r", "g", "b"}},
+                                {kColorColumns, {"diffuse_red", "diffuse_green", "diffuse_blue"}},
+                                {kColorColumns, {"diffuse_r", "diffuse_g", "diffuse_b"}},
+                                {kGreyColumn, {"intensity", "", ""}},
+                                {kGreyColumn, {"i", "", ""}},
+                                {kGreyColumn, {"reflectance", "", ""}}};
 
 double Of(const PointRow& row, PointColumn column) { return row[static_cast<size_t>(column)]; }
 
 uint8_t Byte(double fraction) {
-  const double scaled = fraction * 255 + 0.5;
-  return std::isfinite(scaled) ? static_cast<uint8_t>(std::clamp(scaled, 0.0, 255.0)) : 0;
+  return static_cast<uint8_t>(std::clamp(fraction * 255 + 0.5, 0.0, 255.0));
 }
 
 }  // namespace
 
-std::optional<PointColumn> PointColumnOf(absl::string_view name) {
-  const std::string lower = absl::AsciiStrToLower(absl::StripAsciiWhitespace(name));
-  absl::string_view bare = lower;
-  absl::ConsumePrefix(&bare, "diffuse_");
-  const auto found = std::ranges::find(kNames, bare, &Known::name);
-  if (found == std::end(kNames)) return std::nullopt;
-  return found->column;
+PointColumns PointColumnsByName(std::span<const std::string> names) {
+  std::vector<std::string> lower;
+  for (const std::string& name : names)
+    lower.push_back(absl::AsciiStrToLower(absl::StripAsciiWhitespace(name)));
+  const auto at = [&](absl::string_view name) {
+    return static_cast<size_t>(std::ranges::find(lower, name) - lower.begin());
+  };
+  PointColumns columns(names.size());
+  const auto take = [&](const Family& family) {
+    for (size_t i = 0; i < 3 && !family.names[i].empty(); ++i) {
+      const size_t found = at(family.names[i]);
+      const bool is_taken = std::ranges::find(columns, family.columns[i]) != columns.end();
+      if (found < columns.size() && !is_taken) columns[found] = family.columns[i];
+    }
+  };
+  // Complete families first.
+  for (const Family& family : kFamilies) {
+    const bool is_complete = std::ranges::all_of(family.names, [&](absl::string_view name) {
+      return name.empty() || at(name) < columns.size();
+    });
+    if (is_complete) take(family);
+  }
+  for (const Family& family : kFamilies) take(family);
+  return columns;
 }
 
-double FullScaleOf(double greatest) { return greatest <= 1 ? 1 : greatest <= 255 ? 255 : 65535; }
+PointLayout PointLayout::Of(PointColumns columns, bool may_be_grey) {
+  const auto has = [&](PointColumn column) {
+    return std::ranges::find(columns, column) != columns.end();
+  };
+  const auto drop = [&](std::initializer_list<PointColumn> some) {
+    for (std::optional<PointColumn>& column : columns) {
+      if (column && std::ranges::find(some, *column) != some.end()) column.reset();
+    }
+  };
+  const bool is_packed = has(PointColumn::kPackedColor);
+  if (is_packed || !has(PointColumn::kRed) || !has(PointColumn::kGreen) || !has(PointColumn::kBlue))
+    drop({PointColumn::kRed, PointColumn::kGreen, PointColumn::kBlue});
+  if (!has(PointColumn::kNormalX) || !has(PointColumn::kNormalY) || !has(PointColumn::kNormalZ))
+    drop({PointColumn::kNormalX, PointColumn::kNormalY, PointColumn::kNormalZ});
+  if (is_packed || has(PointColumn::kRed) || !may_be_grey) drop({PointColumn::kIntensity});
+  PointLayout layout;
+  for (size_t c = 0; c < columns.size(); ++c) {
+    if (!columns[c]) layout.others.push_back(c);
+    if (!columns[c] || columns[c] == PointColumn::kIntensity) layout.attributes.push_back(c);
+    if (columns[c] && columns[c] != PointColumn::kPackedColor)
+      layout.has[static_cast<size_t>(*columns[c])] = true;
+  }
+  for (const PointColumn channel : kColorColumns)
+    layout.has[static_cast<size_t>(channel)] |= is_packed;
+  layout.shown = std::move(columns);
+  return layout;
+}
 
 bool IsColor(PointColumn column) {
   return column == PointColumn::kRed || column == PointColumn::kGreen ||
          column == PointColumn::kBlue;
 }
 
-absl::StatusOr<PointTable> PointTable::Make(const SourceFile& file,
-                                            const std::array<bool, kPointColumns>& has,
+void ChannelRange::Add(double channel) {
+  if (std::isfinite(channel)) greatest_ = std::max(greatest_, channel);
+}
+
+std::optional<Rgb> ColorOfChannels(double red, double green, double blue) {
+  if (!std::isfinite(red) || !std::isfinite(green) || !std::isfinite(blue)) return std::nullopt;
+  return Rgb{Byte(red), Byte(green), Byte(blue)};
+}
+
+std::vector<Rgb> GreysOf(std::span<const float> intensities, uint64_t* unknown) {
+  float least = std::numeric_limits<float>::max(), greatest = -least;
+  for (const float intensity : intensities) {
+    if (!std::isfinite(intensity)) continue;
+    least = std::min(least, intensity);
+    greatest = std::max(greatest, intensity);
+  }
+  const double span = greatest > least ? double{greatest} - double{least} : 0;
+  std::vector<Rgb> greys;
+  greys.reserve(intensities.size());
+  for (const float intensity : intensities) {
+    const double part = span > 0 ? (double{intensity} - double{least}) / span : 1;
+    const bool is_known = std::isfinite(intensity);
+    *unknown += is_known ? 0 : 1;
+    greys.push_back(is_known ? ColorOfChannels(part, part, part).value_or(kUnknownColor)
+                             : kUnknownColor);
+  }
+  return greys;
+}
+
+std::optional<double> NumberOfWord(absl::string_view word) {
+  if (absl::StartsWith(word, "+") && !absl::StartsWith(word, "+-")) word.remove_prefix(1);
+  double value = 0;
+  const auto read = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (read.ec != std::errc() || read.ptr != word.data() + word.size()) return std::nullopt;
+  return value;
+}
+
+absl::StatusOr<PointTable> PointTable::Make(const SourceFile& file, const PointLayout& layout,
                                             double full_scale) {
   PointTable table;
-  table.has_ = has;
+  table.has_ = layout.has;
   table.full_scale_ = full_scale;
   for (const auto& [column, name] :
        {std::pair(PointColumn::kX, "x"), {PointColumn::kY, "y"}, {PointColumn::kZ, "z"}}) {
@@ -114,21 +193,17 @@ absl::Status PointTable::Add(const SourceFile& file, const PointRow& row, absl::
   part_.positions.push_back(at);
   for (size_t i = 0; i < part_.attributes.size(); ++i)
     part_.attributes[i].values.push_back(attributes[i]);
-  if (Has(PointColumn::kNormalX) && Has(PointColumn::kNormalY) && Has(PointColumn::kNormalZ)) {
+  if (Has(PointColumn::kNormalX)) {
     part_.normals.push_back(
         UnitOrZero({Of(row, PointColumn::kNormalX), Of(row, PointColumn::kNormalY),
                     Of(row, PointColumn::kNormalZ)}));
   }
-  if (Has(PointColumn::kRed) && Has(PointColumn::kGreen) && Has(PointColumn::kBlue)) {
-    const double red = Of(row, PointColumn::kRed), green = Of(row, PointColumn::kGreen),
-                 blue = Of(row, PointColumn::kBlue);
-    if (std::isnan(red) || std::isnan(green) || std::isnan(blue)) {
-      ++uncolored_;
-      part_.colors.push_back({255, 255, 255});
-    } else {
-      part_.colors.push_back(
-          {Byte(red / full_scale_), Byte(green / full_scale_), Byte(blue / full_scale_)});
-    }
+  if (Has(PointColumn::kRed)) {
+    const std::optional<Rgb> color = ColorOfChannels(Of(row, PointColumn::kRed) / full_scale_,
+                                                     Of(row, PointColumn::kGreen) / full_scale_,
+                                                     Of(row, PointColumn::kBlue) / full_scale_);
+    uncolored_ += color ? 0 : 1;
+    part_.colors.push_back(color.value_or(kUnknownColor));
   } else if (Has(PointColumn::kIntensity)) {
     const double intensity = Of(row, PointColumn::kIntensity);
     intensities_.push_back(static_cast<float>(intensity));
@@ -137,30 +212,14 @@ absl::Status PointTable::Add(const SourceFile& file, const PointRow& row, absl::
 }
 
 Model PointTable::Finish(const SourceFile& file, std::string format) && {
-  if (!intensities_.empty()) {
-    float least = std::numeric_limits<float>::max(), greatest = -least;
-    for (const float intensity : intensities_) {
-      if (!std::isfinite(intensity)) continue;
-      least = std::min(least, intensity);
-      greatest = std::max(greatest, intensity);
-    }
-    // If all are equal, they become white.
-    const double span = greatest > least ? double{greatest} - double{least} : 0;
-    for (const float intensity : intensities_) {
-      const bool is_known = std::isfinite(intensity);
-      uncolored_ += is_known ? 0 : 1;
-      const uint8_t grey =
-          is_known && span > 0 ? Byte((double{intensity} - double{least}) / span) : 255;
-      part_.colors.push_back({grey, grey, grey});
-    }
-  }
+  if (!intensities_.empty()) part_.colors = GreysOf(intensities_, &uncolored_);
   Model model;
   model.path = file.path;
   model.format = std::move(format);
   model.up = Up::kZ;
   model.lit_already = !part_.colors.empty();
   AddLeftOut("points that are not a number", nowhere_, &model);
-  AddLeftOut("colours and intensities that are not a number (shown white)", uncolored_, &model);
+  AddLeftOut(kUnknownColors, uncolored_, &model);
   model.parts.push_back(std::move(part_));
   return model;
 }

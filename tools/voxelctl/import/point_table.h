@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -29,37 +30,75 @@ enum class PointColumn : uint8_t {
   kRed,
   kGreen,
   kBlue,
-  kIntensity
+  kIntensity,
+  kPackedColor  // all channels in one number; a row has them apart
 };
-inline constexpr size_t kPointColumns = 10;
+inline constexpr size_t kPointColumns = 10;  // of a row
 using PointRow = std::array<double, kPointColumns>;
+// What each column of a file is; nothing: another number.
+using PointColumns = std::vector<std::optional<PointColumn>>;
 
-// Recognises the names that files use, case-insensitively: "x", "easting", "nx", "normal_x", "r",
-// "red", "diffuse_red", "i", "intensity", … Returns nothing for another column.
-std::optional<PointColumn> PointColumnOf(absl::string_view name);
+// Finds columns by the names that files use, in any case: "x", "easting", "nx", "normal_x", "r", "red", "diffuse_red", "i", "intensity", …
+// Names of one kind go together: of "r", "red", "green" and "blue" the last three are the colour. Of two columns with one name the first
+// is taken.
+PointColumns PointColumnsByName(std::span<const std::string> names);
 
-// Returns: the channel value of full brightness (1, 255 or 65,535), given the greatest in the file.
-double FullScaleOf(double greatest);
+// Which columns are shown, and which are numbers for --color-by. All formats of points decide it here.
+struct PointLayout {
+  // The columns of a colour or normal that is not complete are other numbers, and so is the intensity of points that have colours, or where
+  // it `may_be_grey` is false. A packed colour goes before channels of their own.
+  static PointLayout Of(PointColumns columns, bool may_be_grey = true);
+
+  bool Has(PointColumn column) const { return has[static_cast<size_t>(column)]; }
+
+  PointColumns shown;                        // of each column of the file
+  std::array<bool, kPointColumns> has = {};  // whether rows have it
+  std::vector<size_t> others;                // columns that are not shown
+  std::vector<size_t> attributes;            // `others` and the intensity, in the file's order
+};
+
 bool IsColor(PointColumn column);
 
-// Converts rows to points. Without colours, intensities become greys, stretched from the least to
+// Finds the value of a colour's channel that is as bright as can be, given all of the file.
+class ChannelRange {
+ public:
+  void Add(double channel);
+  // Returns: 1, 255 or 65,535.
+  double FullScale() const { return greatest_ <= 1 ? 1 : greatest_ <= 255 ? 255 : 65535; }
+
+ private:
+  double greatest_ = 0;
+};
+
+// Returns: the colour whose channels are these parts of full brightness, or nothing if one is not finite.
+std::optional<Rgb> ColorOfChannels(double red, double green, double blue);
+// What is shown instead, and what it is counted as.
+inline constexpr Rgb kUnknownColor = {255, 255, 255};
+inline constexpr std::string_view kUnknownColors =
+    "colours and intensities that are not a number (shown white)";
+
+// Returns: greys from the least intensity to the greatest, or white where all are alike. Adds those that are not finite to `unknown`.
+std::vector<Rgb> GreysOf(std::span<const float> intensities, uint64_t* unknown);
+
+// Returns: the number that a word in a text is, with a sign or without; nothing if it is not one.
+std::optional<double> NumberOfWord(absl::string_view word);
+
+// Rows become points: intensities become greys where there are no colours, stretched from the least to
 // the greatest.
 class PointTable {
  public:
-  // Makes a table. `full_scale` is the channel value of full brightness. Errors: InvalidArgument
-  // without x, y and z.
-  static absl::StatusOr<PointTable> Make(const SourceFile& file,
-                                         const std::array<bool, kPointColumns>& has,
+  // Without x, y and z InvalidArgument. `full_scale`: the value of a colour's channel that is as bright as
+  // can be.
+  static absl::StatusOr<PointTable> Make(const SourceFile& file, const PointLayout& layout,
                                          double full_scale);
 
   void Reserve(uint64_t count);
   // Names the further numbers that Add receives for each point. Requires: called before the first
   // Add.
   void SetAttributes(std::vector<std::string> names);
-  // Adds a point. One with a coordinate that is not a number is left out and counted; one whose
-  // colour is not a number is white, and counted too. `what` names the row, as in "point 3" or
-  // "line 17"; `attributes` has one value for each name. Errors: InvalidArgument if a coordinate is
-  // infinite, or there are more than kMaxModelVertices.
+  // A point with a coordinate that is not a number is left out and counted; one whose colour is not finite is white, and counted too.
+  // InvalidArgument: a coordinate is infinite, or there are more than kMaxModelVertices; `what` names the row, as in "point 3" or
+  // "line 17". `attributes`: one of each name.
   absl::Status Add(const SourceFile& file, const PointRow& row, absl::string_view what,
                    std::span<const double> attributes = {});
   size_t size() const { return part_.positions.size(); }

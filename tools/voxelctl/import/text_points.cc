@@ -1,8 +1,6 @@
 #include "tools/voxelctl/import/text_points.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -74,22 +72,14 @@ class Lines {
 
 using Words = std::vector<absl::string_view>;
 
-std::optional<double> PlainNumber(absl::string_view word) {
-  double value = 0;
-  const auto result = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (result.ec != std::errc() || result.ptr != word.data() + word.size()) return std::nullopt;
-  return value;
-}
-
-// Parses a number with a decimal point or a decimal comma.
+// With a decimal point or a decimal comma.
 std::optional<double> Number(absl::string_view word) {
-  if (absl::StartsWith(word, "+")) word.remove_prefix(1);
-  const std::optional<double> plain = PlainNumber(word);
+  const std::optional<double> plain = NumberOfWord(word);
   const size_t comma = word.find(',');
   if (plain || comma == absl::string_view::npos || absl::StrContains(word, '.')) return plain;
   std::string with_point(word);
   with_point[comma] = '.';
-  return PlainNumber(with_point);
+  return NumberOfWord(with_point);
 }
 
 // Returns whether the word is one that tables use for a missing number.
@@ -222,18 +212,17 @@ Columns ByCount(size_t count, const Ranges& ranges) {
   }
 }
 
-double FullScale(absl::string_view text, char mark, const Columns& columns) {
-  double greatest = 0;
+double FullScale(absl::string_view text, char mark, const PointColumns& columns) {
+  ChannelRange range;
   Lines lines(text);
   absl::string_view line;
   while (lines.Next(&line)) {
     const auto words = WordsOf(line, mark, columns.size());
     for (size_t c = 0; c < std::min(words.size(), columns.size()); ++c) {
-      const bool color = columns[c].known.has_value() && IsColor(*columns[c].known);
-      if (color) greatest = std::max(greatest, Number(words[c]).value_or(0));
+      if (columns[c] && IsColor(*columns[c])) range.Add(Number(words[c]).value_or(0));
     }
   }
-  return FullScaleOf(greatest);
+  return range.FullScale();
 }
 
 bool Has(const Columns& columns, PointColumn column) {
@@ -241,12 +230,10 @@ bool Has(const Columns& columns, PointColumn column) {
 }
 
 Columns ByNames(const Words& words) {
+  const std::vector<std::string> names(words.begin(), words.end());
+  const PointColumns known = PointColumnsByName(names);
   Columns columns;
-  for (const absl::string_view word : words) {
-    const auto column = PointColumnOf(word);
-    const bool twice = column.has_value() && Has(columns, *column);
-    columns.push_back({twice ? std::nullopt : column, std::string(word)});
-  }
+  for (size_t c = 0; c < names.size(); ++c) columns.push_back({known[c], names[c]});
   return columns;
 }
 
@@ -263,8 +250,13 @@ Columns ByComment(absl::string_view comment, char mark, size_t count) {
   return {};
 }
 
-// Determines the columns and reads the lines before the points; the first point's line is stored in
-// `first`.
+PointLayout LayoutOf(const Columns& columns) {
+  PointColumns known;
+  for (const Column& column : columns) known.push_back(column.known);
+  return PointLayout::Of(std::move(known));
+}
+
+// What the columns are, having read the lines that are no points yet; the first point's line is in `first`.
 absl::StatusOr<Columns> ReadHead(const SourceFile& file, char mark, Lines* lines,
                                  absl::string_view* first) {
   if (!lines->Next(first))
@@ -304,34 +296,29 @@ absl::StatusOr<Model> ReadTextPoints(const SourceFile& file, bool attributes) {
     return FileError(file, absl::StrCat("has ", kMostColumns, " columns or more"),
                      absl::StrCat("at most ", kMostColumns - 1, " are read"));
   }
-  std::array<bool, kPointColumns> has = {};
+  const PointLayout layout = LayoutOf(*columns);
   std::vector<size_t> numbers;  // the columns that are attributes
   std::vector<std::string> names;
-  uint64_t others = 0;
-  for (size_t c = 0; c < columns->size(); ++c) {
+  if (attributes) numbers = layout.attributes;
+  for (const size_t c : numbers) {
     const Column& column = (*columns)[c];
-    if (column.known.has_value()) has[static_cast<size_t>(*column.known)] = true;
-    if (!column.known.has_value()) ++others;
-    if (column.known.has_value() && *column.known != PointColumn::kIntensity) continue;
-    numbers.push_back(c);
-    names.push_back(!column.name.empty()       ? column.name
-                    : column.known.has_value() ? "intensity"
-                                               : absl::StrCat("column ", c + 1));
+    names.push_back(!column.name.empty()                      ? column.name
+                    : column.known == PointColumn::kIntensity ? "intensity"
+                                                              : absl::StrCat("column ", c + 1));
   }
-  if (!attributes) numbers.clear();
   absl::StatusOr<PointTable> table =
-      PointTable::Make(file, has, FullScale(file.bytes, mark, *columns));
+      PointTable::Make(file, layout, FullScale(file.bytes, mark, layout.shown));
   if (!table.ok()) return table.status();
-  if (attributes) table->SetAttributes(std::move(names));
+  table->SetAttributes(std::move(names));
   std::vector<double> values(numbers.size());
-  uint64_t beyond = 0;                          // number of extra words
+  uint64_t beyond = 0;                          // words, lines
   bool has_points = false, has_commas = false;  // decimal points and decimal commas
   do {
     const auto words = WordsOf(line, mark, columns->size());
     PointRow row = {};
     beyond += words.size() - std::min(words.size(), columns->size());
     for (size_t c = 0; c < columns->size(); ++c) {
-      if (!(*columns)[c].known.has_value()) continue;
+      if (!layout.shown[c]) continue;
       std::optional<double> value = c < words.size() ? Number(words[c]) : std::nullopt;
       if (!value && c < words.size() && IsMissing(words[c])) value = std::nan("");
       if (!value.has_value()) {
@@ -353,7 +340,7 @@ absl::StatusOr<Model> ReadTextPoints(const SourceFile& file, bool attributes) {
                                       c + 1, ", but the file has both decimal points and commas"),
                          "one of the two is expected");
       }
-      row[static_cast<size_t>(*(*columns)[c].known)] = *value;
+      row[static_cast<size_t>(*layout.shown[c])] = *value;
     }
     for (size_t i = 0; i < numbers.size(); ++i) {
       const size_t c = numbers[i];
@@ -369,7 +356,7 @@ absl::StatusOr<Model> ReadTextPoints(const SourceFile& file, bool attributes) {
   }
   Model model =
       std::move(*table).Finish(file, file.extension == "csv" ? "CSV points" : "XYZ points");
-  if (!attributes) AddLeftOut("other columns", others, &model);
+  if (!attributes) AddLeftOut("other columns", layout.others.size(), &model);
   AddLeftOut("words beyond the columns", beyond, &model);
   return model;
 }
