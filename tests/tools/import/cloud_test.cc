@@ -849,5 +849,46 @@ TEST_F(Clouds, PcdColoursThatAreNotKnownAreCounted) {
       (std::vector<LeftOut>{{"colours and intensities that are not a number (shown white)", 1}}));
 }
 
+// "#" and "//" are comments at the beginning of a line and after a blank, but not in a word, and not in place of one.
+TEST_F(Clouds, WordsOfTextMayLookLikeComments) {
+  const auto numbers = [&](const std::string& text) {
+    const auto model = ReadHere(folder_.Write("a.csv", text), {.attributes = true});
+    EXPECT_THAT(model, IsOk()) << text;
+    if (!model.ok()) return std::string();
+    EXPECT_TRUE(model->left_out.empty()) << text;
+    EXPECT_THAT(model->parts.at(0).positions, ElementsAre(Point3{0, 0, 0}, Point3{9, 0, 0}))
+        << text;
+    return absl::StrJoin(model->parts[0].attributes.back().values, " ");
+  };
+  EXPECT_EQ(numbers("x,y,z,color,temp\n0,0,0,#ff0000,1\n9,0,0,#0f0,2\n"), "1 2");
+  EXPECT_EQ(numbers("x,y,z,url,t\n0,0,0,http://a/b,1\n9,0,0,//a/c,2\n"), "1 2");
+  EXPECT_EQ(numbers("x;y;z;tag;t\n0;0;0;#one;1\n9;0;0; #two;2\n"), "1 2");
+  EXPECT_EQ(numbers("x\ty\tz\ttag\tt\n0\t0\t0\t#one\t1\n9\t0\t0\t//h/two\t2\n"), "1 2");
+  EXPECT_EQ(numbers("x y z color t\n0 0 0 #ff8000 1\n9 0 0 #08f 2 # the last\n"), "1 2");
+  EXPECT_EQ(numbers("color,x,y,z,t\n#ff0000,0,0,0,1\n#00FF00,9,0,0,2\n"), "1 2");
+  EXPECT_EQ(numbers("x,y,z,apt #1,t\n0,0,0,a #1,1\n9,0,0,b,2\n"), "1 2");
+  EXPECT_EQ(numbers("// tag x y z t\na 0 0 0 1\n#ff00ff 9 0 0 2\n"), "1 2");
+  EXPECT_EQ(numbers("x,y,z,temp#1\n0,0,0,1 # a comment\n9,0,0,2 // another\n"), "1 2");
+  // Whether the first word of a line belongs to a comment is not clear here.
+  const auto points = Import("a.csv", "id,x,y,z\n1,0,0,0\n#2,1,1,1\n//3,2,2,2\n# two more\n");
+  ASSERT_THAT(points, IsOk());
+  EXPECT_THAT(points->parts[0].positions, ElementsAre(Point3{0, 0, 0}));
+  EXPECT_EQ(points->left_out,
+            (std::vector<LeftOut>{{"other columns", 1}, {"points in comments", 2}}));
+}
+
+TEST_F(Clouds, TextSaysIfItsCountIsAnother) {
+  const auto note = [&](const std::string& text) {
+    const auto model = Import("a.pts", text);
+    EXPECT_THAT(model, IsOk());
+    return model.ok() ? model->note : "";
+  };
+  EXPECT_EQ(note("2\n0 0 0\n1 0 0\n"), "");
+  EXPECT_EQ(note("2\n0 0 0\nnan nan nan\n"), "");
+  EXPECT_EQ(note("8\n0 0 0\n1 0 0\n"), "its first line announces 8 points, but it has 2");
+  EXPECT_EQ(note("1\n0 0 0\n1 0 0\n"), "its first line announces 1 points, but it has 2");
+  EXPECT_THAT(Error("a.pts", "1.5\n0 0 0\n"), HasSubstr("line 1 is text that begins with"));
+}
+
 }  // namespace cloud_test
 }  // namespace voxeld::voxelctl

@@ -28,47 +28,33 @@ struct Column {
 using Columns = std::vector<Column>;
 constexpr size_t kMostColumns = 4096;
 
-// Returns where a comment begins, outside quotation marks; npos without one.
+// Whether the word at the beginning of `text` is a colour such as #ff8000.
+bool IsHexColor(absl::string_view text) {
+  const size_t end = text.find_first_of(" \t,;");
+  const absl::string_view digits = text.substr(0, end).substr(1);
+  return text[0] == '#' &&
+         (digits.size() == 3 || digits.size() == 4 || digits.size() == 6 || digits.size() == 8) &&
+         std::ranges::all_of(
+             digits, [](char c) { return absl::ascii_isxdigit(static_cast<unsigned char>(c)); });
+}
+
+// Where a comment begins, outside quotation marks: at the beginning of the line, or after a blank, but not where a word must follow. npos:
+// there is none.
 size_t CommentBegin(absl::string_view line) {
   bool quoted = false;
+  char before = '\0';  // the last character that is no blank
   for (size_t i = 0; i < line.size(); ++i) {
-    if (line[i] == '"') quoted = !quoted;
-    if (!quoted && (line[i] == '#' || line.substr(i, 2) == "//")) return i;
+    const char c = line[i];
+    if (c == '"') quoted = !quoted;
+    const bool is_after_blank = i == 0 || line[i - 1] == ' ' || line[i - 1] == '\t';
+    if (!quoted && is_after_blank && before != ',' && before != ';' &&
+        (c == '#' || line.substr(i, 2) == "//") && (i == 0 || !IsHexColor(line.substr(i)))) {
+      return i;
+    }
+    if (c != ' ' && c != '\t') before = c;
   }
   return absl::string_view::npos;
 }
-
-// The lines without line ends, comments and surrounding blanks. A comment begins with "#" or "//".
-class Lines {
- public:
-  explicit Lines(absl::string_view text) : rest_(text) {
-    absl::string_view bom = "\xef\xbb\xbf";
-    if (absl::StartsWith(rest_, bom)) rest_.remove_prefix(bom.size());
-  }
-
-  // Returns false at the end. Empty lines are skipped.
-  bool Next(absl::string_view* line) {
-    while (!rest_.empty()) {
-      ++number_;
-      const absl::string_view all = absl::StripAsciiWhitespace(TakeLine(&rest_));
-      const size_t begin = CommentBegin(all);
-      *line = absl::StripAsciiWhitespace(all.substr(0, begin));
-      if (!line->empty()) return true;
-      if (begin == 0) {
-        comment_ = absl::StripAsciiWhitespace(
-            all.substr(std::min(all.find_first_not_of("#/"), all.size())));
-      }
-    }
-    return false;
-  }
-  size_t number() const { return number_; }
-  // Returns the last line that consisted only of a comment.
-  absl::string_view comment() const { return comment_; }
-
- private:
-  absl::string_view rest_, comment_;
-  size_t number_ = 0;
-};
 
 using Words = std::vector<absl::string_view>;
 
@@ -119,6 +105,67 @@ Words SplitAt(absl::string_view line, char mark) {
   return words;
 }
 
+// Lines without their ends, comments and blanks around. A comment begins with "#" or "//".
+class Lines {
+ public:
+  explicit Lines(absl::string_view text) : rest_(text) {
+    absl::string_view bom = "\xef\xbb\xbf";
+    if (absl::StartsWith(rest_, bom)) rest_.remove_prefix(bom.size());
+  }
+
+  // False at the end. Empty ones are passed over.
+  bool Next(absl::string_view* line) {
+    while (!rest_.empty()) {
+      ++number_;
+      whole_ = absl::StripAsciiWhitespace(TakeLine(&rest_));
+      const size_t begin = CommentBegin(whole_);
+      *line = absl::StripAsciiWhitespace(whole_.substr(0, begin));
+      if (!line->empty()) return true;
+      if (begin == 0 && IsPointAfterAll()) {
+        *line = whole_;
+        return true;
+      }
+      if (begin == 0) {
+        comment_ = absl::StripAsciiWhitespace(
+            whole_.substr(std::min(whole_.find_first_not_of("#/"), whole_.size())));
+      }
+    }
+    return false;
+  }
+  size_t number() const { return number_; }
+  // The line with the comment at its end.
+  absl::string_view whole() const { return whole_; }
+  // The last line that was nothing but a comment.
+  absl::string_view comment() const { return comment_; }
+  // From now on lines are points in these columns.
+  void Expect(PointColumns columns, char mark) {
+    columns_ = std::move(columns);
+    mark_ = mark;
+  }
+  // How many comments since then look like points whose first word begins with "#" or "//".
+  uint64_t points_in_comments() const { return points_in_comments_; }
+
+ private:
+  // Whether a line that begins like a comment is a point whose first word is a colour such as #ff8000.
+  bool IsPointAfterAll() {
+    if (columns_.empty() || columns_[0]) return false;
+    const Words words = SplitAt(whole_, mark_);
+    bool is_point = words.size() == columns_.size();
+    for (size_t c = 0; is_point && c < words.size(); ++c)
+      is_point = !columns_[c] || Number(words[c]).has_value();
+    if (!is_point) return false;
+    if (words[0].size() >= 7 && IsHexColor(words[0])) return true;
+    ++points_in_comments_;
+    return false;
+  }
+
+  absl::string_view rest_, whole_, comment_;
+  size_t number_ = 0;
+  PointColumns columns_;
+  char mark_ = ' ';
+  uint64_t points_in_comments_ = 0;
+};
+
 bool IsPoint(const Words& words) {
   return std::ranges::count_if(words, [](absl::string_view w) { return Number(w).has_value(); }) >=
          3;
@@ -156,10 +203,14 @@ char MarkOf(absl::string_view text) {
   return ' ';
 }
 
-// Returns the words of a line with points. A line with too few words by the file's separator is
-// split at its own.
-Words WordsOf(absl::string_view line, char mark, size_t columns) {
+// The words of the line at which `lines` is, which has points. A line with too few at the file's mark is parted at its own, and what
+// looks like a comment in a line with too few is words.
+Words WordsOf(absl::string_view line, const Lines& lines, char mark, size_t columns) {
   Words words = SplitAt(line, mark);
+  if (words.size() < columns && line.size() < lines.whole().size()) {
+    Words all = SplitAt(lines.whole(), mark);
+    if (all.size() >= columns) return all;
+  }
   return words.size() < columns ? SplitAt(line, MarkOf(line)) : words;
 }
 
@@ -173,7 +224,7 @@ Ranges RangesOf(absl::string_view text, char mark, size_t columns) {
   Lines lines(text);
   absl::string_view line;
   while (lines.Next(&line)) {
-    const auto words = WordsOf(line, mark, columns);
+    const auto words = WordsOf(line, lines, mark, columns);
     for (size_t c = 3; c < std::min({words.size(), columns, size_t{9}}); ++c) {
       const double value = Number(words[c]).value_or(0);
       out.least[c - 3] = std::min(out.least[c - 3], value);
@@ -215,9 +266,10 @@ Columns ByCount(size_t count, const Ranges& ranges) {
 double FullScale(absl::string_view text, char mark, const PointColumns& columns) {
   ChannelRange range;
   Lines lines(text);
+  lines.Expect(columns, mark);
   absl::string_view line;
   while (lines.Next(&line)) {
-    const auto words = WordsOf(line, mark, columns.size());
+    const auto words = WordsOf(line, lines, mark, columns.size());
     for (size_t c = 0; c < std::min(words.size(), columns.size()); ++c) {
       if (columns[c] && IsColor(*columns[c])) range.Add(Number(words[c]).value_or(0));
     }
@@ -256,21 +308,32 @@ PointLayout LayoutOf(const Columns& columns) {
   return PointLayout::Of(std::move(known));
 }
 
-// What the columns are, having read the lines that are no points yet; the first point's line is in `first`.
+// What the columns are, having read the lines that are no points yet; the first point's line is in `first`. `count`: the number of points
+// that a line before them announces.
 absl::StatusOr<Columns> ReadHead(const SourceFile& file, char mark, Lines* lines,
-                                 absl::string_view* first) {
+                                 absl::string_view* first, std::optional<uint64_t>* count) {
   if (!lines->Next(first))
     return FileError(file, "holds no line of numbers", "x y z a line is expected");
   Words words = SplitAt(*first, mark);
-  if (words.size() == 1 && Number(words[0]).has_value()) {  // a count
+  uint64_t announced = 0;
+  if (words.size() == 1 && absl::SimpleAtoi(words[0], &announced)) {
+    *count = announced;
     if (!lines->Next(first))
       return FileError(file, "ends after a count", "x y z a line is expected");
     words = SplitAt(*first, mark);
   }
   if (IsNames(words)) {
+    const Words all = SplitAt(lines->whole(), mark);
     Columns columns = ByNames(words);
+    lines->Expect(LayoutOf(columns).shown, mark);
     if (!lines->Next(first))
       return FileError(file, "ends after its names", "x y z a line is expected");
+    // What looks like a comment behind the names may be more of them.
+    if (mark != ' ' && all.size() > words.size() &&
+        SplitAt(lines->whole(), mark).size() == all.size()) {
+      columns = ByNames(all);
+      lines->Expect(LayoutOf(columns).shown, mark);
+    }
     return columns;
   }
   if (words.size() < 3) {
@@ -278,7 +341,10 @@ absl::StatusOr<Columns> ReadHead(const SourceFile& file, char mark, Lines* lines
                      "three numbers or more a line are expected, or names of columns first");
   }
   Columns named = ByComment(lines->comment(), mark, words.size());
-  if (!named.empty()) return named;
+  if (!named.empty()) {
+    lines->Expect(LayoutOf(named).shown, mark);
+    return named;
+  }
   return ByCount(words.size(), RangesOf(file.bytes, mark, words.size()));
 }
 
@@ -290,7 +356,8 @@ absl::StatusOr<Model> ReadTextPoints(const SourceFile& file, bool attributes) {
   const char mark = MarkOf(file.bytes);
   Lines lines(file.bytes);
   absl::string_view line;
-  const absl::StatusOr<Columns> columns = ReadHead(file, mark, &lines, &line);
+  std::optional<uint64_t> announced;
+  const absl::StatusOr<Columns> columns = ReadHead(file, mark, &lines, &line, &announced);
   if (!columns.ok()) return columns.status();
   if (columns->size() >= kMostColumns) {
     return FileError(file, absl::StrCat("has ", kMostColumns, " columns or more"),
@@ -311,11 +378,12 @@ absl::StatusOr<Model> ReadTextPoints(const SourceFile& file, bool attributes) {
   if (!table.ok()) return table.status();
   table->SetAttributes(std::move(names));
   std::vector<double> values(numbers.size());
-  uint64_t beyond = 0;                          // words, lines
+  uint64_t beyond = 0, rows = 0;                // words, lines
   bool has_points = false, has_commas = false;  // decimal points and decimal commas
   do {
-    const auto words = WordsOf(line, mark, columns->size());
+    const auto words = WordsOf(line, lines, mark, columns->size());
     PointRow row = {};
+    ++rows;
     beyond += words.size() - std::min(words.size(), columns->size());
     for (size_t c = 0; c < columns->size(); ++c) {
       if (!layout.shown[c]) continue;
@@ -356,8 +424,13 @@ absl::StatusOr<Model> ReadTextPoints(const SourceFile& file, bool attributes) {
   }
   Model model =
       std::move(*table).Finish(file, file.extension == "csv" ? "CSV points" : "XYZ points");
+  if (announced && *announced != rows) {
+    AddNote(absl::StrCat("its first line announces ", *announced, " points, but it has ", rows),
+            &model);
+  }
   if (!attributes) AddLeftOut("other columns", layout.others.size(), &model);
   AddLeftOut("words beyond the columns", beyond, &model);
+  AddLeftOut("points in comments", lines.points_in_comments(), &model);
   return model;
 }
 

@@ -7,12 +7,12 @@
 
 namespace voxeld::voxelctl {
 
-// Reads one point per line, with numbers separated by blanks, tabs, commas or semicolons. # and //
-// begin comments, and a line of one number at the beginning is a count and is skipped. The first
-// line may name the columns (point_table.h). Otherwise they are x y z, x y z intensity, x y z r g b
-// (or a normal, if none of these numbers is beyond −1 to 1 and one is negative), x y z intensity r
-// g b, or x y z r g b nx ny nz. Colours range to 255, or to 1 if none of them is greater than 1.
-// Errors: InvalidArgument with the line's number.
+// A point a line, numbers parted by blanks, tabs, commas or semicolons; # and // begin comments at the beginning of a line and after a
+// blank; a line of one whole number at the beginning is a count, and the model's note says if it is wrong. Columns are what a first line of names says
+// (point_table.h); without one x y z, x y z intensity, x y z r g b (or a normal, where no number of these is
+// beyond −1 to 1 and one is negative), x y z intensity r g b, or x y z r g b nx ny nz. Colours go to 255, or, where none of them is
+// greater than 1, to 1.
+// InvalidArgument with the line's number.
 absl::StatusOr<Model> ReadTextPoints(const SourceFile& file, bool attributes = false);
 
 }  // namespace voxeld::voxelctl
