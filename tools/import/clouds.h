@@ -14,11 +14,10 @@ namespace voxeld::voxelctl {
 // files (.laz) are refused by name.
 absl::StatusOr<Model> ReadLasPoints(const SourceFile& file, bool attributes = false);
 
-// Reads clouds of the Point Cloud Library (.pcd, version 0.7 and earlier), as text, binary and
-// compressed. Uses the fields x, y, z; rgb or rgba (packed, as a float or an integer) or r, g, b;
-// normal_x, normal_y, normal_z; intensity. Points that are not finite, for example of rays without
-// a hit, are left out and counted. With `attributes`, the other fields and the intensity become
-// attributes. Errors: InvalidArgument with the line of the header or the point.
+// Clouds of the Point Cloud Library (.pcd, version 0.7 and before), as text, binary and compressed. Takes the fields x, y, z; rgb or rgba
+// (packed, as a float or a whole number) or r, g, b; normal_x, normal_y, normal_z; intensity. Points that are not finite, as of rays that
+// met nothing, are left out and counted, and so is a viewpoint: points have the coordinates of the file. With `attributes` the other fields and the intensity are attributes. InvalidArgument names the
+// line of the header or the point.
 absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file, bool attributes = false);
 
 }  // namespace voxeld::voxelctl

@@ -52,6 +52,7 @@ struct PcdHeader {
   Data data = Data::kAscii;
   size_t body = 0;  // offset of the points
   uint64_t point_bytes = 0;
+  bool has_viewpoint = false;  // other than that at the origin which looks straight ahead
 };
 
 constexpr uint64_t kMostPointBytes = 4096;
@@ -62,6 +63,17 @@ using Words = std::vector<absl::string_view>;
 absl::Status Wrong(const SourceFile& file, size_t line, absl::string_view found,
                    absl::string_view expected) {
   return FileError(file, absl::StrCat("line ", line, " ", found), expected);
+}
+
+// Whether the words of VIEWPOINT are a translation by 0 and a quaternion, w first, that does not turn.
+bool IsPlainViewpoint(const Words& words) {
+  constexpr std::array<double, 7> kPlain = {0, 0, 0, 1, 0, 0, 0};
+  if (words.size() != kPlain.size() + 1) return false;
+  for (size_t i = 0; i < kPlain.size(); ++i) {
+    const std::optional<double> value = NumberOfWord(words[i + 1]);
+    if (!value || (i < 3 ? *value : std::abs(*value)) != kPlain[i]) return false;
+  }
+  return true;
 }
 
 // One line of the header. `done`: it was the last.
@@ -111,7 +123,8 @@ absl::Status TakeHeaderLine(const SourceFile& file, size_t line, const Words& wo
   if (number != nullptr && (words.size() != 2 || !absl::SimpleAtoi(words[1], number))) {
     return Wrong(file, line, absl::StrCat("has no number for ", key), "one is expected");
   }
-  if (key != "DATA") return absl::OkStatus();  // VERSION, VIEWPOINT and unknown keys
+  if (key == "VIEWPOINT") out->has_viewpoint = !IsPlainViewpoint(words);
+  if (key != "DATA") return absl::OkStatus();  // VERSION and what others may add
   *done = true;
   const absl::string_view data = words.size() > 1 ? words[1] : "";
   if (data == "ascii") return absl::OkStatus();
@@ -147,6 +160,12 @@ absl::StatusOr<PcdHeader> ReadPcdHeader(const SourceFile& file) {
   }
   for (const Field& field : out.fields) {
     if (field.size == 0) return FileError(file, "has no line SIZE", "a PCD header is expected");
+    if (out.data != Data::kAscii && field.type == 'F' && field.size < 4 && !IsPadding(field)) {
+      return FileError(file,
+                       absl::StrCat("has field ", EscapeForTerminal(field.name),
+                                    " of TYPE F and SIZE ", field.size),
+                       "floating-point numbers have 4 or 8 bytes");
+    }
     out.point_bytes += uint64_t{field.size} * field.count;
   }
   if (out.points == 0 || out.points > kMaxModelVertices || out.point_bytes > kMostPointBytes) {
@@ -167,7 +186,7 @@ double As(const char* at) {
 double ValueOf(const Field& field, const char* at) {
   switch (field.type) {
     case 'F':
-      return field.size == 8 ? As<double>(at) : field.size == 4 ? As<float>(at) : 0;
+      return field.size == 8 ? As<double>(at) : field.size == 4 ? As<float>(at) : std::nan("");
     case 'I':
       return field.size == 1   ? As<int8_t>(at)
              : field.size == 2 ? As<int16_t>(at)
@@ -245,15 +264,37 @@ PcdPoint EmptyPoint(const PcdHeader& header) {
   return point;
 }
 
-absl::Status ReadAscii(const SourceFile& file, const PcdHeader& header, TakePoint take) {
+// Removes the first word and the blanks behind it. Returns: the word; empty if there is none.
+absl::string_view TakeWordOf(absl::string_view* line) {
+  const absl::string_view word = line->substr(0, line->find_first_of(" \t\r"));
+  line->remove_prefix(word.size());
+  *line = absl::StripLeadingAsciiWhitespace(*line);
+  return word;
+}
+
+// What the data have and points do not.
+struct Surplus {
+  uint64_t points = 0;  // beyond the header's number
+  uint64_t words = 0;   // of lines, beyond the fields
+};
+
+// A line is a point.
+absl::Status ReadAscii(const SourceFile& file, const PcdHeader& header, TakePoint take,
+                       Surplus* surplus) {
   absl::string_view rest = absl::string_view(file.bytes).substr(header.body);
   PcdPoint point = EmptyPoint(header), ignored = point;
-  for (uint64_t i = 0; i < header.points; ++i) {
+  *surplus = {};
+  for (uint64_t i = 0; i < header.points || !rest.empty();) {
+    absl::string_view line =
+        rest.empty() ? rest : absl::StripLeadingAsciiWhitespace(TakeLine(&rest));
+    if (line.empty() && !rest.empty()) continue;
+    if (i >= header.points) {
+      surplus->points += line.empty() ? 0 : 1;
+      continue;
+    }
     for (const Field& field : header.fields) {
       for (uint32_t k = 0; k < field.count; ++k) {
-        rest = absl::StripLeadingAsciiWhitespace(rest);
-        const absl::string_view word = rest.substr(0, rest.find_first_of(" \t\r\n"));
-        rest.remove_prefix(word.size());
+        const absl::string_view word = TakeWordOf(&line);
         if (!TakeWord(field, word, k == 0 ? &point : &ignored)) {
           return FileError(
               file,
@@ -266,20 +307,24 @@ absl::Status ReadAscii(const SourceFile& file, const PcdHeader& header, TakePoin
         }
       }
     }
+    while (!TakeWordOf(&line).empty()) ++surplus->words;
     if (absl::Status status = take(point, i); !status.ok()) return status;
+    ++i;
   }
   return absl::OkStatus();
 }
 
 // Reads points one after another, or field after field (`by_field`), as compressed data store them.
 absl::Status ReadBinary(const SourceFile& file, const PcdHeader& header, absl::string_view bytes,
-                        bool by_field, TakePoint take) {
-  if (bytes.size() < header.points * header.point_bytes) {
+                        bool by_field, TakePoint take, Surplus* surplus) {
+  const uint64_t there = bytes.size() / header.point_bytes;
+  if (there < header.points) {
     return FileError(file,
                      absl::StrCat("has ", bytes.size(), " bytes of data for ", header.points,
                                   " points of ", header.point_bytes, TextModeHint(file.bytes)),
                      "the file is truncated or damaged");
   }
+  *surplus = {.points = there - header.points};
   PcdPoint point = EmptyPoint(header);
   for (uint64_t i = 0; i < header.points; ++i) {
     uint64_t before = 0;  // bytes of the fields before it
@@ -340,12 +385,16 @@ absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file, bool attributes) {
     field.attribute = names.size();
     names.push_back(field.name);
   }
-  uint64_t others = 0;
+  uint64_t others = 0, further = 0;
   for (size_t f = 0; f < header->fields.size(); ++f) {
     Field& field = header->fields[f];
     field.shown = layout.shown[f];
     if (IsPadding(field)) continue;
-    if (!field.shown && !field.attribute) ++others;
+    if (field.shown || field.attribute) {
+      further += field.count - 1;
+    } else {
+      ++others;
+    }
     if (field.shown && IsColor(*field.shown)) {
       floats |= field.type == 'F';
       wide |= field.type != 'F' && field.size > 1;
@@ -357,12 +406,13 @@ absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file, bool attributes) {
     if (!bytes.ok()) return bytes.status();
     decompressed = *std::move(bytes);
   }
+  Surplus surplus;
   const auto read = [&](TakePoint take) {
-    if (header->data == Data::kAscii) return ReadAscii(file, *header, take);
+    if (header->data == Data::kAscii) return ReadAscii(file, *header, take, &surplus);
     const bool by_field = header->data == Data::kCompressed;
     return ReadBinary(file, *header,
                       by_field ? decompressed : absl::string_view(file.bytes).substr(header->body),
-                      by_field, take);
+                      by_field, take, &surplus);
   };
   ChannelRange range;
   if (!floats) range.Add(255);
@@ -391,6 +441,10 @@ absl::StatusOr<Model> ReadPcdPoints(const SourceFile& file, bool attributes) {
   Model model = std::move(*table).Finish(file, "PCD points");
   AddLeftOut("points that are not finite", nowhere, &model);
   AddLeftOut("other fields", others, &model);
+  AddLeftOut("further values of fields", further, &model);
+  AddLeftOut("points beyond the header's number", surplus.points, &model);
+  AddLeftOut("words beyond the fields", surplus.words, &model);
+  AddLeftOut("viewpoints", header->has_viewpoint ? 1 : 0, &model);
   return model;
 }
 

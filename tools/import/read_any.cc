@@ -54,7 +54,7 @@ const std::vector<Reader>& Readers() {
         "text, binary and compressed; packed and single colours, intensities, normals; other "
         "fields "
         "by --color-by",
-        "all but the first value of a field", "–"},
+        "all but the first value of a field, viewpoints", "–"},
        [](const SourceFile& file, const ImportOptions& options) {
          return ReadPcdPoints(file, options.attributes);
        }},

@@ -849,6 +849,69 @@ TEST_F(Clouds, PcdColoursThatAreNotKnownAreCounted) {
       (std::vector<LeftOut>{{"colours and intensities that are not a number (shown white)", 1}}));
 }
 
+TEST_F(Clouds, PcdNumbersOfNoTypeAreRefused) {
+  const auto binary = [](const std::string& fields, const std::string& sizes, size_t bytes) {
+    return absl::StrCat("FIELDS ", fields, "\nSIZE ", sizes,
+                        "\nTYPE F F F F\nPOINTS 1\nDATA binary\n", std::string(bytes, '\0'));
+  };
+  EXPECT_THAT(Error("a.pcd", binary("x y z w", "4 4 2 4", 14)),
+              HasSubstr("has field z of TYPE F and SIZE 2; floating-point numbers have 4 or 8"));
+  EXPECT_THAT(Error("a.pcd", binary("x y z w", "4 4 4 1", 13)), HasSubstr("has field w of TYPE F"));
+  EXPECT_THAT(Import("a.pcd", binary("x y z _", "4 8 4 2", 18)), IsOk())
+      << "padding has no numbers";
+}
+
+TEST_F(Clouds, PcdCountsWhatItsDataHaveBeside) {
+  const auto left_out = [&](const std::string& bytes) {
+    const auto model = Import("a.pcd", bytes);
+    EXPECT_THAT(model, IsOk());
+    if (!model.ok()) return std::vector<LeftOut>();
+    EXPECT_EQ(model->parts.at(0).positions.size(), 2u);
+    return model->left_out;
+  };
+  const std::string two = AsciiPcd("x y z", "F F F", "0 0 0\n\n  1 0 0 \n");
+  EXPECT_EQ(left_out(two + "\n \n"), (std::vector<LeftOut>{}));
+  EXPECT_EQ(left_out(two + "2 0 0\n\n3 0 0"),
+            (std::vector<LeftOut>{{"points beyond the header's number", 2}}));
+  // A word too many does not move the points that follow.
+  EXPECT_EQ(left_out(AsciiPcd("x y z", "F F F", "0 0 0 9 9\n1 0 0 9\n")),
+            (std::vector<LeftOut>{{"words beyond the fields", 3}}));
+  EXPECT_THAT(Error("a.pcd", AsciiPcd("x y z", "F F F", "0 0\n1 0 0\n")),
+              HasSubstr("point 0 of 2 has nothing for z"));
+  EXPECT_EQ(left_out(PcdHeader("2", "binary") + PcdPoint(0, 0, 0, 0) + PcdPoint(1, 0, 0, 0) +
+                     PcdPoint(2, 0, 0, 0)),
+            (std::vector<LeftOut>{{"other fields", 1}, {"points beyond the header's number", 1}}));
+  // The first of two fields with one name.
+  const auto twice = Import("a.pcd", AsciiPcd("x y z z", "F F F F", "0 0 1 5\n0 0 2 5\n"));
+  ASSERT_THAT(twice, IsOk());
+  EXPECT_THAT(twice->parts[0].positions, ElementsAre(Point3{0, 0, 1}, Point3{0, 0, 2}));
+  EXPECT_EQ(twice->left_out, (std::vector<LeftOut>{{"other fields", 1}}));
+  // Values after the first, also of a field that is an attribute.
+  const auto several =
+      ReadHere(folder_.Write("a.pcd",
+                             "FIELDS x y z n\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 3\nPOINTS "
+                             "1\nDATA ascii\n0 0 0 1 2 3\n"),
+               {.attributes = true});
+  ASSERT_THAT(several, IsOk());
+  EXPECT_EQ(several->left_out, (std::vector<LeftOut>{{"further values of fields", 2}}));
+}
+
+// Points stay where the file has them.
+TEST_F(Clouds, PcdViewpointsAreCounted) {
+  const auto count = [&](const std::string& viewpoint) {
+    const auto model = Import("a.pcd", absl::StrCat("VIEWPOINT ", viewpoint, "\n",
+                                                    AsciiPcd("x y z", "F F F", "0 0 0\n1 0 0\n")));
+    EXPECT_THAT(model, IsOk());
+    return model.ok() ? model->left_out : std::vector<LeftOut>();
+  };
+  const std::vector<LeftOut> one = {{"viewpoints", 1}};
+  EXPECT_THAT(count("0 0 0 1 0 0 0"), IsEmpty());
+  EXPECT_THAT(count("0.0 -0 0 -1 0 0 0"), IsEmpty()) << "the same turn";
+  EXPECT_EQ(count("0 0 0 0.70710678 0 -0.70710678 0"), one);
+  EXPECT_EQ(count("0 0 2 1 0 0 0"), one);
+  EXPECT_EQ(count("0 0 0 1 0 0"), one);
+}
+
 // "#" and "//" are comments at the beginning of a line and after a blank, but not in a word, and not in place of one.
 TEST_F(Clouds, WordsOfTextMayLookLikeComments) {
   const auto numbers = [&](const std::string& text) {
