@@ -222,6 +222,36 @@ TEST(PlyMesh, AFacesColorGoesBeforeItsVertices) {
   EXPECT_EQ(part.positions.size(), 6u) << "corners of two colors are two vertices";
   for (size_t i = 0; i < 6; ++i)
     EXPECT_EQ(part.colors[part.indices[i]], i < 3 ? (Rgb{255, 0, 0}) : (Rgb{0, 0, 255}));
+  EXPECT_EQ(model->left_out,
+            (std::vector<LeftOut>{{"colours of vertices whose faces have others", 4}}));
+}
+
+TEST(PlyMesh, VerticesMayHaveTheColorsOfTheirFaces) {
+  const std::string colors = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  const absl::StatusOr<Model> model =
+      Ply(AsciiPly(VertexElement(4) + colors + kFace + colors,
+                   "0 0 0 9 8 7\n4 0 0 9 8 7\n4 0 1 9 8 7\n0 0 1 9 8 6\n4 0 1 2 3 9 8 7\n"));
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(model->left_out,
+            (std::vector<LeftOut>{{"colours of vertices whose faces have others", 1}}));
+}
+
+TEST(PlyMesh, ColorsThatAreNotFiniteAreWhiteAndCounted) {
+  const std::string colors = "property float red\nproperty float green\nproperty float blue\n";
+  const std::vector<LeftOut> one = {
+      {"colours and intensities that are not a number (shown white)", 1}};
+  const absl::StatusOr<Model> of_vertices = Ply(AsciiPly(
+      VertexElement(3) + colors + kFace, "0 0 0 nan 0 0\n4 0 0 1 0 0\n4 0 1 0 0 1\n3 0 1 2\n"));
+  ASSERT_THAT(of_vertices, IsOk());
+  EXPECT_EQ(of_vertices->parts[0].colors,
+            (std::vector<Rgb>{{255, 255, 255}, {255, 0, 0}, {0, 0, 255}}));
+  EXPECT_EQ(of_vertices->left_out, one);
+  const absl::StatusOr<Model> of_faces = Ply(AsciiPly(
+      VertexElement(4) + "element face 2\nproperty list uchar int vertex_indices\n" + colors,
+      absl::StrCat(kSquare, "3 0 1 2 0 inf 0\n3 0 2 3 0 1 0\n")));
+  ASSERT_THAT(of_faces, IsOk());
+  EXPECT_EQ(of_faces->parts[0].colors[0], (Rgb{255, 255, 255}));
+  EXPECT_EQ(of_faces->left_out, one);
 }
 
 TEST(PlyMesh, IntensitiesOfVerticesAreOtherProperties) {
@@ -297,15 +327,25 @@ TEST(PlyMesh, AConcavePolygonIsFilledWithinItsOutline) {
   }
 }
 
-TEST(PlyMesh, FacesOfFewerThanThreeVerticesAreLeftOut) {
-  ExpectSquare(
-      Ply(AsciiPly(VertexElement(4) + "element face 4\nproperty list uchar int vertex_indices\n",
-                   absl::StrCat(kSquare, "0\n1 2\n2 0 1\n4 0 1 2 3\n"))));
+TEST(PlyMesh, FacesOfFewerThanThreeVerticesAreCounted) {
+  const absl::StatusOr<Model> faces =
+      Ply(AsciiPly(VertexElement(6) + "element face 4\nproperty list uchar int vertex_indices\n",
+                   absl::StrCat(kSquare, "9 9 9\n8 8 8\n0\n1 2\n2 4 5\n4 0 1 2 3\n")));
+  ExpectSquare(faces);
+  EXPECT_EQ(faces->left_out, (std::vector<LeftOut>{{"faces of fewer than three vertices", 3}}));
+  // A piece of two in a strip, and an end behind which nothing follows.
+  const absl::StatusOr<Model> strip = Ply(
+      AsciiPly(VertexElement(4) + "element tristrips 1\nproperty list uchar int vertex_indices\n",
+               absl::StrCat(kSquare, "9 0 1 -1 1 0 2 3 -1 -1\n")));
+  ExpectSquare(strip);
+  EXPECT_EQ(strip->left_out, (std::vector<LeftOut>{{"faces of fewer than three vertices", 1}}));
 }
 
-TEST(PlyMesh, AVertexThatNoFaceHasMayBeNowhere) {
-  ExpectSquare(
-      Ply(AsciiPly(VertexElement(5) + kFace, absl::StrCat(kSquare, "nan nan nan\n4 0 1 2 3\n"))));
+TEST(PlyMesh, AVertexThatNoFaceHasMayBeNowhereAndIsCounted) {
+  const absl::StatusOr<Model> model = Ply(
+      AsciiPly(VertexElement(6) + kFace, absl::StrCat(kSquare, "nan nan nan\n7 7 7\n4 0 1 2 3\n")));
+  ExpectSquare(model);
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"vertices that no face has", 2}}));
 }
 
 struct BadPlyMesh {

@@ -24,7 +24,8 @@ constexpr size_t kMostFacesAround = 64;  // a vertex of more faces gets one norm
 // Triangles as they are read: three vertices each, and the color of the face to which each belongs.
 struct PlyTriangles {
   std::vector<uint32_t> vertices;
-  std::vector<Rgb> colors;  // may be empty
+  std::vector<Rgb> colors;  // or none
+  uint64_t too_few = 0;     // faces and pieces of strips with fewer than three vertices
 };
 
 // The lists of vertices of an element, one per entry, with colors.
@@ -133,7 +134,10 @@ absl::StatusOr<PlyTriangles> Triangulated(const SourceFile& file, const PlyFaces
   size_t first = 0;
   for (size_t f = 0; f < faces.sizes.size(); first += faces.sizes[f++]) {
     const size_t size = faces.sizes[f];
-    if (size < 3) continue;
+    if (size < 3) {
+      ++triangles.too_few;
+      continue;
+    }
     corners.clear();
     for (size_t i = 0; i < size; ++i) corners.push_back(positions[faces.vertices[first + i]]);
     cut.clear();
@@ -151,9 +155,13 @@ absl::StatusOr<PlyTriangles> Unstripped(const SourceFile& file, const PlyFaces& 
   PlyTriangles triangles;
   size_t first = 0;
   for (size_t s = 0; s < strips.sizes.size(); first += strips.sizes[s++]) {
+    const size_t end = first + strips.sizes[s];
     size_t begun = first;
-    for (size_t i = first; i < first + strips.sizes[s]; ++i) {
-      if (strips.vertices[i] == kRestart) begun = i + 1;
+    for (size_t i = first; i <= end; ++i) {
+      if (i == end || strips.vertices[i] == kRestart) {
+        if (i == begun + 1 || i == begun + 2) ++triangles.too_few;
+        begun = i + 1;
+      }
       if (i < begun + 2) continue;
       if (triangles.vertices.size() + 3 > kMaxModelIndices) return TooManyIndices(file);
       const bool turned = (i - begun) % 2 == 1;
@@ -251,7 +259,33 @@ absl::StatusOr<Part> Surface(const SourceFile& file, const PlyVertices& vertices
   return std::move(surface).Finish();
 }
 
-// Gives each corner of the triangles a vertex of its own, with the attributes of the file's vertex.
+// Counts what the surfaces do not show of vertices and colors.
+void CountUnseen(const PlyVertices& vertices, const PlyFaces& faces, const PlyTriangles& triangles,
+                 std::vector<uint8_t>* is_used, Model* model) {
+  for (const uint32_t v : faces.vertices) {
+    if (v != kRestart) (*is_used)[v] = 1;
+  }
+  AddLeftOut("faces of fewer than three vertices", triangles.too_few, model);
+  AddLeftOut(kUnknownColors, faces.unknown.size(), model);
+  if (vertices.colors.empty()) return;
+  std::vector<uint8_t> is_counted(vertices.colors.size());
+  uint64_t covered = 0, unknown = 0;
+  for (size_t c = 0; c < triangles.vertices.size(); ++c) {
+    const uint32_t v = triangles.vertices[c];
+    if (is_counted[v] != 0) continue;
+    const bool is_covered =
+        !triangles.colors.empty() && triangles.colors[c / 3] != vertices.colors[v];
+    const bool is_unknown =
+        triangles.colors.empty() && std::ranges::binary_search(vertices.unknown, v);
+    covered += is_covered ? 1 : 0;
+    unknown += is_unknown ? 1 : 0;
+    is_counted[v] = is_covered || is_unknown ? 1 : 0;
+  }
+  AddLeftOut("colours of vertices whose faces have others", covered, model);
+  AddLeftOut(kUnknownColors, unknown, model);
+}
+
+// Gives each corner of the triangles a vertex of its own, with the attributes of the vertex that it is in the file.
 void AddAttributes(const PlyVertices& vertices, const PlyTriangles& triangles, Part* part) {
   if (vertices.attributes.empty()) return;
   Part apart;
@@ -306,13 +340,18 @@ absl::StatusOr<Model> ReadPlyMesh(const SourceFile& file, const PlyHeader& heade
   if (!of_faces.ok()) return of_faces.status();
   const absl::StatusOr<PlyTriangles> of_strips = Unstripped(file, *strips);
   if (!of_strips.ok()) return of_strips.status();
-  for (const PlyTriangles* triangles : {&*of_faces, &*of_strips}) {
+  std::vector<uint8_t> is_used(vertices->positions.size());
+  for (const auto& [listed, triangles] :
+       {std::pair(&*faces, &*of_faces), {&*strips, &*of_strips}}) {
+    CountUnseen(*vertices, *listed, *triangles, &is_used, &model);
     if (triangles->vertices.empty()) continue;
     absl::StatusOr<Part> part = Surface(file, *vertices, *triangles);
     if (!part.ok()) return part.status();
     AddAttributes(*vertices, *triangles, &*part);
     model.parts.push_back(*std::move(part));
   }
+  AddLeftOut("vertices that no face has",
+             static_cast<uint64_t>(std::ranges::count(is_used, uint8_t{0})), &model);
   AddLeftOut("other properties of vertices", vertices->others, &model);
   AddLeftOut("other properties of faces", faces->others + strips->others, &model);
   AddLeftOut("entries of other elements", header.OtherEntries(), &model);
