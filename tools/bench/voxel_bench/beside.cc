@@ -95,9 +95,11 @@ absl::StatusOr<nlohmann::json> RunBeside(const BesideOptions& options, const Sur
        .config = "[limits]\nmax_uncommitted_bytes = 1_073_741_824\nmax_operations_per_commit = "
                  "1_000_100\n"});
   if (!daemon.ok()) return daemon.status();
+  // Built before the streams begin: the daemon closes a stream that does not open its session within some seconds.
+  Frames large_frame = LargeFrame(options.entities);
   Loop loop(with.interrupted);
   Party small(loop, (*daemon)->unix_target(), OneLine());
-  Party large(loop, (*daemon)->unix_target(), LargeFrame(options.entities));
+  Party large(loop, (*daemon)->unix_target(), std::move(large_frame));
   Latencies* now = nullptr;
   uint64_t seen = 0;  // the newest frame that was shown
   small.session.OnReceipt([&](const v1::Receipt& receipt) {
