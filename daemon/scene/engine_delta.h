@@ -23,6 +23,7 @@
 #include <map>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
@@ -44,7 +45,10 @@ class EngineScene {
   // work. It must not call back. If `choose` is empty, the engine draws everything.
   explicit EngineScene(std::function<void()> breathe = nullptr, Choose choose = nullptr);
 
-  // Returns: the snapshot that the engine holds (since the last Plan); null: none.
+  // Another owner does what will not wait; it must not be at work.
+  void SetBreathe(std::function<void()> breathe) { breathe_ = std::move(breathe); }
+
+  // Of what is held (since the last Plan); null: nothing.
   const SnapshotPtr& held() const { return held_; }
 
   // Computes the delta from the held snapshot to `next`, and treats `next` as held from now on.
@@ -107,7 +111,7 @@ class EngineScene {
   void GiveBackSlots();
   void Breathe();
 
-  const std::function<void()> breathe_;
+  std::function<void()> breathe_;
   const Choose choose_;
   uint32_t since_breath_ = 0;
 

@@ -53,7 +53,20 @@ class PersistentMap {
     return true;
   }
 
-  // Calls fn(const K&, const V&) in ascending order.
+  // A copy whose keys from `from` up to, but not including, `to` are those of `other`. Costs O(log n), and a visit to
+  // each of those keys in both maps.
+  PersistentMap WithRangeOf(const PersistentMap& other, const K& from, const K& to) const {
+    auto [below, not_below] = SplitBefore(root_, from);
+    auto [mine, above] = SplitBefore(std::move(not_below), to);
+    auto [theirs_below, theirs_not_below] = SplitBefore(other.root_, from);
+    auto [theirs, theirs_above] = SplitBefore(std::move(theirs_not_below), to);
+    PersistentMap joined;
+    joined.size_ = size_ - Count(mine.get()) + Count(theirs.get());
+    joined.root_ = Merge(Merge(std::move(below), std::move(theirs)), std::move(above));
+    return joined;
+  }
+
+  // fn(const K&, const V&), ascending.
   template <typename Fn>
   void ForEach(Fn&& fn) const {
     Visit(root_.get(), fn);
@@ -191,7 +204,25 @@ class PersistentMap {
     return {at->left, at->right};
   }
 
-  // Requires: every key of `a` is less than every key of `b`.
+  // Those less than `key`, and the others.
+  static std::pair<Ref, Ref> SplitBefore(Ref at, const K& key) {
+    if (!at) return {};
+    Node* node = Own(at);
+    if (at->key < key) {
+      auto [less, others] = SplitBefore(std::move(node->right), key);
+      node->right = std::move(less);
+      return {std::move(at), std::move(others)};
+    }
+    auto [less, others] = SplitBefore(std::move(node->left), key);
+    node->left = std::move(others);
+    return {std::move(less), std::move(at)};
+  }
+
+  static size_t Count(const Node* node) {
+    return node == nullptr ? 0 : 1 + Count(node->left.get()) + Count(node->right.get());
+  }
+
+  // Every key of `a` is less than every key of `b`.
   static Ref Merge(Ref a, Ref b) {
     if (!a) return b;
     if (!b) return a;

@@ -1,7 +1,9 @@
 #include "daemon/scene/scene_changes.h"
 
+#include <algorithm>
 #include <memory>
 #include <utility>
+#include <variant>
 
 namespace voxeld::daemon {
 namespace {
@@ -27,6 +29,43 @@ bool ListsSame(const Layer& a, const Layer& b) {
 // Returns: the previous layer with the same name, if it is still the same layer.
 const Layer* Same(const Layer* was, const Layer& is) {
   return was != nullptr && was->number == is.number ? was : nullptr;
+}
+
+// What is as much to do as a small entity.
+constexpr uint64_t kBytesPerUnit = 4096;
+// A layer that looks otherwise is only blended anew where its entities are.
+constexpr uint64_t kEntitiesPerUnitOfLook = 16;
+
+uint64_t SizeOf(const Layer& layer) { return layer.entities.size() + layer.bytes / kBytesPerUnit; }
+
+uint64_t SizeOf(const Entity& entity, uint64_t owner, const Snapshot& scene) {
+  const uint64_t bytes = entity.bytes / kBytesPerUnit;
+  if (const auto* group = std::get_if<GroupPtr>(&entity.data.content)) {
+    return std::max<uint64_t>(1, (*group)->parts.size()) + bytes;
+  }
+  if (const auto* instance = std::get_if<InstanceRef>(&entity.data.content)) {
+    const Object* const object = scene.FindObject({owner, instance->object});
+    return std::max<uint64_t>(1, object == nullptr ? 1 : object->drawables);
+  }
+  return 1 + bytes;
+}
+
+uint64_t ChangeOf(uint64_t owner, const Layer* was, const Layer* is, const Snapshot& after,
+                  uint64_t most) {
+  if (is == nullptr) return SizeOf(*was);
+  if (was == nullptr) return SizeOf(*is);
+  if (was->number != is->number) return SizeOf(*was) + SizeOf(*is);
+  if (was->transform != is->transform) return std::max(SizeOf(*was), SizeOf(*is));
+  uint64_t change = 0;
+  if (!ListsSame(*was, *is) || was->suppressed != is->suppressed) {
+    change = is->entities.size() / kEntitiesPerUnitOfLook;
+  }
+  EntityMap::DiffFrom(was->entities, is->entities, "",
+                      [&](const std::string&, const EntityPtr*, const EntityPtr* entity) {
+                        change += entity == nullptr ? 1 : SizeOf(**entity, owner, after);
+                        return change < most;
+                      });
+  return change;
 }
 
 template <typename T>
@@ -119,6 +158,56 @@ bool SceneChanges::TellEntities(const Layer* was, const Layer& is, SceneChangeVi
                           });
   if (whole) inside_.reset();
   return whole;
+}
+
+std::map<uint64_t, uint64_t> ChangesByOwner(const Snapshot& before, const Snapshot& after,
+                                            uint64_t most, const std::set<uint64_t>& skip) {
+  std::map<uint64_t, uint64_t> changes;
+  PersistentMap<OwnedName, LayerPtr>::Diff(
+      before.layers, after.layers,
+      [&](const OwnedName& key, const LayerPtr* was, const LayerPtr* is) {
+        if (skip.contains(key.owner)) return;
+        uint64_t& change = changes[key.owner];
+        if (change < most) change += ChangeOf(key.owner, Get(was), Get(is), after, most - change);
+      });
+  // Instances of an object that is defined otherwise now are drawn anew.
+  PersistentMap<OwnedName, ObjectPtr>::Diff(
+      before.objects, after.objects,
+      [&](const OwnedName& key, const ObjectPtr* was, const ObjectPtr* is) {
+        if (was == nullptr || is == nullptr || skip.contains(key.owner)) return;
+        uint64_t& change = changes[key.owner];
+        if (change >= most) return;
+        after.uses.ForEachFrom({key.owner, key.name, false, "", ""}, [&](const UseKey& use, bool) {
+          if (use.owner != key.owner || use.object != key.name || use.by_object) return false;
+          change += std::max<uint64_t>(1, (*is)->drawables);
+          return change < most;
+        });
+      });
+  return changes;
+}
+
+SnapshotPtr WithPartsOf(const Snapshot& scene, const Snapshot& part,
+                        const std::set<uint64_t>& owners) {
+  auto joined = std::make_shared<Snapshot>(scene);
+  for (const uint64_t owner : owners) {
+    const OwnedName from{owner, ""}, to{owner + 1, ""};
+    joined->layers = joined->layers.WithRangeOf(part.layers, from, to);
+    joined->objects = joined->objects.WithRangeOf(part.objects, from, to);
+    static constexpr OwnerTally kNothing;
+    const OwnerTally* const was = scene.owners.Find(owner);
+    const OwnerTally* const is = part.owners.Find(owner);
+    for (const auto count :
+         {&OwnerTally::drawables, &OwnerTally::layers, &OwnerTally::bytes, &OwnerTally::derived}) {
+      joined->total.*count +=
+          (is == nullptr ? kNothing : *is).*count - (was == nullptr ? kNothing : *was).*count;
+    }
+    if (is != nullptr) {
+      joined->owners.Put(owner, *is);
+    } else {
+      joined->owners.Erase(owner);
+    }
+  }
+  return joined;
 }
 
 }  // namespace voxeld::daemon

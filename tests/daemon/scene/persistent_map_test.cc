@@ -187,6 +187,51 @@ TEST(PersistentMap, ADifferenceCostsWhatDiffers) {
   EXPECT_LT(Counted::comparisons, 1000);  // 12 paths of a tree of 100,000
 }
 
+TEST(PersistentMap, TakesARangeOfKeysFromAnotherMap) {
+  std::mt19937 random(7);
+  const auto key = [&] { return absl::StrCat(random() % 60); };
+  for (int round = 0; round < 300; ++round) {
+    Map mine, theirs;
+    for (uint32_t i = random() % 40; i > 0; --i) mine.Put(key(), static_cast<int>(random() % 5));
+    if (random() % 2 == 0) theirs = mine;
+    for (uint32_t i = random() % 40; i > 0; --i) theirs.Put(key(), static_cast<int>(random() % 5));
+    const Model mine_before = ToModel(mine), theirs_before = ToModel(theirs);
+    std::string from = key(), to = key();
+    if (to < from) std::swap(from, to);
+    const Map joined = mine.WithRangeOf(theirs, from, to);
+    Model expected;
+    for (const auto& [k, value] : mine_before) {
+      if (k < from || k >= to) expected[k] = value;
+    }
+    for (const auto& [k, value] : theirs_before) {
+      if (k >= from && k < to) expected[k] = value;
+    }
+    EXPECT_EQ(ToModel(joined), expected);
+    EXPECT_EQ(joined.size(), expected.size());
+    EXPECT_EQ(ToModel(mine), mine_before);
+    EXPECT_EQ(ToModel(theirs), theirs_before);
+    // Its shape is that of any map with these keys, so that differences are found.
+    EXPECT_EQ(Diff(joined, mine), Diff(expected, mine_before));
+    Map built;
+    for (const auto& [k, value] : expected) built.Put(k, value);
+    EXPECT_TRUE(Diff(joined, built).empty());
+  }
+}
+
+TEST(PersistentMap, AMapThatTookARangeSharesWhatItTook) {
+  PersistentMap<int, Counted> a, b;
+  for (int i = 0; i < 100000; ++i) a.Put(i, {i});
+  for (int i = 0; i < 100000; ++i) b.Put(i, {-i});
+  const PersistentMap<int, Counted> joined = a.WithRangeOf(b, 1000, 90000);
+  Counted::comparisons = 0;
+  int changes = 0;
+  const PersistentMap<int, Counted> again = a.WithRangeOf(b, 1000, 90000);
+  PersistentMap<int, Counted>::Diff(joined, again,
+                                    [&](int, const Counted*, const Counted*) { ++changes; });
+  EXPECT_EQ(changes, 0);
+  EXPECT_LT(Counted::comparisons, 1000);
+}
+
 TEST(PersistentMap, VersionsMayBeUsedFromSeveralThreads) {
   Map base;
   for (int i = 0; i < 2000; ++i) base.Put(std::to_string(i), i);

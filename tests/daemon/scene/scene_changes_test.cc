@@ -280,5 +280,86 @@ TEST(SceneChanges, AnObjectIsNewsByItsOwnDefinitionOnly) {
   EXPECT_EQ(watcher.changes_told, 0);
 }
 
+// ------------------------------------------------------------------ how large changes are, by owner
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using ::testing::Pair;
+
+class ChangeSizes : public ::testing::Test {
+ protected:
+  ChangeSizes() {
+    f_.Commit(Put("a", "x", 1), Put("a", "y", 2), Put("a", "z", 3));
+    f_.Commit(other_, Put("a", "x", 1));
+    before_ = f_.store.snapshot();
+  }
+  std::map<uint64_t, uint64_t> Changes(uint64_t most = 1000) {
+    return ChangesByOwner(*before_, *f_.store.snapshot(), most);
+  }
+
+  StoreFixture f_;
+  const Author other_ = MakeAuthor(2, 12);
+  SnapshotPtr before_;
+};
+
+TEST_F(ChangeSizes, EachEntityThatIsPutMovedOrRemovedCounts) {
+  EXPECT_THAT(Changes(), IsEmpty());
+  f_.Commit(Put("a", "new", 1), Move("a", "x", Shift(1)), DeleteId("a", "y"));
+  EXPECT_THAT(Changes(), ElementsAre(Pair(1, 3)));
+  f_.Commit(other_, Put("b", "x", 1), Put("b", "y", 1));
+  EXPECT_THAT(Changes(), ElementsAre(Pair(1, 3), Pair(2, 2)));
+  EXPECT_THAT(ChangesByOwner(*before_, *f_.store.snapshot(), 1000, {1}), ElementsAre(Pair(2, 2)));
+}
+
+TEST_F(ChangeSizes, CountingStopsWhereItIsLarge) {
+  for (int i = 0; i < 100; ++i) f_.Commit(Put("a", std::to_string(i), 1));
+  EXPECT_THAT(Changes(10), ElementsAre(Pair(1, 10)));
+}
+
+TEST_F(ChangeSizes, ALayerThatMovesComesOrGoesCountsWithAllThatItHolds) {
+  f_.Commit(testing::SetLayer("a", std::nullopt, Shift(1)));
+  EXPECT_THAT(Changes(), ElementsAre(Pair(1, 3)));
+  f_.Commit(testing::SetLayer("a", false));
+  f_.Commit(testing::DeleteAllOf("a"));
+  EXPECT_THAT(Changes(), ElementsAre(Pair(1, 3)));
+  EXPECT_THAT(ChangesByOwner(*f_.store.snapshot(), *before_, 1000), ElementsAre(Pair(1, 3)));
+}
+
+TEST_F(ChangeSizes, AnEntityCountsByItsBytesAndAnInstanceByWhatItDraws) {
+  f_.Commit(Put("a", "large", testing::Entity1(Dots(0, 1, 10'000))));
+  EXPECT_GE(Changes()[1], 10'000u * 12 / 4096);
+  before_ = f_.store.snapshot();
+  f_.Commit(Define("o", {{Dots(1), {}}, {Dots(2), {}}}));
+  EXPECT_EQ(Changes()[1], 0u);
+  f_.Commit(testing::PutInstance("a", "i", "o"), testing::PutInstance("a", "j", "o"));
+  EXPECT_EQ(Changes()[1], 4u);
+  before_ = f_.store.snapshot();
+  f_.Commit(Define("o", {{Dots(1), {}}, {Dots(2), {}}, {Dots(3), {}}}));
+  EXPECT_EQ(Changes()[1], 6u) << "both are drawn anew";
+}
+
+TEST_F(ChangeSizes, PartsOfAnotherSnapshotAreThoseOfTheOwnersAlone) {
+  f_.Commit(Define("o", {{Dots(1), {}}}), DeleteId("a", "x"), Put("b", "new", 1));
+  f_.Commit(other_, Put("a", "x", 9), Put("b", "y", 1));
+  const Snapshot& now = *f_.store.snapshot();
+  const SnapshotPtr joined = WithPartsOf(now, *before_, {1});
+  EXPECT_EQ(joined->number, now.number);
+  EXPECT_EQ(joined->FindLayer({1, "a"}), before_->FindLayer({1, "a"}));
+  EXPECT_EQ(joined->FindLayer({1, "b"}), nullptr);
+  EXPECT_EQ(joined->FindObject({1, "o"}), nullptr);
+  EXPECT_EQ(joined->FindLayer({2, "a"}), now.FindLayer({2, "a"}));
+  EXPECT_EQ(joined->FindLayer({2, "b"}), now.FindLayer({2, "b"}));
+  EXPECT_EQ(joined->layers.size(), 3u);
+  EXPECT_EQ(*joined->owners.Find(1), *before_->owners.Find(1));
+  EXPECT_EQ(*joined->owners.Find(2), *now.owners.Find(2));
+  OwnerTally total = *joined->owners.Find(1);
+  total.drawables += joined->owners.Find(2)->drawables;
+  total.layers += joined->owners.Find(2)->layers;
+  total.bytes += joined->owners.Find(2)->bytes;
+  total.derived += joined->owners.Find(2)->derived;
+  EXPECT_EQ(joined->total, total);
+  EXPECT_EQ(WithPartsOf(now, Snapshot(), {1, 2})->total, OwnerTally());
+}
+
 }  // namespace
 }  // namespace voxeld::daemon
