@@ -377,8 +377,13 @@ void Core::Impl::Ride(Session& session, const WaitingCommit& commit, const Stage
     for (const auto& slot : displays_) hold.displays.insert(slot->info.name);
     holding_.insert(session.id);
   }
-  const Rider rider{session.id,          commit.commit.frame_id,       commit.sequence,
-                    session.incarnation, !session.options.no_outcomes, stages};
+  const Rider rider{.session = session.id,
+                    .frame_id = commit.commit.frame_id,
+                    .sequence = commit.sequence,
+                    .incarnation = session.incarnation,
+                    .asked = !session.options.no_outcomes,
+                    .stages = stages,
+                    .owner = session.owner};
   session.owed_outcomes += displays_.size();
   budget_->ChargeAnyway(Budget::Use::kOwed, displays_.size() * kOwedBytes);
   for (const auto& slot : displays_) {

@@ -58,6 +58,10 @@ struct CoreOptions {
   // when its engine was lost.
   std::function<absl::StatusOr<std::unique_ptr<gpu::Engine>>(const gpu::EngineOptions&)>
       make_engine;
+  // From how large a change of an owner on (ChangesByOwner) displays make it ready beside what they draw.
+  uint64_t large_change = kLargeChange;
+  // threads = false only: runs that work, as FramePipeline::Options has it.
+  std::function<void(std::function<void()>)> run_aside;
   // What becomes of engines in processes of their own; on the core's thread. May be empty.
   std::function<void(const EngineEvent&)> engine_event;
   // A display's state, whenever it or its reason changes; on the core's thread. May be empty.

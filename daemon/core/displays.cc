@@ -82,6 +82,13 @@ absl::Status Core::Impl::AddDisplay(std::unique_ptr<display::Display> display,
   options.retire = [retired = retired_](std::shared_ptr<const void> what) {
     retired->Post([what = std::move(what)] {});
   };
+  options.large_change = options_.large_change;
+  options.run_aside = options_.run_aside;
+  if (options_.threads) {
+    options.run_aside = [aside = aside_](std::function<void()> work) {
+      aside->Post(std::move(work));
+    };
+  }
   if (options_.engine_event) {
     options.tell_engine = [loop = loop_, tell = options_.engine_event,
                            name = info.name](EngineEvent event) {

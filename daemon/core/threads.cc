@@ -1,4 +1,7 @@
 // Core's threads: start, stop within a limit, and a simulation's steps.
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -7,6 +10,11 @@
 #include "daemon/core/core_impl.h"
 
 namespace voxeld::daemon {
+namespace {
+
+constexpr int kAsideNice = 10;
+
+}  // namespace
 
 Core::Impl::Impl(CoreOptions options, sync::Clock& clock)
     : options_(std::move(options)),
@@ -14,6 +22,7 @@ Core::Impl::Impl(CoreOptions options, sync::Clock& clock)
       started_ns_(clock.Now()),
       loop_(std::make_shared<Loop>(clock)),
       retired_(options_.threads ? std::make_shared<Loop>(clock) : loop_),
+      aside_(std::make_shared<Loop>(clock)),
       store_(options_.limits),
       published_(store_.snapshot()),
       budget_(std::make_shared<Budget>(options_.limits.max_memory_bytes)),
@@ -133,6 +142,15 @@ absl::Status Core::Impl::Start(std::shared_ptr<Impl> self) {
       }
       retired->RunPosted();
     });
+    Launch("aside", [aside = aside_] {
+      // On Linux this is the thread's alone. What is shown meanwhile comes first.
+      setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kAsideNice);
+      while (!aside->closed()) {
+        aside->RunPosted();
+        aside->Wait(sync::kNever);
+      }
+      aside->RunPosted();
+    });
     Launch("core", [self = std::move(self)] { self->RunCore(); });
     for (const auto& slot : displays_) {
       Launch(absl::StrCat("display \"", slot->info.name, "\""),
@@ -165,16 +183,19 @@ absl::Status Core::Impl::Stop(sync::TimeNs limit) {
   const sync::TimeNs now = clock_.Now();
   std::set<std::string> displays;
   for (const NamedThread& t : threads_) {
-    if (t.name != "core" && t.name != "retired") displays.insert(t.name);
+    if (t.name != "core" && t.name != "retired" && t.name != "aside") displays.insert(t.name);
   }
   if (!AwaitEnd(displays, now + limit / 4).empty()) *abandoned_ = true;
   std::set<std::string> left = AwaitEnd(displays, now + limit / 4 * 3);
+  // The displays' engines have ended; those beside them give up what they are at.
+  *abandoned_ = true;
   store_.Abandon();
   loop_->Close();
   left.merge(AwaitEnd({"core"}, now + limit));
-  // Stop succeeds even if a large scene is still being freed.
+  // Stop succeeds even if a large scene is still being freed, or compared with another for a display that has gone.
+  aside_->Close();
   retired_->Close();
-  const std::set<std::string> freeing = AwaitEnd({"retired"}, now + limit);
+  const std::set<std::string> freeing = AwaitEnd({"retired", "aside"}, now + limit);
   for (NamedThread& t : threads_) {
     if (left.contains(t.name) || freeing.contains(t.name)) {
       t.thread.detach();

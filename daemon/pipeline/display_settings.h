@@ -13,6 +13,10 @@
 
 namespace voxeld::daemon {
 
+// From how large a change on (ChangesByOwner) a display's engine would hold up other owners. Drawing a smaller one takes
+// about as long as a few volumes are shown for, or less.
+inline constexpr uint64_t kLargeChange = 4096;
+
 // How the scene is laid into a display's volume.
 struct ViewOptions {
   enum class Mode : uint8_t { kFit, kMillimetres, kVoxels };

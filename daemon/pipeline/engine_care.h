@@ -88,6 +88,8 @@ class EngineCare {
   // Pins of entities that have gone from the newest scene and from the pattern, if there is one, are
   // let go.
   void Prune(const Snapshot& newest, const Snapshot* pattern);
+  // Whether any entity is drawn by the CPU.
+  bool has_pins() const { return !pins_.empty(); }
   // Neither tried nor taken any more.
   void Stop();
 

@@ -35,6 +35,8 @@ FramePipeline::FramePipeline(Options options)
       engine_options_(options.engine),
       tell_(std::move(options.tell)),
       retire_(std::move(options.retire)),
+      run_aside_(std::move(options.run_aside)),
+      large_change_(options.large_change),
       tell_state_(std::move(options.tell_state)),
       tell_transfers_(std::move(options.tell_transfers)),
       genlock_(std::move(options.genlock)),
@@ -73,6 +75,7 @@ void FramePipeline::Stop() {
   // The engine's end comes before the buffer that it may be writing into is let go.
   alive_ = nullptr;
   if (care_ != nullptr) care_->Stop();
+  DropAside();
   made_.engine = nullptr;
   SetEngineBytes(0, 0);
   drawing_.reset();
@@ -89,8 +92,8 @@ sync::TimeNs FramePipeline::Step() {
     ServeCaptures();
   } while (MaybeDraw());
   sweeps_->Set(showing() ? display_->ComingSweeps(2) : std::vector<sync::TimeNs>());
-  sync::TimeNs next =
-      std::min({next_tick_, next_round, limiter_.next(), LetGoOfWatch(), LetGoOfScenes()});
+  sync::TimeNs next = std::min(
+      {next_tick_, next_round, limiter_.next(), LetGoOfWatch(), LetGoOfScenes(), LetGoOfSpare()});
   if (care_ != nullptr) next = std::min(next, care_->Step());
   for (const PendingCapture& capture : captures_) next = std::min(next, capture.deadline);
   // Of a genlock's member it is for the group to say when.
@@ -164,21 +167,25 @@ bool FramePipeline::MaybeDraw() {
   if (drawing_.has_value()) return false;
   if (care_ != nullptr && care_->ready()) TakeReturned();
   if (newest_ == nullptr || !showing() || !(display_->mailbox_free() || urgent_)) return false;
-  const bool due = newest_->number != drawn_snapshot_ || settings_changed_ ||
-                   (show_again_ && clock_.Now() >= show_again_at_);
+  const bool changed = newest_->number != drawn_snapshot_ || settings_changed_ ||
+                       (show_again_ && clock_.Now() >= show_again_at_);
+  const bool due = changed || IsAsideReady();
   const std::optional<Genlock::Round> round = genlock_ == nullptr ? std::nullopt : RoundToDraw(due);
   if (genlock_ == nullptr ? !due : !round.has_value()) return false;
   if (genlock_ == nullptr) {
     draw_from_ = DrawFrom();
     if (clock_.Now() < draw_from_) return false;
   }
+  if (IsAsideReady() && !TakeAside() && !changed) return false;
 
   urgent_ = false;
   const SnapshotPtr newest = round.has_value() ? round->snapshot : newest_;
   if (care_ != nullptr) care_->Prune(*newest, pattern_scene_.get());
   drawn_snapshot_ = newest->number;
   settings_changed_ = false;
-  riders_.Draw(newest->number);
+  const SnapshotPtr scene = HoldBack(newest);
+  riders_.Draw(newest->number, held_back_);
+  const Contents contents{WholeUpTo(newest->number), settings_};
   if (!HaveEngine()) {
     if (round.has_value()) genlock_->Failed(member_, round->volume, engine_info_.reason);
     OnEngineFailure(absl::UnavailableError(absl::StrCat("no engine: ", engine_info_.reason)),
@@ -186,17 +193,17 @@ bool FramePipeline::MaybeDraw() {
     return true;
   }
   SnapshotPtr held = scene_->held();
-  const size_t size = scene_->Plan(pattern_scene_ != nullptr ? pattern_scene_ : newest);
+  const size_t size = scene_->Plan(scene);
   Retire(std::move(held));
-  const bool wanted = show_again_ || last_submitted_ == 0 || round.has_value();
+  const bool wanted = show_again_ || engine_is_new_ || last_submitted_ == 0 || round.has_value();
   if (size == 0 && !target_stale_ && !wanted) {
-    KeepUnchanged({newest->number, settings_});
+    KeepUnchanged(contents);
     return true;
   }
 
   Drawing& drawing = drawing_.emplace(Drawing{});
   drawing.began = clock_.Now();
-  drawing.contents = {newest->number, settings_};
+  drawing.contents = contents;
   last_volume_ = round.has_value() ? round->volume : last_volume_ + 1;
   drawing.volume = last_volume_;
   drawing.lease = pool_.Acquire();
@@ -204,6 +211,7 @@ bool FramePipeline::MaybeDraw() {
     target_stale_ = false;
     target_ = CurrentTarget();
     target_steps_ = light_steps();
+    ++targets_;
     made_.engine->SetTarget(target_, Completion(&FramePipeline::OnCallDone));
   }
   if (const absl::Status status = ApplyDelta(size); !status.ok()) {
@@ -383,6 +391,7 @@ void FramePipeline::OnState(display::DisplayState state, const std::string& reas
     return;
   }
   if (care_ != nullptr) care_->OnHidden();
+  GiveUpAside();
   riders_.LoseUnsubmitted(WhyNotShowing(), true);
 }
 

@@ -25,17 +25,22 @@
 //   changes (genlock.h); then every round ends PRESENTED or LOST.
 // - Volumes are numbered as the engine's frames are: ascending, with gaps where one
 //   came out the same.
+// - A large change of one owner, while others are there, does not hold up the others: a second engine is brought
+//   to it beside the one that draws, which goes on with what that owner had before. Then the second takes over
+//   (frame_pipeline_aside.cc). The owner's commits wait for it, in their order.
 // - An engine that is lost (DataLoss) is replaced by the CPU's in this process, which gets the whole
 //   scene; riders stay aboard the first time. One that had a process of its own comes back by
 //   EngineCare. The first volume of another engine is handed over even if it looks the same. Any
 //   other failure is LOST to its riders; the engine gets the whole scene next time.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -83,6 +88,10 @@ class FramePipeline final : private display::Display::Listener {
     // Takes what the pipeline has done with: freeing a large scene takes longer than its thread may
     // be busy. Empty: it is freed on the spot.
     std::function<void(std::shared_ptr<const void>)> retire;
+    // Runs long work once, on another thread, one after the other. Empty: it is done on the spot.
+    std::function<void(std::function<void()>)> run_aside;
+    // From how large a change on (ChangesByOwner) an owner's is made ready aside.
+    uint64_t large_change = kLargeChange;
     std::function<void(EngineEvent)> tell_engine;  // what becomes of the engine; may be empty
     // The display's state, whenever it or its reason changes; may be empty.
     std::function<void(display::DisplayState, const std::string&)> tell_state;
@@ -158,6 +167,26 @@ class FramePipeline final : private display::Display::Listener {
     display::CaptureId id = 0;
   };
 
+  // A second engine with what it holds (frame_pipeline_aside.cc).
+  struct Aside {
+    enum class Phase : uint8_t { kSpare, kUnderWay, kReady };
+    Phase phase = Phase::kUnderWay;
+    sync::TimeNs until = sync::kNever;  // kSpare: from then on it is not worth its memory
+    std::set<uint64_t> owners;          // whose change it is brought to,
+    uint64_t number = 0;                // which is in the snapshot of this number
+    int rounds = 0;
+    uint64_t targets = 0;  // as of targets_, that it knows
+    // What a round is given, and fills.
+    SnapshotPtr goal;
+    std::optional<gpu::Target> target;  // if it is to be told
+    uint64_t frame = 0;
+    std::vector<std::byte> bytes;
+    std::vector<uint64_t> changed_in;
+    absl::Status status;  // of the calls so far
+    std::unique_ptr<EngineScene> scene;
+    EngineCare::Made made;  // last: its end comes before that of what it writes into
+  };
+
   explicit FramePipeline(Options options);
 
   absl::Status Open(std::function<void(EngineEvent)> tell);
@@ -202,6 +231,27 @@ class FramePipeline final : private display::Display::Listener {
   void OnFrame(const absl::StatusOr<gpu::FrameResult>& result);
   void OnEngineFailure(const absl::Status& status, sync::TimeNs since);
   void OnEngineLost(uint64_t id, const absl::Status& status);
+  // Large changes (frame_pipeline_aside.cc). What is to be drawn for `newest`, which has not been drawn: itself, or with
+  // older parts of owners whose change is made ready aside.
+  SnapshotPtr HoldBack(const SnapshotPtr& newest);
+  bool MayHoldBack(const Snapshot& newest) const;
+  bool BeginAside(const SnapshotPtr& newest);
+  void BeginRound();
+  bool IsAsideReady() const { return aside_ != nullptr && aside_->phase == Aside::Phase::kReady; }
+  // Has the engine that was made ready draw from now on. False: it is to catch up with the others first.
+  bool TakeAside();
+  void OnAsideCall(const absl::Status& status);
+  void OnAsideFrame(const absl::StatusOr<gpu::FrameResult>& result);
+  template <typename Result>
+  std::function<void(Result)> AsideCompletion(void (FramePipeline::*method)(const Result&));
+  // What was held back is drawn as it comes.
+  void GiveUpAside();
+  void DropAside();
+  void SetAsideBytes(uint64_t bytes);
+  sync::TimeNs LetGoOfSpare();  // when it is due; answers when
+  std::set<uint64_t> HeldOwners() const;
+  // Every commit up to the snapshot of this number is to be seen in what is drawn for that of number `newest`.
+  uint64_t WholeUpTo(uint64_t newest) const;
   void SubmitDrawn(Drawing drawing);
   void KeepUnchanged(const Contents& contents);
   void ShowAgain(sync::TimeNs delay);
@@ -209,7 +259,7 @@ class FramePipeline final : private display::Display::Listener {
   void ServeCaptures();
   void TellWatchers(const absl::StatusOr<display::DecodedVolume>& volume);
   sync::TimeNs LetGoOfWatch();  // when it is due; answers when
-  // Scenes (frame_pipeline_shown.cc), while somebody compares: that a volume is drawn from.
+  // Scenes (frame_pipeline_requests.cc), while somebody compares: that a volume is drawn from.
   void KeepScene(uint64_t volume);
   sync::TimeNs LetGoOfScenes();
   void Breathe();
@@ -229,6 +279,8 @@ class FramePipeline final : private display::Display::Listener {
   std::string takeover_;  // why the engine is not the one that was asked for
   const RiderBook::Tell tell_;
   const std::function<void(std::shared_ptr<const void>)> retire_;
+  const std::function<void(std::function<void()>)> run_aside_;
+  const uint64_t large_change_;
   const std::function<void(display::DisplayState, const std::string&)> tell_state_;
   const std::function<void(uint64_t)> tell_transfers_;
 
@@ -240,6 +292,15 @@ class FramePipeline final : private display::Display::Listener {
   bool engine_is_new_ = false;        // it came back, and has drawn nothing yet
   gpu::EngineInfo engine_info_;       // of the engine, or why there is none
   std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
+  std::shared_ptr<Aside> aside_;
+  std::shared_ptr<bool> aside_alive_;  // while a round is under way
+  uint64_t aside_bytes_ = 0;           // charged for it
+  sync::TimeNs no_aside_until_ = 0;    // one has failed
+  // Owners of whom an older part is drawn, and the snapshot that it is of.
+  std::map<uint64_t, uint64_t> held_back_;
+  SnapshotPtr drawn_scene_;  // what was last drawn, or begun to be; null: unknown, or a pattern
+  uint64_t drawn_number_ =
+      0;  // it has the parts of this snapshot of all owners who were not held back
   bool started_ = false;
   const std::shared_ptr<Genlock> genlock_;
   Genlock::Member member_ = 0;
@@ -262,6 +323,7 @@ class FramePipeline final : private display::Display::Listener {
   bool urgent_ = false;                     // draw, though a volume waits in the mailbox
   std::optional<uint64_t> drawn_snapshot_;  // the newest that a draw was begun for
   gpu::Target target_;                      // that the engine was told last
+  uint64_t targets_ = 0;                    // how many it was told
   bool target_stale_ = true;       // the engine has not been told the target that there is now
   bool settings_changed_ = false;  // view or pattern, since a draw was last begun
   uint64_t settings_ = 0;          // changes of them, counted

@@ -97,6 +97,9 @@ void FramePipeline::OnEngineLost(uint64_t id, const absl::Status& status) {
   // A call under way has told it already, and there is another engine.
   if (id == made_.id && made_.engine != nullptr && !drawing_.has_value()) {
     OnEngineFailure(status, clock_.Now());
+  } else if (aside_ != nullptr && id == aside_->made.id) {
+    OnAsideCall(status);
+    GiveUpAside();
   } else if (care_ != nullptr) {
     care_->OnEngineLost(id, status);
   }
@@ -106,6 +109,7 @@ void FramePipeline::OnEngineFailure(const absl::Status& status, sync::TimeNs sin
   Retire(std::shared_ptr<EngineScene>(std::move(scene_)));
   scene_ = std::make_unique<EngineScene>([this] { Breathe(); });
   target_stale_ = true;
+  GiveUpAside();
   // A device that has no memory for the scene gives way too.
   const bool gives_way = absl::IsResourceExhausted(status) && care_ != nullptr && !care_->away();
   if (absl::IsDataLoss(status) || gives_way) {

@@ -78,9 +78,11 @@ void RiderBook::NotShown(const Rider& rider, CommitOutcome::NotShown why) {
   Give(rider, std::move(outcome));
 }
 
-void RiderBook::Draw(uint64_t snapshot) {
-  const auto later = std::stable_partition(waiting_.begin(), waiting_.end(),
-                                           [&](const Rider& r) { return r.snapshot <= snapshot; });
+void RiderBook::Draw(uint64_t snapshot, const std::map<uint64_t, uint64_t>& held) {
+  const auto later = std::stable_partition(waiting_.begin(), waiting_.end(), [&](const Rider& r) {
+    const auto part = held.find(r.owner);
+    return r.snapshot <= (part == held.end() ? snapshot : part->second);
+  });
   const std::vector<Rider> aboard(waiting_.begin(), later);
   waiting_.erase(waiting_.begin(), later);
   Merge(drawing_, aboard);

@@ -36,6 +36,7 @@ struct Rider {
   bool asked = true;         // its client wants the outcomes
   Stages stages;             // up to applied_ns
   uint64_t snapshot = 0;     // the first that contains it
+  uint64_t owner = 0;
 };
 
 class RiderBook {
@@ -53,8 +54,9 @@ class RiderBook {
   // It was applied, but by rule 1 will not be shown.
   void NotShown(const Rider& rider, CommitOutcome::NotShown why);
 
-  // Those that wait and are in `snapshot` ride in the volume that is about to be drawn from it.
-  void Draw(uint64_t snapshot = UINT64_MAX);
+  // Those that wait and are in `snapshot` ride in the volume that is about to be drawn from it. Of an owner in `held`
+  // the volume shows an older snapshot, which is given: the later ones wait on.
+  void Draw(uint64_t snapshot = UINT64_MAX, const std::map<uint64_t, uint64_t>& held = {});
   // The volume under way comes to nothing: its riders wait again, before those who came later.
   void Redraw();
   // `volume`, submitted, comes to nothing, and what it shows will be drawn again: its riders wait as above.

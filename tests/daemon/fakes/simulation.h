@@ -2,6 +2,8 @@
 // engines.
 #pragma once
 
+#include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -65,11 +67,17 @@ class Simulation {
       std::function<absl::StatusOr<std::unique_ptr<gpu::Engine>>(const gpu::EngineOptions&)>;
 
   explicit Simulation(Limits limits = {}, int displays = 1, MakeEngine make_engine = nullptr,
-                      const gpu::EngineOptions& engine_options = {}) {
+                      const gpu::EngineOptions& engine_options = {},
+                      uint64_t large_change = kLargeChange) {
     CoreOptions options;
     options.limits = limits;
     options.version = "test";
     options.threads = false;
+    options.large_change = large_change;
+    options.run_aside = [this](std::function<void()> work) {
+      if (!hold_aside) return work();
+      aside.push_back(std::move(work));
+    };
     options.engine_event = [this](const EngineEvent& event) { engine_events.push_back(event); };
     options.transfers_event = [this](const std::string& display, uint64_t failed) {
       transfers_failed[display].push_back(failed);
@@ -163,7 +171,19 @@ class Simulation {
   ScriptedDisplay& display(int i = 0) { return *display_[i]; }
   EngineScript& engine(int i = 0) { return *engine_script(i); }
 
+  // Does what hold_aside has kept waiting. False if there was nothing.
+  bool RunAside() {
+    if (aside.empty()) return false;
+    const std::function<void()> work = std::move(aside.front());
+    aside.pop_front();
+    work();
+    core->Step();
+    return true;
+  }
+
   sync::FakeClock clock;
+  bool hold_aside = false;  // the thread that makes large changes ready is busy
+  std::deque<std::function<void()>> aside;
   absl::Status make_engine_fails;
   std::vector<EngineEvent> engine_events;
   std::map<std::string, std::vector<uint64_t>> transfers_failed;  // as reported, by display

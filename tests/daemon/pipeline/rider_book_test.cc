@@ -256,6 +256,33 @@ TEST(RiderBook, WhatTheSnapshotDoesNotContainWaits) {
   EXPECT_EQ(std::get<0>(told.back()), 3u);
 }
 
+TEST(RiderBook, OfAnOwnerWhoIsHeldBackWhatItsOlderPartDoesNotContainWaits) {
+  std::vector<Told> told;
+  RiderBook book("d",
+                 [&](const Rider& r, const CommitOutcome& o) { told.push_back(Flatten(r, o)); });
+  for (uint64_t frame = 1; frame <= 4; ++frame) {
+    Rider rider = RiderOf(frame % 2, frame, frame);
+    rider.owner = 10 + frame % 2;
+    book.Board(rider);
+  }
+  book.Draw(4, {{11, 1}});
+  book.Submit(1);
+  // The other owner's two are in it, of which the later supersedes the earlier.
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_EQ(told[0], (Told{2, Kind::kSuperseded, 4, ""}));
+  book.Draw(4);
+  book.Submit(2);
+  display::VolumeOutcome shown;
+  shown.kind = display::VolumeOutcome::Kind::kPresented;
+  shown.volume = 1;
+  book.OnOutcome(shown);
+  shown.volume = 2;
+  book.OnOutcome(shown);
+  EXPECT_THAT(told, ::testing::UnorderedElementsAre(
+                        Told{2, Kind::kSuperseded, 4, ""}, Told{1, Kind::kPresented, 1, ""},
+                        Told{4, Kind::kPresented, 1, ""}, Told{3, Kind::kPresented, 2, ""}));
+}
+
 TEST(RiderBook, RidersOfAVolumeThatIsDrawnAgainRideAgainBeforeLaterOnes) {
   std::vector<Told> told;
   RiderBook book("d",
