@@ -58,9 +58,9 @@ struct CoreOptions {
   // when its engine was lost.
   std::function<absl::StatusOr<std::unique_ptr<gpu::Engine>>(const gpu::EngineOptions&)>
       make_engine;
-  // From how large a change of an owner on (ChangesByOwner) displays make it ready beside what they draw.
+  // The size (ChangesByOwner) from which displays prepare an owner's change with a second engine.
   uint64_t large_change = kLargeChange;
-  // threads = false only: runs that work, as FramePipeline::Options has it.
+  // With threads = false: runs the work that takes long (FramePipeline::Options). Empty: inside the call.
   std::function<void(std::function<void()>)> run_aside;
   // What becomes of engines in processes of their own; on the core's thread. May be empty.
   std::function<void(const EngineEvent&)> engine_event;

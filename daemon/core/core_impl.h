@@ -283,7 +283,7 @@ class Core::Impl {
   // The thread of this loop frees replaced scenes and spent operations. For a large scene that takes up to a second, which no other
   // thread can spare. Without threads it is loop_.
   const std::shared_ptr<Loop> retired_;
-  // The thread of this loop makes large changes ready for displays, one after the other. Without threads nobody runs it.
+  // The thread of this loop prepares large changes for displays, in order. Without threads it is not used.
   const std::shared_ptr<Loop> aside_;
   SceneStore store_;
   SnapshotPtr published_;

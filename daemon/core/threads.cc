@@ -143,7 +143,7 @@ absl::Status Core::Impl::Start(std::shared_ptr<Impl> self) {
       retired->RunPosted();
     });
     Launch("aside", [aside = aside_] {
-      // On Linux this is the thread's alone. What is shown meanwhile comes first.
+      // On Linux this applies to this thread only. What is drawn meanwhile has priority.
       setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kAsideNice);
       while (!aside->closed()) {
         aside->RunPosted();
@@ -187,12 +187,12 @@ absl::Status Core::Impl::Stop(sync::TimeNs limit) {
   }
   if (!AwaitEnd(displays, now + limit / 4).empty()) *abandoned_ = true;
   std::set<std::string> left = AwaitEnd(displays, now + limit / 4 * 3);
-  // The displays' engines have ended; those beside them give up what they are at.
+  // The displays have released their engines. Second engines abandon their calls.
   *abandoned_ = true;
   store_.Abandon();
   loop_->Close();
   left.merge(AwaitEnd({"core"}, now + limit));
-  // Stop succeeds even if a large scene is still being freed, or compared with another for a display that has gone.
+  // Stop succeeds even if a large scene is still being freed, or prepared for a display that has stopped.
   aside_->Close();
   retired_->Close();
   const std::set<std::string> freeing = AwaitEnd({"retired", "aside"}, now + limit);

@@ -13,8 +13,8 @@
 
 namespace voxeld::daemon {
 
-// From how large a change on (ChangesByOwner) a display's engine would hold up other owners. Drawing a smaller one takes
-// about as long as a few volumes are shown for, or less.
+// The size (ChangesByOwner) from which an owner's change is prepared by a second engine. A display's engine applies and
+// draws a smaller one within a few volumes.
 inline constexpr uint64_t kLargeChange = 4096;
 
 // How the scene is laid into a display's volume.

@@ -93,7 +93,7 @@ sync::TimeNs FramePipeline::Step() {
   } while (MaybeDraw());
   sweeps_->Set(showing() ? display_->ComingSweeps(2) : std::vector<sync::TimeNs>());
   sync::TimeNs next = std::min(
-      {next_tick_, next_round, limiter_.next(), LetGoOfWatch(), LetGoOfScenes(), LetGoOfSpare()});
+      {next_tick_, next_round, limiter_.next(), LetGoOfWatch(), LetGoOfScenes(), ReleaseSpare()});
   if (care_ != nullptr) next = std::min(next, care_->Step());
   for (const PendingCapture& capture : captures_) next = std::min(next, capture.deadline);
   // Of a genlock's member it is for the group to say when.

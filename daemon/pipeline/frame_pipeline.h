@@ -25,9 +25,9 @@
 //   changes (genlock.h); then every round ends PRESENTED or LOST.
 // - Volumes are numbered as the engine's frames are: ascending, with gaps where one
 //   came out the same.
-// - A large change of one owner, while others are there, does not hold up the others: a second engine is brought
-//   to it beside the one that draws, which goes on with what that owner had before. Then the second takes over
-//   (frame_pipeline_aside.cc). The owner's commits wait for it, in their order.
+// - A large change of one owner does not hold up other owners: a second engine applies it while the first draws on with
+//   what that owner had before. Then the second takes over (frame_pipeline_aside.cc). Until then the owner's commits
+//   wait, in order.
 // - An engine that is lost (DataLoss) is replaced by the CPU's in this process, which gets the whole
 //   scene; riders stay aboard the first time. One that had a process of its own comes back by
 //   EngineCare. The first volume of another engine is handed over even if it looks the same. Any
@@ -88,9 +88,9 @@ class FramePipeline final : private display::Display::Listener {
     // Takes what the pipeline has done with: freeing a large scene takes longer than its thread may
     // be busy. Empty: it is freed on the spot.
     std::function<void(std::shared_ptr<const void>)> retire;
-    // Runs long work once, on another thread, one after the other. Empty: it is done on the spot.
+    // Runs work that takes long on another thread, in order. Empty: it runs inside the call.
     std::function<void(std::function<void()>)> run_aside;
-    // From how large a change on (ChangesByOwner) an owner's is made ready aside.
+    // The size (ChangesByOwner) from which an owner's change is prepared by a second engine.
     uint64_t large_change = kLargeChange;
     std::function<void(EngineEvent)> tell_engine;  // what becomes of the engine; may be empty
     // The display's state, whenever it or its reason changes; may be empty.
@@ -167,24 +167,24 @@ class FramePipeline final : private display::Display::Listener {
     display::CaptureId id = 0;
   };
 
-  // A second engine with what it holds (frame_pipeline_aside.cc).
+  // A second engine, and what it holds (frame_pipeline_aside.cc).
   struct Aside {
     enum class Phase : uint8_t { kSpare, kUnderWay, kReady };
     Phase phase = Phase::kUnderWay;
-    sync::TimeNs until = sync::kNever;  // kSpare: from then on it is not worth its memory
-    std::set<uint64_t> owners;          // whose change it is brought to,
-    uint64_t number = 0;                // which is in the snapshot of this number
+    sync::TimeNs until = sync::kNever;  // kSpare: when it is released
+    std::set<uint64_t> owners;          // who are held back while it applies their changes
+    uint64_t number = 0;                // of the snapshot with those changes
     int rounds = 0;
-    uint64_t targets = 0;  // as of targets_, that it knows
-    // What a round is given, and fills.
+    uint64_t targets = 0;  // targets_ when its target was set
+    // Input and output of a round.
     SnapshotPtr goal;
-    std::optional<gpu::Target> target;  // if it is to be told
+    std::optional<gpu::Target> target;  // if it has to be set
     uint64_t frame = 0;
     std::vector<std::byte> bytes;
     std::vector<uint64_t> changed_in;
     absl::Status status;  // of the calls so far
     std::unique_ptr<EngineScene> scene;
-    EngineCare::Made made;  // last: its end comes before that of what it writes into
+    EngineCare::Made made;  // last: it is destroyed before the buffers that it writes into
   };
 
   explicit FramePipeline(Options options);
@@ -231,26 +231,27 @@ class FramePipeline final : private display::Display::Listener {
   void OnFrame(const absl::StatusOr<gpu::FrameResult>& result);
   void OnEngineFailure(const absl::Status& status, sync::TimeNs since);
   void OnEngineLost(uint64_t id, const absl::Status& status);
-  // Large changes (frame_pipeline_aside.cc). What is to be drawn for `newest`, which has not been drawn: itself, or with
-  // older parts of owners whose change is made ready aside.
+  // Large changes (frame_pipeline_aside.cc). Returns the scene to draw for `newest`, which may have older parts of
+  // owners whose change is being prepared.
   SnapshotPtr HoldBack(const SnapshotPtr& newest);
   bool MayHoldBack(const Snapshot& newest) const;
   bool BeginAside(const SnapshotPtr& newest);
   void BeginRound();
   bool IsAsideReady() const { return aside_ != nullptr && aside_->phase == Aside::Phase::kReady; }
-  // Has the engine that was made ready draw from now on. False: it is to catch up with the others first.
+  // Makes the prepared engine the one that draws. False if it first has to catch up with other owners.
   bool TakeAside();
   void OnAsideCall(const absl::Status& status);
   void OnAsideFrame(const absl::StatusOr<gpu::FrameResult>& result);
   template <typename Result>
   std::function<void(Result)> AsideCompletion(void (FramePipeline::*method)(const Result&));
-  // What was held back is drawn as it comes.
+  // Releases the second engine. The next volume is drawn from the newest snapshot.
   void GiveUpAside();
   void DropAside();
   void SetAsideBytes(uint64_t bytes);
-  sync::TimeNs LetGoOfSpare();  // when it is due; answers when
+  // Releases the spare engine when it is due. Returns the time when it will be.
+  sync::TimeNs ReleaseSpare();
   std::set<uint64_t> HeldOwners() const;
-  // Every commit up to the snapshot of this number is to be seen in what is drawn for that of number `newest`.
+  // Returns the number of the newest snapshot of which every change is in the volume drawn for snapshot `newest`.
   uint64_t WholeUpTo(uint64_t newest) const;
   void SubmitDrawn(Drawing drawing);
   void KeepUnchanged(const Contents& contents);
@@ -295,12 +296,11 @@ class FramePipeline final : private display::Display::Listener {
   std::shared_ptr<Aside> aside_;
   std::shared_ptr<bool> aside_alive_;  // while a round is under way
   uint64_t aside_bytes_ = 0;           // charged for it
-  sync::TimeNs no_aside_until_ = 0;    // one has failed
-  // Owners of whom an older part is drawn, and the snapshot that it is of.
+  sync::TimeNs no_aside_until_ = 0;    // after a failure
+  // By owner whose older part is drawn: the number of the snapshot that this part is from.
   std::map<uint64_t, uint64_t> held_back_;
-  SnapshotPtr drawn_scene_;  // what was last drawn, or begun to be; null: unknown, or a pattern
-  uint64_t drawn_number_ =
-      0;  // it has the parts of this snapshot of all owners who were not held back
+  SnapshotPtr drawn_scene_;    // planned last; null: unknown, or a pattern
+  uint64_t drawn_number_ = 0;  // of the snapshot that its other owners' parts are from
   bool started_ = false;
   const std::shared_ptr<Genlock> genlock_;
   Genlock::Member member_ = 0;
@@ -323,7 +323,7 @@ class FramePipeline final : private display::Display::Listener {
   bool urgent_ = false;                     // draw, though a volume waits in the mailbox
   std::optional<uint64_t> drawn_snapshot_;  // the newest that a draw was begun for
   gpu::Target target_;                      // that the engine was told last
-  uint64_t targets_ = 0;                    // how many it was told
+  uint64_t targets_ = 0;                    // how often it was set
   bool target_stale_ = true;       // the engine has not been told the target that there is now
   bool settings_changed_ = false;  // view or pattern, since a draw was last begun
   uint64_t settings_ = 0;          // changes of them, counted

@@ -1,15 +1,15 @@
-// FramePipeline and large changes: a second engine is brought to one, beside the engine that draws.
+// FramePipeline prepares large changes with a second engine, beside the engine that draws.
 //
-//   HoldBack   finds that an owner's change is large while others are there. From then on what is drawn has that
-//              owner's layers and objects as they were (WithPartsOf), and everything else as it is.
-//   a round    brings the second engine to the newest snapshot, and has it draw that, for nobody: on a thread of its
-//              own and in the engine's, so that nothing here waits for it.
-//   TakeAside  has the second engine draw from then on. What the others have changed meanwhile comes by an ordinary
-//              delta; if that is much itself, another round comes first.
+//   HoldBack   finds that an owner's change is large while other owners have layers. From then on the pipeline draws
+//              that owner's layers and objects as they were before (WithPartsOf), and everything else as it is now.
+//   a round    applies the newest snapshot to the second engine and has it draw a frame that is not shown. This runs on
+//              the thread of `run_aside` and in the engine, so nothing here waits for it.
+//   TakeAside  makes the second engine the one that draws. An ordinary delta brings what the others have changed in the
+//              meantime. If that is a large change itself, another round comes first.
 //
-// So a change is shown whole, and each owner's in their order: an owner who is held back is shown one snapshot's part, and
-// the commits after it wait. The engine that has drawn until then is kept for a while: it is behind by the same change, so
-// bringing it to the next one costs what differs.
+// A change is therefore shown whole, and each owner's commits are shown in order: the pipeline shows one snapshot's part of
+// an owner who is held back, and the commits after it wait. The engine that drew until then is kept for a while as a
+// spare: it lacks the same change, so the next large change costs what differs, not the whole scene.
 #include <algorithm>
 #include <memory>
 #include <set>
@@ -22,12 +22,12 @@
 namespace voxeld::daemon {
 namespace {
 
-constexpr sync::TimeNs kSpareLinger = 5 * sync::kSecond;
+constexpr sync::TimeNs kSpareLinger = 30 * sync::kSecond;
 constexpr sync::TimeNs kAsideRetry = 10 * sync::kSecond;  // after a failure
-// Each round is of what was changed during the one before, so a few are enough.
+// Each round applies what was changed during the previous one, so a few are enough.
 constexpr int kMostRounds = 4;
 
-// Of the budget's limit, what a second engine leaves to clients.
+// Returns whether clients keep a quarter of the budget's limit.
 bool LeavesRoom(const Budget& budget, uint64_t more) {
   return budget.used_bytes() + more <= budget.limit_bytes() / 4 * 3;
 }
@@ -48,7 +48,7 @@ uint64_t FramePipeline::WholeUpTo(uint64_t newest) const {
 bool FramePipeline::MayHoldBack(const Snapshot& newest) const {
   if (genlock_ != nullptr || drawn_scene_ == nullptr || made_.engine == nullptr) return false;
   if (care_ != nullptr && (care_->away() || care_->has_pins())) return false;
-  // Nobody else would be held up.
+  // There is nobody else to hold up.
   const bool alone = newest.owners.size() < 2 && drawn_scene_->owners.size() < 2;
   return !alone && clock_.Now() >= no_aside_until_;
 }
@@ -63,19 +63,19 @@ SnapshotPtr FramePipeline::HoldBack(const SnapshotPtr& newest) {
   if (!MayHoldBack(*newest)) {
     GiveUpAside();
   } else {
-    // While nothing is under way, who is held back is decided anew.
-    const bool anew = aside_ == nullptr || aside_->phase == Aside::Phase::kSpare;
+    // A round under way has its owners; otherwise they are chosen here.
+    const bool idle = aside_ == nullptr || aside_->phase == Aside::Phase::kSpare;
     const auto changes = ChangesByOwner(*drawn_scene_, *newest, large_change_,
-                                        anew ? std::set<uint64_t>() : HeldOwners());
+                                        idle ? std::set<uint64_t>() : HeldOwners());
     const auto is_large = [&](uint64_t owner) {
       const auto change = changes.find(owner);
       return change != changes.end() && change->second >= large_change_;
     };
-    if (anew) std::erase_if(held_back_, [&](const auto& held) { return !is_large(held.first); });
+    if (idle) std::erase_if(held_back_, [&](const auto& held) { return !is_large(held.first); });
     for (const auto& [owner, change] : changes) {
       if (is_large(owner)) held_back_.emplace(owner, drawn_number_);
     }
-    if (anew && !held_back_.empty() && !BeginAside(newest)) held_back_.clear();
+    if (idle && !held_back_.empty() && !BeginAside(newest)) held_back_.clear();
     if (!held_back_.empty()) scene = WithPartsOf(*newest, *drawn_scene_, HeldOwners());
   }
   Retire(std::exchange(drawn_scene_, scene));
@@ -84,6 +84,7 @@ SnapshotPtr FramePipeline::HoldBack(const SnapshotPtr& newest) {
 }
 
 bool FramePipeline::BeginAside(const SnapshotPtr& newest) {
+  // The measured size is charged when a round ends. The expected size is an upper bound that is seldom reached.
   const uint64_t expected = std::max(aside_bytes_, newest->total.derived);
   if (budget_ != nullptr && !LeavesRoom(*budget_, expected - aside_bytes_)) {
     DropAside();
@@ -107,8 +108,7 @@ bool FramePipeline::BeginAside(const SnapshotPtr& newest) {
   } else if (aside_->targets != targets_ || target_stale_) {
     aside_->target = CurrentTarget();
   }
-  SetAsideBytes(expected);
-  // The engine that draws is told a stale target with the volume that is about to be drawn.
+  // The engine that draws receives a stale target with the volume that is about to be drawn.
   aside_->targets = targets_ + (target_stale_ ? 1 : 0);
   aside_->owners = HeldOwners();
   aside_->number = newest->number;
@@ -126,7 +126,7 @@ void FramePipeline::BeginRound() {
   aside_alive_ = std::make_shared<bool>(true);
   const auto called = AsideCompletion(&FramePipeline::OnAsideCall);
   const auto drawn = AsideCompletion(&FramePipeline::OnAsideFrame);
-  // Until it is drawn, nobody but this work and the engine touches what they are given.
+  // Until the frame is drawn, only this work and the engine use what they are given.
   auto work = [aside = aside_, called, drawn, alive = std::weak_ptr<bool>(aside_alive_)] {
     if (alive.expired()) return;
     gpu::Engine& engine = *aside->made.engine;
@@ -200,7 +200,7 @@ bool FramePipeline::TakeAside() {
   std::swap(engine_bytes_, aside_bytes_);
   engine_info_ = made_.engine->info();
   engine_info_.reason = reason_;
-  // What it has drawn so far no display has seen: buffers are new to it, and its pictures to the display.
+  // No display has seen what it drew so far: all buffers are new to it, and all of its pictures to the display.
   pool_.Forget(last_volume_);
   first_volume_ = last_volume_ + 1;
   engine_is_new_ = true;
@@ -233,7 +233,7 @@ void FramePipeline::SetAsideBytes(uint64_t bytes) {
   aside_bytes_ = bytes;
 }
 
-sync::TimeNs FramePipeline::LetGoOfSpare() {
+sync::TimeNs FramePipeline::ReleaseSpare() {
   if (aside_ == nullptr || aside_->phase != Aside::Phase::kSpare) return sync::kNever;
   const bool room = budget_ == nullptr || LeavesRoom(*budget_, 0);
   if (room && clock_.Now() < aside_->until) return aside_->until;

@@ -54,8 +54,8 @@ class RiderBook {
   // It was applied, but by rule 1 will not be shown.
   void NotShown(const Rider& rider, CommitOutcome::NotShown why);
 
-  // Those that wait and are in `snapshot` ride in the volume that is about to be drawn from it. Of an owner in `held`
-  // the volume shows an older snapshot, which is given: the later ones wait on.
+  // Those that wait and are in `snapshot` ride in the volume that is about to be drawn from it. For an owner in `held` the
+  // volume shows the older snapshot of that number, and the owner's later commits keep waiting.
   void Draw(uint64_t snapshot = UINT64_MAX, const std::map<uint64_t, uint64_t>& held = {});
   // The volume under way comes to nothing: its riders wait again, before those who came later.
   void Redraw();

@@ -207,7 +207,7 @@ void EngineScene::PlanInstances(const Snapshot& before, const Snapshot& next) {
         next.uses.ForEachFrom({key.owner, key.name, false, "", ""}, [&](const UseKey& use, bool) {
           if (use.owner != key.owner || use.object != key.name || use.by_object) return false;
           EntityPlace place{{use.owner, use.layer}, use.id};
-          // A scene that was put together of parts (WithPartsOf) may lack it; then its layer has changed too.
+          // A scene joined from parts (WithPartsOf) may lack the entity; then the diff of its layer covers it.
           const EntityPtr entity = next.FindEntity(place.layer, place.id);
           if (entity != nullptr) redraw_.emplace(entity->number, std::move(place));
           return true;

@@ -45,7 +45,7 @@ class EngineScene {
   // work. It must not call back. If `choose` is empty, the engine draws everything.
   explicit EngineScene(std::function<void()> breathe = nullptr, Choose choose = nullptr);
 
-  // Another owner does what will not wait; it must not be at work.
+  // Replaces `breathe`. Requires: no call is running.
   void SetBreathe(std::function<void()> breathe) { breathe_ = std::move(breathe); }
 
   // Of what is held (since the last Plan); null: nothing.

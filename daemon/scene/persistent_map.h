@@ -53,8 +53,8 @@ class PersistentMap {
     return true;
   }
 
-  // A copy whose keys from `from` up to, but not including, `to` are those of `other`. Costs O(log n), and a visit to
-  // each of those keys in both maps.
+  // Returns a copy in which the keys from `from` to just before `to` are those of `other`. Costs O(log n) and a visit to
+  // each of these keys in both maps.
   PersistentMap WithRangeOf(const PersistentMap& other, const K& from, const K& to) const {
     auto [below, not_below] = SplitBefore(root_, from);
     auto [mine, above] = SplitBefore(std::move(not_below), to);

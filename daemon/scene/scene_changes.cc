@@ -4,6 +4,7 @@
 #include <memory>
 #include <utility>
 #include <variant>
+#include <vector>
 
 namespace voxeld::daemon {
 namespace {
@@ -31,9 +32,9 @@ const Layer* Same(const Layer* was, const Layer& is) {
   return was != nullptr && was->number == is.number ? was : nullptr;
 }
 
-// What is as much to do as a small entity.
+// An entity of this size counts twice.
 constexpr uint64_t kBytesPerUnit = 4096;
-// A layer that looks otherwise is only blended anew where its entities are.
+// A layer whose appearance changes is only blended again where its entities are.
 constexpr uint64_t kEntitiesPerUnitOfLook = 16;
 
 uint64_t SizeOf(const Layer& layer) { return layer.entities.size() + layer.bytes / kBytesPerUnit; }
@@ -57,7 +58,7 @@ uint64_t ChangeOf(uint64_t owner, const Layer* was, const Layer* is, const Snaps
   if (was->number != is->number) return SizeOf(*was) + SizeOf(*is);
   if (was->transform != is->transform) return std::max(SizeOf(*was), SizeOf(*is));
   uint64_t change = 0;
-  if (!ListsSame(*was, *is) || was->suppressed != is->suppressed) {
+  if (!ListsSame(*was, *is)) {
     change = is->entities.size() / kEntitiesPerUnitOfLook;
   }
   EntityMap::DiffFrom(was->entities, is->entities, "",
@@ -170,7 +171,7 @@ std::map<uint64_t, uint64_t> ChangesByOwner(const Snapshot& before, const Snapsh
         uint64_t& change = changes[key.owner];
         if (change < most) change += ChangeOf(key.owner, Get(was), Get(is), after, most - change);
       });
-  // Instances of an object that is defined otherwise now are drawn anew.
+  // Instances of an object whose definition changed are drawn again.
   PersistentMap<OwnedName, ObjectPtr>::Diff(
       before.objects, after.objects,
       [&](const OwnedName& key, const ObjectPtr* was, const ObjectPtr* is) {
@@ -193,6 +194,18 @@ SnapshotPtr WithPartsOf(const Snapshot& scene, const Snapshot& part,
     const OwnedName from{owner, ""}, to{owner + 1, ""};
     joined->layers = joined->layers.WithRangeOf(part.layers, from, to);
     joined->objects = joined->objects.WithRangeOf(part.objects, from, to);
+    // An operator hides an owner at once.
+    std::vector<std::pair<OwnedName, LayerPtr>> hidden_or_shown;
+    joined->layers.ForEachFrom(from, [&](const OwnedName& key, const LayerPtr& layer) {
+      if (key.owner != owner) return false;
+      const Layer* const now = scene.FindLayer(key);
+      if (now == nullptr || now->suppressed == layer->suppressed) return true;
+      auto changed = std::make_shared<Layer>(*layer);
+      changed->suppressed = now->suppressed;
+      hidden_or_shown.emplace_back(key, std::move(changed));
+      return true;
+    });
+    for (auto& [key, layer] : hidden_or_shown) joined->layers.Put(key, std::move(layer));
     static constexpr OwnerTally kNothing;
     const OwnerTally* const was = scene.owners.Find(owner);
     const OwnerTally* const is = part.owners.Find(owner);

@@ -71,14 +71,15 @@ class SceneChanges {
   std::string entity_from_;          // the next entity, or one before it
 };
 
-// How much an engine has to do to follow a change from `before` to `after`, by owner: about 1 for a small entity that is
-// put, moved or removed, more for a large one. Counting an owner's change stops at `most`, so the cost is at most that
-// much for each owner. Owners in `skip` are left out.
+// Returns the size of the change from `before` to `after`, by owner: 1 for a small entity that is put, moved or removed,
+// more for a large one. It stands for the work of an engine. Counting stops at `most` for each owner, which bounds the
+// cost. Owners in `skip` are left out.
 std::map<uint64_t, uint64_t> ChangesByOwner(const Snapshot& before, const Snapshot& after,
                                             uint64_t most, const std::set<uint64_t>& skip = {});
 
-// `scene`, but these owners' layers and objects are those of `part`. It is to be drawn, not to be changed: what is not
-// drawn (uses of objects, expiries, the number of entities) is as `scene` has it.
+// Returns `scene` with these owners' layers and objects replaced by those of `part`; whether an operator hides a layer is
+// as in `scene`. The result is for drawing only: what is not drawn (uses of objects, expiries, the number of entities) is
+// that of `scene`.
 SnapshotPtr WithPartsOf(const Snapshot& scene, const Snapshot& part,
                         const std::set<uint64_t>& owners);
 

@@ -427,7 +427,7 @@ TEST_F(CoreAside, TheOtherEngineIsLetGoSomeSecondsLaterAndItsMemoryIsGivenBack) 
   ShowAll();
   const uint64_t both = sim_.GetStats().memory.engines;
   EXPECT_GE(both, 1'000'000u + before);
-  sim_.Advance(6 * sync::kSecond);
+  sim_.Advance(31 * sync::kSecond);
   SendSmall(2);
   ShowAll();
   const uint64_t one = sim_.GetStats().memory.engines;

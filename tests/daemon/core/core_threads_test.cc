@@ -114,9 +114,11 @@ class Answer {
 
 class RunningCore {
  public:
-  explicit RunningCore(std::vector<std::string> displays = {"main"}) {
+  explicit RunningCore(std::vector<std::string> displays = {"main"},
+                       uint64_t large_change = kLargeChange) {
     CoreOptions options;
     options.version = "test";
+    options.large_change = large_change;
     core.emplace(std::move(options), TheClock());
     for (const std::string& name : displays) {
       display::DisplayOptions made;
@@ -276,6 +278,65 @@ TEST(CoreThreads, WhatTakesLongToFreeHoldsUpNoCommit) {
   }
   gate.Open();
   EXPECT_TRUE(running.core->Stop(kGenerous).ok());
+}
+
+// Hands over a commit in which every one of `entities` has the same content.
+void CommitMany(const SessionInfo& session, uint64_t& sequence, const std::string& layer,
+                int entities, uint64_t frame) {
+  std::vector<Operation> all;
+  for (int i = 0; i < entities; ++i) {
+    all.push_back(
+        Put(layer, std::to_string(i), Entity1(Dots(static_cast<float>(frame % 8) / 10, 0xFFFFFF))));
+  }
+  all.push_back(testing::EndCommit(frame));
+  for (Operation& operation : all) operation.sequence = ++sequence;
+  session.intake->Take({std::move(all), {}, 100});
+}
+
+TEST(CoreThreads, LargeAndSmallCommitsOfTwoOwnersAllEndWhileTwoEnginesTakeTurns) {
+  RunningCore running({"main"}, /*large_change=*/100);
+  auto large_sink = std::make_shared<WaitingSink>(), small_sink = std::make_shared<WaitingSink>();
+  const SessionInfo large = running.Open(large_sink), small = running.Open(small_sink);
+  uint64_t large_sequence = 0, small_sequence = 0;
+  constexpr uint64_t kLargeCommits = 8, kSmallCommits = 80;
+  CommitMany(small, small_sequence, "small", 1, 1);
+  ASSERT_TRUE(small_sink->Await(2));
+  for (uint64_t frame = 2; frame <= kSmallCommits; ++frame) {
+    if (frame % (kSmallCommits / kLargeCommits) == 0) {
+      CommitMany(large, large_sequence, "large", 1000, frame / (kSmallCommits / kLargeCommits));
+    }
+    CommitMany(small, small_sequence, "small", 1, frame);
+    ASSERT_TRUE(small_sink->AwaitAccepted(static_cast<int64_t>(frame)));
+  }
+  // Accepted, and an outcome.
+  EXPECT_TRUE(small_sink->Await(2 * kSmallCommits));
+  EXPECT_TRUE(large_sink->Await(2 * kLargeCommits));
+  const auto shown = [](WaitingSink& sink, uint64_t frame) {
+    const std::vector<Receipt> all = sink.receipts();
+    return std::any_of(all.begin(), all.end(), [&](const Receipt& receipt) {
+      const auto* outcome = std::get_if<CommitOutcome>(&receipt.what);
+      return receipt.frame_id == frame && outcome != nullptr &&
+             (outcome->kind == Kind::kPresented || outcome->kind == Kind::kUnchanged);
+    });
+  };
+  EXPECT_TRUE(shown(*small_sink, kSmallCommits));
+  EXPECT_TRUE(shown(*large_sink, kLargeCommits));
+  EXPECT_TRUE(running.core->Stop(kGenerous).ok());
+}
+
+TEST(CoreThreads, StopEndsInTimeWhileALargeChangeIsMadeReady) {
+  RunningCore running({"main"}, /*large_change=*/100);
+  auto large_sink = std::make_shared<WaitingSink>(), small_sink = std::make_shared<WaitingSink>();
+  const SessionInfo large = running.Open(large_sink), small = running.Open(small_sink);
+  uint64_t large_sequence = 0, small_sequence = 0;
+  CommitMany(small, small_sequence, "small", 1, 1);
+  ASSERT_TRUE(small_sink->Await(2));
+  CommitMany(large, large_sequence, "large", 5000, 1);
+  ASSERT_TRUE(large_sink->AwaitAccepted(1));
+  CommitMany(small, small_sequence, "small", 1, 2);
+  ASSERT_TRUE(small_sink->AwaitAccepted(2));
+  EXPECT_TRUE(running.core->Stop(kGenerous).ok());
+  EXPECT_EQ(large_sink->receipts().size(), 2u) << "accepted, and presented or lost";
 }
 
 TEST(CoreThreads, ManyClientsAtOnceAndEverySumIsExact) {

@@ -338,6 +338,16 @@ TEST_F(ChangeSizes, AnEntityCountsByItsBytesAndAnInstanceByWhatItDraws) {
   EXPECT_EQ(Changes()[1], 6u) << "both are drawn anew";
 }
 
+TEST_F(ChangeSizes, AnOwnerIsHiddenAtOnceWhateverPartIsDrawn) {
+  f_.Commit(Put("a", "new", 1));
+  f_.store.Suppress(1, true);
+  const SnapshotPtr hidden = WithPartsOf(*f_.store.snapshot(), *before_, {1});
+  EXPECT_FALSE(hidden->FindLayer({1, "a"})->shown());
+  EXPECT_EQ(hidden->FindEntity({1, "a"}, "new"), nullptr);
+  EXPECT_EQ(Changes()[1], 1u) << "hiding is not part of what is held back";
+  EXPECT_TRUE(before_->FindLayer({1, "a"})->shown());
+}
+
 TEST_F(ChangeSizes, PartsOfAnotherSnapshotAreThoseOfTheOwnersAlone) {
   f_.Commit(Define("o", {{Dots(1), {}}}), DeleteId("a", "x"), Put("b", "new", 1));
   f_.Commit(other_, Put("a", "x", 9), Put("b", "y", 1));
