@@ -27,6 +27,9 @@ constexpr size_t kCachedTiles = 1024;    // drawn in one frame: so many colours 
 constexpr size_t kFreeBlocks = 256;      // kept, beside as many as are spare
 constexpr size_t kKeptEntries = 4096;    // of a list of drawables whose entries have gone
 constexpr size_t kKeptInTile = 64;       // the same, of the list of a tile
+// From so many entries below a layer on, their blended colours are kept while that layer changes. The entries themselves
+// take as much memory.
+constexpr size_t kManyBelow = kTileVoxels / 4;
 constexpr size_t kMovedRun = 16;  // tiles that a worker draws one behind the other where more are
 
 // Releases the unused capacity of a list that has become much shorter.
@@ -149,12 +152,17 @@ uint64_t Volume::index_bytes() const {
 
 uint64_t Volume::memory_bytes() const {
   return scene_.memory_bytes() + derived_bytes_ + entries_bytes_ + index_bytes() -
-         budget_.kept_bytes() + tiles_.memory_bytes();
+         budget_.kept_bytes() + tiles_.memory_bytes() + tiles_below_ * HeapBytes(sizeof(Below));
 }
 
-void Volume::MarkDirty(uint32_t tile) {
-  if (index_[tile].dirty) return;
-  index_[tile].dirty = true;
+void Volume::MarkDirty(uint32_t tile, const LayerKey& layer) {
+  TileIndex& index = index_[tile];
+  if (index.dirty) {
+    index.lowest = std::min(index.lowest, layer);
+    return;
+  }
+  index.dirty = true;
+  index.lowest = layer;
   dirty_.push_back(tile);
 }
 
@@ -178,11 +186,12 @@ void Volume::ForEachTile(const Drawable& d, Fn fn) const {
 void Volume::OnLeave(Drawable& drawable) {
   executor_.ThrowIfAbandoned();
   if (drawable.pending || drawable.leaving) return;  // in no tile, or on its way out already
+  const LayerKey layer = KeyOf(drawable.layer->record);
   if (drawable.unlisted && drawable.layer->drawn) {
-    ForEachTile(drawable, [this](uint32_t tile) { MarkDirty(tile); });
+    ForEachTile(drawable, [&](uint32_t tile) { MarkDirty(tile, layer); });
   }
   for (uint32_t tile : drawable.bins.tiles) {
-    if (drawable.layer->drawn) MarkDirty(tile);
+    if (drawable.layer->drawn) MarkDirty(tile, layer);
     if (!index_[tile].leaving) {
       index_[tile].leaving = true;
       leaving_.push_back(tile);
@@ -207,8 +216,9 @@ void Volume::OnLayerLook(Layer& layer, const LayerRecord& next) {
   if (LooksSame(now, next) || (!layer.drawn && next.visible == 0)) return;
   // Nothing of it was to be seen, and where it will be is not known yet.
   if (!layer.drawn && !(now.transform == next.transform)) return;
+  const LayerKey lower = std::min(KeyOf(now), KeyOf(next));
   for (Drawable* drawable : layer.drawables) {
-    ForEachTile(*drawable, [this](uint32_t tile) { MarkDirty(tile); });
+    ForEachTile(*drawable, [&](uint32_t tile) { MarkDirty(tile, lower); });
   }
 }
 
@@ -238,6 +248,8 @@ absl::Status Volume::Apply(std::span<const std::byte> delta, BulkSource* bulk) {
   absl::Status status = scene_.Apply(delta, bulk, *this, gone);
   TakeOutLeaving();
   scene_.MapClips(view_, false);
+  masked_ = std::ranges::any_of(
+      scene_.layers(), [](const auto& layer) { return layer.second->record.has_mask != 0; });
   for (const std::unique_ptr<Drawable>& drawable : gone) budget_.Release(*drawable);
   if (!gone.empty()) {
     std::erase_if(pending_, [](const Drawable* d) { return d->layer == nullptr; });
@@ -259,6 +271,7 @@ void Volume::SetView(const TileGrid& grid, const Affine& view, std::vector<uint8
   lit_tiles_ = 0;
   derived_bytes_ = 0;
   entries_bytes_ = 0;
+  tiles_below_ = 0;
   singular_ = 0;
   counted_ = 0;
   most_kept_ = 0;
@@ -355,7 +368,8 @@ void Volume::PreparePending() {
     d->derived_bytes = DerivedBytes(*d);
     derived_bytes_ += d->derived_bytes;
     List(*d);
-    if (d->layer->drawn) ForEachTile(*d, [this](uint32_t tile) { MarkDirty(tile); });
+    if (!d->layer->drawn) continue;
+    ForEachTile(*d, [&](uint32_t tile) { MarkDirty(tile, KeyOf(d->layer->record)); });
   }
   pending_.clear();
   GiveBack(pending_, kKeptEntries);
@@ -452,8 +466,15 @@ bool Volume::DrawMask(const Layer& layer, uint32_t tile, const Box3& box, Scratc
 bool Volume::DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, TileObserver* observer,
                       Scratch& scratch) {
   scratch.entries.clear();
-  for (const Entry& e : index_[tile].entries) {
-    if (e.drawable->layer->drawn) scratch.entries.push_back(e);
+  TileIndex& index = index_[tile];
+  const bool keeps = !masked_ && scratch.unlisted.empty();
+  // What is kept is right if only layers from its place on have changed.
+  if (index.below != nullptr && (!keeps || index.lowest < index.below->key)) index.below = nullptr;
+  for (const Entry& e : index.entries) {
+    const Layer& layer = *e.drawable->layer;
+    if (!layer.drawn) continue;
+    if (index.below != nullptr && KeyOf(layer.record) < index.below->key) continue;
+    scratch.entries.push_back(e);
   }
   scratch.entries.insert(scratch.entries.end(), scratch.unlisted.begin(), scratch.unlisted.end());
   const std::span<const Entry> entries = scratch.entries;
@@ -465,9 +486,14 @@ bool Volume::DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, Til
   TileWords* colors =
       scratch.words
           .get();  // of the layers so far; while there are none, the next one's words become them
+  if (index.below != nullptr) {
+    colors = scratch.colors.get();
+    *colors = index.below->colors;
+  }
   uint32_t lit = 0;
   TileRows rows;
   TileRows touched;
+  bool above = false;  // the layers drawn from here on are at or above the lowest that changed
   // While this one is moved.
   const auto fetch_next = [&] {
     if (next == nullptr) return;
@@ -478,6 +504,14 @@ bool Volume::DrawTile(uint32_t tile, const uint32_t* next, bool past_caches, Til
   };
   for (size_t i = 0; i < entries.size();) {
     const Layer& layer = *entries[i].drawable->layer;
+    if (!above && KeyOf(layer.record) >= index.lowest) {
+      above = true;
+      if (keeps && i >= kManyBelow) {
+        if (index.below == nullptr) index.below = std::make_unique<Below>();
+        index.below->key = index.lowest;
+        index.below->colors = *colors;
+      }
+    }
     const std::span<const Entry> of_layer = EntriesOf(layer, entries.subspan(i));
     i += of_layer.size();
     const TileClip clip(*layer.clip, box);
@@ -612,6 +646,7 @@ Volume::Changes Volume::Update(TileObserver* observer) {
   Changes changes;
   changes.tiles_drawn = static_cast<uint32_t>(dirty_.size());
   std::vector<Drawn> drawn(dirty_.size());
+  for (const uint32_t tile : dirty_) tiles_below_ -= index_[tile].below != nullptr;
   tiles_.Expect(dirty_);
   if (counted_ == 0 && unlisted_.empty()) {
     DrawRun({0, dirty_.size()}, observer, drawn);
@@ -621,6 +656,7 @@ Volume::Changes Volume::Update(TileObserver* observer) {
   for (size_t i = 0; i < dirty_.size(); ++i) {
     const uint32_t tile = dirty_[i];
     index_[tile].dirty = false;
+    tiles_below_ += index_[tile].below != nullptr;
     if (owned_[tile] == kOwned) lit_voxels_ = lit_voxels_ - drawn[i].lit_before + tiles_.lit(tile);
     lit_tiles_ = lit_tiles_ - (drawn[i].lit_before != 0) + (tiles_.lit(tile) != 0);
     if (!drawn[i].differs) continue;

@@ -2,6 +2,7 @@
 // and the drawing of those that changed.
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -124,12 +125,26 @@ class Volume final : private SceneObserver {
   static bool Lower(const Entry& a, const Entry& b) {
     return a.drawable->layer->rank < b.drawable->layer->rank;
   }
+  // The place of a layer in the order of combination.
+  struct LayerKey {
+    int32_t order = 0;
+    uint64_t id = 0;
+    auto operator<=>(const LayerKey&) const = default;
+  };
+  static LayerKey KeyOf(const LayerRecord& layer) { return {layer.order, layer.id}; }
+  // The blended colours of all layers below a place, kept for a tile with many entries in them.
+  struct Below {
+    LayerKey key;
+    TileWords colors;
+  };
   // Of entries that are sorted, those of a layer.
   static std::span<const Entry> EntriesOf(const Layer& layer, std::span<const Entry> entries);
   struct TileIndex {
     std::vector<Entry> entries;
     bool dirty = false;
     bool leaving = false;  // some of its entries' drawables are
+    LayerKey lowest;       // of the layers that make it dirty
+    std::unique_ptr<Below> below;
   };
   // A worker's.
   struct Scratch {
@@ -143,7 +158,8 @@ class Volume final : private SceneObserver {
   void OnEnter(Drawable& drawable) override;
   void OnLayerLook(Layer& layer, const LayerRecord& next) override;
 
-  void MarkDirty(uint32_t tile);
+  // `layer`: what changes, in this tile, is in it or in layers above it.
+  void MarkDirty(uint32_t tile, const LayerKey& layer);
   void TakeOutLeaving();
   bool SeenCounted(const Entry& entry) const;
   // False if its bins are more than `bytes`, or than may be kept.
@@ -205,6 +221,8 @@ class Volume final : private SceneObserver {
   uint64_t most_kept_ = 0;  // of the budget, since KeepCounted last tried
   uint64_t lit_voxels_ = 0, lit_tiles_ = 0, derived_bytes_ = 0;
   uint64_t entries_bytes_ = 0;  // of all index_[…].entries
+  uint64_t tiles_below_ = 0;    // with index_[…].below
+  bool masked_ = false;         // some layer has a mask, so a layer may depend on one above it
   uint32_t singular_ = 0;
 };
 

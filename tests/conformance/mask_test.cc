@@ -1,6 +1,7 @@
-// Tests layers that are visible only where another layer covers.
+// Layers that are seen only where another covers, and layers above others with many entities.
 #include <algorithm>
 #include <cstdint>
+#include <random>
 #include <vector>
 
 #include "tests/conformance/conformance_test.h"
@@ -187,6 +188,113 @@ TEST_P(Masks, AHiddenMaskOfNoneIsNotDrawn) {
   ASSERT_TRUE(engine.Apply(delta).ok());
   ASSERT_EQ(engine.Frame().status(), absl::OkStatus());
   EXPECT_GT(drawn(), 0u);
+}
+
+// Points, each a drawable, so many in one tile that an engine may keep what the layers below a change look like.
+class ManyBelow : public EngineConformance {
+ protected:
+  static constexpr int32_t kCube = 20, kInTile = 16;
+  static constexpr uint64_t kLayers = 4, kMany = 1100, kFew = 30;
+
+  ManyBelow() {
+    for (uint64_t id = 1; id <= kLayers; ++id) {
+      LayerRecord& layer = scene_.layers[id];
+      layer.id = id;
+      layer.order = static_cast<int32_t>(id);
+      ModelGeometry& point = scene_.geometries[id];
+      point.record.id = id;
+      point.record.kind = PrimitiveKind::kPoints;
+      point.record.vertex_count = 1;
+      point.record.color = static_cast<uint32_t>(0x3F1F0F << id);
+      point.positions = {0.5f, 0.5f, 0.5f};
+      for (uint64_t i = 0; i < (id == 1 ? kMany : kFew); ++i) Place(id * 10'000 + i, id);
+    }
+    scene_.layers[2].opacity = 100;
+    scene_.layers[3].blend = BlendMode::kAdd;
+  }
+
+  DrawableRecord& Place(uint64_t id, uint64_t layer) {
+    DrawableRecord& drawable = scene_.drawables[id];
+    drawable.id = id;
+    drawable.geometry = drawable.layer = layer;
+    for (const int a : {3, 7, 11}) drawable.transform.m[a] = Below(kInTile);
+    return drawable;
+  }
+  int Below(int end) { return static_cast<int>(random_() % static_cast<uint32_t>(end)); }
+
+  // Changes a layer, most often an upper one, or something in it.
+  DeltaBuffer Change() {
+    DeltaBuffer delta;
+    for (auto& [id, layer] : scene_.layers) {
+      if (layer.has_mask == 0 || Below(2) == 0) continue;
+      layer.has_mask = 0;
+      delta.Put(layer);
+      return delta;
+    }
+    const auto id = static_cast<uint64_t>(Below(20) == 0 ? 1 : 2 + Below(kLayers - 1));
+    LayerRecord& layer = scene_.layers[id];
+    const uint64_t drawable = id * 10'000 + static_cast<uint64_t>(Below(kFew));
+    // The layer with many stays below.
+    switch (id == 1 ? 7 + Below(2) : Below(12)) {
+      case 0:
+        layer.visible ^= 1;
+        break;
+      case 1:
+        layer.order = 1 + Below(2 * kLayers);
+        break;
+      case 2:
+        layer.opacity = static_cast<uint32_t>(Below(256));
+        break;
+      case 3:
+        layer.blend = static_cast<BlendMode>(Below(3));
+        break;
+      case 4:
+        layer.has_mask = 1;
+        layer.mask = static_cast<uint64_t>(1 + Below(kLayers));
+        break;
+      case 5:
+        layer.plane_count ^= 1;
+        layer.planes[0] = {1, 0, 0, -static_cast<double>(Below(kInTile))};
+        break;
+      case 6:
+        layer.transform.m[3] = Below(4);
+        break;
+      case 7:
+      case 8:
+        if (scene_.drawables.erase(drawable) > 0) {
+          delta.Drop(Op::kDropDrawable, drawable);
+          return delta;
+        }
+        [[fallthrough]];
+      default:
+        delta.Put(Place(drawable, id));
+        return delta;
+    }
+    delta.Put(layer);
+    return delta;
+  }
+
+  std::mt19937 random_{5};
+  const Target target_ = CubeTarget(kCube);
+  SceneModel scene_;
+};
+
+INSTANTIATE_TEST_SUITE_P(Engines, ManyBelow, testing::ValuesIn(EngineCases()),
+                         [](const auto& info) { return info.param.name; });
+
+TEST_P(ManyBelow, ChangesAboveAndBelowShow) {
+  EngineDriver engine = Make();
+  ASSERT_TRUE(engine.SetTarget(target_).ok());
+  DeltaBuffer whole;
+  whole.PutWhole(scene_);
+  ASSERT_TRUE(engine.Apply(whole).ok());
+  for (int step = 0; step < 400 && !HasFatalFailure(); ++step) {
+    SCOPED_TRACE(step);
+    for (int changes = 1 + Below(3); changes > 0; --changes) {
+      ASSERT_TRUE(engine.Apply(Change()).ok());
+    }
+    ExpectLikeOracle(engine, scene_, target_);
+  }
 }
 
 }  // namespace mask_test
