@@ -182,6 +182,8 @@ class FramePipeline final : private display::Display::Listener {
     uint64_t frame = 0;
     std::vector<std::byte> bytes;
     std::vector<uint64_t> changed_in;
+    gpu::Engine::Done called;
+    gpu::Engine::FrameDone drawn;
     absl::Status status;  // of the calls so far
     std::unique_ptr<EngineScene> scene;
     EngineCare::Made made;  // last: it is destroyed before the buffers that it writes into

@@ -124,24 +124,26 @@ void FramePipeline::BeginRound() {
   aside_->status = absl::OkStatus();
   aside_->frame = ++last_volume_;
   aside_alive_ = std::make_shared<bool>(true);
-  const auto called = AsideCompletion(&FramePipeline::OnAsideCall);
-  const auto drawn = AsideCompletion(&FramePipeline::OnAsideFrame);
+  aside_->called = AsideCompletion(&FramePipeline::OnAsideCall);
+  aside_->drawn = AsideCompletion(&FramePipeline::OnAsideFrame);
   // Until the frame is drawn, only this work and the engine use what they are given.
-  auto work = [aside = aside_, called, drawn, alive = std::weak_ptr<bool>(aside_alive_)] {
+  auto work = [aside = aside_, alive = std::weak_ptr<bool>(aside_alive_)] {
     if (alive.expired()) return;
     gpu::Engine& engine = *aside->made.engine;
-    if (aside->target.has_value()) engine.SetTarget(*std::exchange(aside->target, {}), called);
+    if (aside->target.has_value()) {
+      engine.SetTarget(*std::exchange(aside->target, {}), aside->called);
+    }
     const size_t size = aside->scene->Plan(aside->goal);
     if (alive.expired()) return;
     if (size > 0) {
       absl::StatusOr<gpu::StagingBlock> block = engine.AcquireStaging(size);
-      if (!block.ok()) return drawn(block.status());
+      if (!block.ok()) return aside->drawn(block.status());
       gpu::DeltaWriter writer(block->bytes());
       aside->scene->Write(writer);
       block->Refer(writer.TakeReferred());
-      engine.Apply(*std::move(block), size, called);
+      engine.Apply(*std::move(block), size, aside->called);
     }
-    engine.SubmitFrame({.frame = aside->frame}, {aside->bytes, aside->changed_in}, drawn);
+    engine.SubmitFrame({.frame = aside->frame}, {aside->bytes, aside->changed_in}, aside->drawn);
   };
   if (run_aside_) {
     run_aside_(std::move(work));
