@@ -10,6 +10,7 @@
 #include <gemmi/small.hpp>
 #include <gemmi/symmetry.hpp>
 #include <gemmi/unitcell.hpp>
+#include <initializer_list>
 #include <limits>
 #include <new>
 #include <optional>
@@ -48,6 +49,7 @@ constexpr char kHelices[] = "helices";
 constexpr char kStrands[] = "strands of sheets";
 constexpr char kSymmetricBonds[] = "bonds to symmetry copies";
 constexpr char kNcsCopies[] = "copies by non-crystallographic symmetry";
+constexpr double kDefaultAngle = 90;  // of a unit cell, in degrees, by CIF's dictionary
 
 const ChemicalElement& ElementOf(gemmi::Element element) {
   const ChemicalElement* found =
@@ -56,6 +58,23 @@ const ChemicalElement& ElementOf(gemmi::Element element) {
 }
 
 double AttributeOf(double value) { return std::isfinite(value) ? value : kNoValue; }
+
+// Counts the copies that the symmetry of a crystal makes of the atoms in the file. If the file
+// lists no operators, their number is that of the space group, which is found by its name or else
+// by its number. The angles tell the settings of rhombohedral groups apart.
+void CountCrystalCopies(uint64_t operators, const std::string& name, const std::string& number,
+                        double alpha, double gamma, Model* model) {
+  if (operators == 0 && name.empty() && number.empty()) return;
+  if (operators == 0) {
+    int table_number = 0;
+    const gemmi::SpaceGroup* group = gemmi::find_spacegroup_by_name(name, alpha, gamma);
+    if (group == nullptr && absl::SimpleAtoi(number, &table_number))
+      group = gemmi::find_spacegroup_by_number(table_number);
+    if (group == nullptr) return AddLeftOut("space groups that are not known", 1, model);
+    operators = static_cast<uint64_t>(group->operations().order());
+  }
+  AddLeftOut("copies by crystal symmetry", operators - 1, model);
+}
 
 // Collects atoms with their attributes, one alternate location for each residue, and finds them by
 // address.
@@ -163,6 +182,7 @@ class PdbReader {
   absl::Status ForEachLine(Use use);
   absl::Status Scan(Builder* builder);
   absl::Status CheckPlace(string_view line) const;
+  void CountSymmetry(Model* model) const;
   std::string TextForGemmi();
   void AddNamedBonds(Builder* builder, Model* model);
   void AddLink(string_view line, const std::array<size_t, 8>& columns, const Addresses& addresses,
@@ -172,6 +192,7 @@ class PdbReader {
   string_view text_;
   uint64_t line_ = 0, further_models_ = 0, symmetric_ = 0, unclear_ = 0;
   std::vector<string_view> atoms_;  // lines
+  string_view crystal_;             // the line of the unit cell and its symmetry
   std::string others_;              // lines that describe things that are not drawn
 };
 
@@ -204,16 +225,24 @@ absl::Status PdbReader::CheckPlace(string_view line) const {
   return absl::OkStatus();
 }
 
+// A model ends with ENDMDL or END, or where the next one begins: some programs write MODEL alone.
+bool DividesModels(string_view record) {
+  const string_view name = absl::StripAsciiWhitespace(record);
+  return name == "MODEL" || name == "ENDMDL" || name == "END";
+}
+
 // Keeps the lines of the first model's atoms, and counts the other models.
 absl::Status PdbReader::Scan(Builder* builder) {
   bool ended = false;
   return ForEachLine([&](string_view line) -> absl::Status {
     const string_view record = ColumnsOf(line, 1, 6);
-    if (absl::StartsWith(record, "ENDMDL") || absl::StripAsciiWhitespace(record) == "END") {
+    if (DividesModels(record)) {
       ended = true;
+    } else if (record == "CRYST1") {
+      if (crystal_.empty()) crystal_ = line;
     } else if (absl::StartsWith(record, "ATOM") || record == "HETATM") {
       if (ended && !atoms_.empty()) ++further_models_;
-      ended = ended && atoms_.empty();
+      ended = false;
       if (further_models_ > 0) return absl::OkStatus();
       if (!builder->Chooses(ColumnsOf(line, 17, 17).empty() ? ' ' : line[16],
                             ColumnsOf(line, 21, 27)))
@@ -284,6 +313,13 @@ gemmi::Element ElementOfName(const gemmi::Atom& atom, const gemmi::Residue& resi
   return atom.element;
 }
 
+void PdbReader::CountSymmetry(Model* model) const {
+  double alpha = 0, gamma = 0;
+  if (!absl::SimpleAtod(Stripped(crystal_, 34, 40), &alpha)) alpha = 0;
+  if (!absl::SimpleAtod(Stripped(crystal_, 48, 54), &gamma)) gamma = 0;
+  CountCrystalCopies(0, std::string(Stripped(crystal_, 56, 66)), "", alpha, gamma, model);
+}
+
 absl::Status PdbReader::Read(Builder* builder, Model* model) {
   if (absl::Status status = Scan(builder); !status.ok()) return status;
   if (atoms_.empty()) {
@@ -333,6 +369,7 @@ absl::Status PdbReader::Read(Builder* builder, Model* model) {
              static_cast<uint64_t>(std::count_if(structure.ncs.begin(), structure.ncs.end(),
                                                  [](const auto& op) { return !op.given; })),
              model);
+  CountSymmetry(model);
   AddNamedBonds(builder, model);
   return absl::OkStatus();
 }
@@ -510,31 +547,20 @@ absl::Status CifTokens::Next() {
 
 // Returns whether a table of a block is drawn, or describes something that is not drawn.
 bool IsKept(string_view tag) {
-  static constexpr string_view kKept[] = {"_atom_site.cartn_",
-                                          "_atom_site.type_symbol",
-                                          "_atom_site.label_",
-                                          "_atom_site.auth_",
-                                          "_atom_site.pdbx_pdb_",
-                                          "_atom_site.occupancy",
-                                          "_atom_site.b_iso",
-                                          "_atom_site.pdbx_formal_charge",
-                                          "_atom_site_label",
-                                          "_atom_site_type_symbol",
-                                          "_atom_site_fract_",
-                                          "_atom_site_u_iso",
-                                          "_atom_site_b_iso",
-                                          "_atom_site_occupancy",
-                                          "_atom_site_disorder_group",
-                                          "_cell_length_",
-                                          "_cell_angle_",
-                                          "_symmetry_",
-                                          "_space_group_",
-                                          "_chem_comp_atom.",
-                                          "_chem_comp_bond.",
-                                          "_struct_conn.",
-                                          "_struct_conf.",
-                                          "_struct_sheet_range.",
-                                          "_pdbx_struct_oper_list.",
+  static constexpr string_view kKept[] = {"_atom_site.cartn_",    "_atom_site.type_symbol",
+                                          "_atom_site.label_",    "_atom_site.auth_",
+                                          "_atom_site.pdbx_pdb_", "_atom_site.occupancy",
+                                          "_atom_site.b_iso",     "_atom_site.pdbx_formal_charge",
+                                          "_atom_site_label",     "_atom_site_type_symbol",
+                                          "_atom_site_fract_",    "_atom_site_u_iso",
+                                          "_atom_site_b_iso",     "_atom_site_occupancy",
+                                          "_atom_site_disorder_", "_cell_length_",
+                                          "_cell_angle_",         "_cell.angle_",
+                                          "_symmetry_",           "_symmetry.",
+                                          "_space_group_",        "_space_group.",
+                                          "_chem_comp_atom.",     "_chem_comp_bond.",
+                                          "_struct_conn.",        "_struct_conf.",
+                                          "_struct_sheet_range.", "_pdbx_struct_oper_list.",
                                           "_struct_ncs_oper."};
   return std::any_of(std::begin(kKept), std::end(kKept),
                      [tag](string_view kept) { return absl::StartsWithIgnoreCase(tag, kept); });
@@ -570,7 +596,18 @@ enum : size_t {
   kB,
   kCharge
 };
-enum : size_t { kFractX, kFractY, kFractZ, kLabel, kType, kUIso, kBIso, kSiteOccupancy, kGroup };
+enum : size_t {
+  kFractX,
+  kFractY,
+  kFractZ,
+  kLabel,
+  kType,
+  kUIso,
+  kBIso,
+  kSiteOccupancy,
+  kAssembly,
+  kGroup
+};
 constexpr size_t kMostPairs = 10000, kMostLoops = 1000;
 
 // Returns the value that is written so; empty if it is unknown (?) or does not apply (.).
@@ -663,6 +700,8 @@ class CifReader {
   void AddConnections(Builder* builder, Model* model);
   void AddComponentBonds(Builder* builder);
   void CountTheRest(Model* model);
+  std::string FirstOf(std::initializer_list<const char*> tags) const;
+  void CountSymmetry(Model* model) const;
 
   // The atoms of a residue with their names, in the order of the file.
   struct ResidueAtoms {
@@ -790,7 +829,8 @@ absl::Status CifReader::Read(Builder* builder, Model* model) {
                    "occupancy", "B_iso_or_equiv", "pdbx_formal_charge"});
   const CifColumns sites = block_.Find(
       "_atom_site_", {"fract_x", "fract_y", "fract_z", "label", "type_symbol", "U_iso_or_equiv",
-                      "B_iso_or_equiv", "occupancy", "disorder_group"});
+                      "B_iso_or_equiv", "occupancy", "disorder_assembly", "disorder_group"});
+  CountSymmetry(model);
   absl::Status status;
   if (atoms.rows() > 0) {
     status = ReadAtoms(atoms, builder, model);
@@ -892,27 +932,57 @@ void CifReader::ReadComponent(Builder* builder, Model* model) {
   AddLeftOut(kNoPlace, nowhere, model);
 }
 
-// Reads the atoms of a crystal's asymmetric unit; of a disordered one, those of its first group.
+// Returns the first value of these tags that the block has; empty if it has none.
+std::string CifReader::FirstOf(std::initializer_list<const char*> tags) const {
+  for (const char* tag : tags) {
+    const CifColumns one = block_.Find("", {tag});
+    if (one.rows() > 0 && !one.Text(0, 0).empty()) return one.Text(0, 0);
+  }
+  return "";
+}
+
+// Looks for the names of CIF's core dictionary and, with a point, of mmCIF's.
+void CifReader::CountSymmetry(Model* model) const {
+  uint64_t operators = 0;
+  for (const char* tag : {"_space_group_symop_operation_xyz", "_symmetry_equiv_pos_as_xyz",
+                          "_space_group_symop.operation_xyz", "_symmetry_equiv.pos_as_xyz"})
+    operators = std::max<uint64_t>(operators, block_.Find("", {tag}).rows());
+  CountCrystalCopies(operators,
+                     FirstOf({"_space_group_name_H-M_alt", "_symmetry_space_group_name_H-M",
+                              "_space_group.name_H-M_alt", "_symmetry.space_group_name_H-M"}),
+                     FirstOf({"_space_group_IT_number", "_symmetry_Int_Tables_number",
+                              "_space_group.IT_number", "_symmetry.Int_Tables_number"}),
+                     NumberOf(FirstOf({"_cell_angle_alpha", "_cell.angle_alpha"})),
+                     NumberOf(FirstOf({"_cell_angle_gamma", "_cell.angle_gamma"})), model);
+}
+
+// Reads the atoms of a crystal's asymmetric unit; where they are disordered, those of the first
+// group of each assembly.
 absl::Status CifReader::ReadCrystal(const CifColumns& sites, Builder* builder, Model* model) {
   model->format = "CIF crystal";
   gemmi::UnitCell cell;
-  const auto value = [&](const char* tag) {
-    const CifColumns one = block_.Find("", {tag});
-    return one.rows() > 0 ? one.Number(0, 0) : std::numeric_limits<double>::quiet_NaN();
-  };
-  const double a = value("_cell_length_a"), b = value("_cell_length_b"),
-               c = value("_cell_length_c"), alpha = value("_cell_angle_alpha"),
-               beta = value("_cell_angle_beta"), gamma = value("_cell_angle_gamma");
-  if (!(a > 0 && b > 0 && c > 0 && alpha > 0 && beta > 0 && gamma > 0)) {
+  const double a = NumberOf(FirstOf({"_cell_length_a"})), b = NumberOf(FirstOf({"_cell_length_b"})),
+               c = NumberOf(FirstOf({"_cell_length_c"}));
+  std::array<double, 3> angles = {};
+  size_t missing = 0;
+  for (size_t i = 0; i < 3; ++i) {
+    const char* const kTags[] = {"_cell_angle_alpha", "_cell_angle_beta", "_cell_angle_gamma"};
+    const std::string written = FirstOf({kTags[i]});
+    angles[i] = written.empty() ? kDefaultAngle : NumberOf(written);
+    missing += written.empty() ? 1 : 0;
+  }
+  if (!(a > 0 && b > 0 && c > 0 && angles[0] > 0 && angles[1] > 0 && angles[2] > 0)) {
     return FileError(file_, "has fractional coordinates without a unit cell",
                      "numbers in _cell_length_a to _cell_angle_gamma are expected");
   }
-  cell.set(a, b, c, alpha, beta, gamma);
-  std::string group;
-  for (size_t row = 0; row < sites.rows() && group.empty(); ++row) group = sites.Text(row, kGroup);
+  if (missing > 0) AddNote("angles of the unit cell that it does not have are 90°", model);
+  cell.set(a, b, c, angles[0], angles[1], angles[2]);
+  absl::flat_hash_map<string_view, string_view> groups;  // the first of each assembly
   uint64_t nowhere = 0, others = 0;
   for (size_t row = 0; row < sites.rows(); ++row) {
-    if (!sites.Text(row, kGroup).empty() && sites.Text(row, kGroup) != group) {
+    const std::string& group = sites.Text(row, kGroup);
+    if (!group.empty() &&
+        groups.emplace(sites.Text(row, kAssembly), group).first->second != group) {
       ++others;
       continue;
     }
@@ -933,16 +1003,6 @@ absl::Status CifReader::ReadCrystal(const CifColumns& sites, Builder* builder, M
          .occupancy = AttributeOf(sites.Number(row, kSiteOccupancy)),
          .charge = static_cast<double>(site.charge)});
   }
-  uint64_t copies = 0;
-  for (const char* tag : {"_symmetry_equiv_pos_as_xyz", "_space_group_symop_operation_xyz"})
-    copies = std::max<uint64_t>(copies, block_.Find("", {tag}).rows());
-  for (const char* tag : {"_space_group_name_H-M_alt", "_symmetry_space_group_name_H-M"}) {
-    const CifColumns name = block_.Find("", {tag});
-    if (copies > 0 || name.rows() == 0) continue;
-    const gemmi::SpaceGroup* found = gemmi::find_spacegroup_by_name(name.Text(0, 0), alpha, gamma);
-    if (found != nullptr) copies = static_cast<uint64_t>(found->operations().order());
-  }
-  AddLeftOut("copies by crystal symmetry", copies > 0 ? copies - 1 : 0, model);
   AddLeftOut(kOtherLocations, others, model);
   AddLeftOut(kNoPlace, nowhere, model);
   return absl::OkStatus();

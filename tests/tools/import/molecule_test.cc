@@ -2,11 +2,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_split.h"
+#include "absl/strings/string_view.h"
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include "tests/tools/import/read_here.h"
@@ -144,6 +149,63 @@ TEST_F(Molecules, FramesThatEndDivides) {
   }
 }
 
+TEST_F(Molecules, AnEndBeforeTheFirstAtomDoesNotDivide) {
+  const auto model =
+      Import("END\n" + Atom(1, " C  ", 0, 0, 0, "C") + Atom(2, " C  ", 5, 0, 0, "C"));
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(AtomsOf(*model), 2u);
+  EXPECT_TRUE(model->left_out.empty());
+}
+
+TEST_F(Molecules, ModelsThatOnlyBegin) {
+  const std::string atom = Atom(1, " C  ", 0, 0, 0, "C");
+  for (const char* begin : {"MODEL        2\n", "MODEL 2\n", "MODEL\n"}) {
+    for (const char* end : {"", "TER\n", "ENDMDL\n"}) {
+      const auto model = Import(
+          absl::StrCat("MODEL        1\n", atom, end, begin, atom, end, begin, atom, "END\n"));
+      ASSERT_THAT(model, IsOk());
+      EXPECT_EQ(model->parts.at(0).positions.size(), 1u) << begin << end;
+      EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"further models", 2}}));
+    }
+  }
+}
+
+// CRYST1 has the cell in columns 7 to 54 and the space group in 56 to 66 (wwPDB's format 3.3).
+TEST_F(Molecules, CopiesByTheSymmetryOfACrystalAreCounted) {
+  const std::string atom = Atom(1, " C  ", 0, 0, 0, "C");
+  const auto copies = [&](const std::string& group, double gamma = 90) {
+    const auto model = Import(absl::StrFormat("CRYST1%9.3f%9.3f%9.3f%7.2f%7.2f%7.2f %-11s%4d\n",
+                                              20., 30., 40., 90., 90., gamma, group, 4) +
+                              atom);
+    EXPECT_TRUE(model.ok()) << model.status();
+    return model.ok() ? model->left_out : std::vector<LeftOut>();
+  };
+  const auto counted = [](uint64_t count) {
+    return std::vector<LeftOut>{{"copies by crystal symmetry", count}};
+  };
+  EXPECT_EQ(copies("P 21 21 21"), counted(3));
+  EXPECT_EQ(copies("C 1 2 1"), counted(3));
+  EXPECT_EQ(copies("P 43 21 2"), counted(7));
+  EXPECT_EQ(copies("H 3", 120), counted(8));
+  EXPECT_TRUE(copies("P 1").empty());
+  EXPECT_TRUE(copies("").empty());
+  EXPECT_EQ(copies("Q 7"), (std::vector<LeftOut>{{"space groups that are not known", 1}}));
+
+  const std::string row = "C C . ALA A 1 0 0 0 1\n";
+  const auto cif = [&](const std::string& symmetry) {
+    const auto model = ImportAs("a.cif", Cif(row) + symmetry);
+    EXPECT_TRUE(model.ok()) << model.status();
+    return model.ok() ? model->left_out : std::vector<LeftOut>();
+  };
+  EXPECT_EQ(cif("_symmetry.space_group_name_H-M 'P 21 21 21'\n"), counted(3));
+  EXPECT_EQ(cif("_space_group.name_H-M_alt 'C 1 2 1'\n"), counted(3));
+  EXPECT_EQ(cif("_symmetry.Int_Tables_number 96\n_symmetry.space_group_name_H-M ?\n"), counted(7));
+  EXPECT_EQ(cif("loop_\n_space_group_symop.id\n_space_group_symop.operation_xyz\n1 x,y,z\n"
+                "2 -x,-y,-z\n"),
+            counted(1));
+  EXPECT_TRUE(cif("_symmetry.space_group_name_H-M 'P 1'\n").empty());
+}
+
 TEST_F(Molecules, AResidueHasOneLocationWhateverItsLetter) {
   const auto model = Import(Atom(1, " N  ", 0, 0, 0, "N") + Atom(2, " CA ", 9, 0, 0, "C", 'B') +
                             Atom(3, " CA ", 9, 1, 0, "C", 'C') + Atom(4, " C  ", 20, 0, 0, "C"));
@@ -157,7 +219,10 @@ TEST_F(Molecules, RealProteins) {
   ASSERT_THAT(model, IsOk()) << "tools/setup --import installs pymol-data";
   EXPECT_EQ(AtomsOf(*model), 1631u);  // grep -cE '^(ATOM|HETATM)'
   // grep -c '^HELIX', '^SHEET'
-  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"helices", 2}, {"strands of sheets", 19}}));
+  // The space group P 61 has 6 operators.
+  EXPECT_EQ(model->left_out,
+            (std::vector<LeftOut>{
+                {"helices", 2}, {"strands of sheets", 19}, {"copies by crystal symmetry", 5}}));
   // A chain of amino acids has about as many bonds as atoms, and a few more for rings.
   EXPECT_GT(model->parts[0].indices.size() / 4, 1500u);
   EXPECT_LT(model->parts[0].indices.size() / 4, 1800u);
@@ -367,6 +432,48 @@ TEST_F(Molecules, CrystalsInFractions) {
   EXPECT_THAT(ErrorOf("a.cif", "data_a\n" + sites), HasSubstr("without a unit cell"));
 }
 
+// In CIF's core dictionary, groups are alternatives within an assembly, and assemblies are
+// independent of each other.
+TEST_F(Molecules, EachAssemblyOfADisorderedCrystalShowsItsFirstGroup) {
+  const std::string cell =
+      "data_x\n_cell_length_a 10\n_cell_length_b 10\n_cell_length_c 10\n_cell_angle_alpha 90\n"
+      "_cell_angle_beta 90\n_cell_angle_gamma 90\nloop_\n_atom_site_label\n_atom_site_fract_x\n"
+      "_atom_site_fract_y\n_atom_site_fract_z\n";
+  const std::string sites = "_atom_site_disorder_assembly\n_atom_site_disorder_group\n";
+  // O1, N3 and F4 are in the first groups; assembly C has the same names of groups as assembly A.
+  const auto model = ImportAs("a.cif", cell + sites +
+                                           "C1 0 0 0 . .\nO1 .5 0 0 A 1\nO2 .5 .1 0 A 2\n"
+                                           "N3 0 .5 0 B 3\nN4 0 .6 0 B 4\nF4 0 0 .5 C 2\n"
+                                           "F5 0 .1 .5 C 1\nS6 .5 .5 .5 . .\n");
+  ASSERT_THAT(model, IsOk());
+  std::vector<double> elements = ValuesOf(*model, "element");
+  std::sort(elements.begin(), elements.end());
+  EXPECT_EQ(elements, (std::vector<double>{6, 7, 8, 9, 16}));
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"atoms at alternate locations", 3}}));
+}
+
+// CIF's dictionary has 90° as the default of the cell's angles.
+TEST_F(Molecules, CellsWithoutAnglesHaveRightOnes) {
+  const std::string lengths = "data_x\n_cell_length_a 10\n_cell_length_b 20\n_cell_length_c 30\n";
+  const std::string sites =
+      "loop_\n_atom_site_label\n_atom_site_fract_x\n_atom_site_fract_y\n_atom_site_fract_z\n"
+      "C1 0.5 0.5 0.5\n";
+  for (const char* angles : {"", "_cell_angle_alpha .\n_cell_angle_gamma 90\n"}) {
+    const auto model = ImportAs("a.cif", absl::StrCat(lengths, angles, sites));
+    ASSERT_THAT(model, IsOk()) << angles;
+    const Point3 at = model->parts.at(0).positions.at(0);
+    EXPECT_NEAR(at.x, 5, 1e-9);
+    EXPECT_NEAR(at.y, 10, 1e-9);
+    EXPECT_NEAR(at.z, 15, 1e-9);
+    EXPECT_THAT(model->note, HasSubstr("angles of the unit cell that it does not have are 90°"));
+  }
+  const auto monoclinic = ImportAs("a.cif", lengths + "_cell_angle_beta 120\n" + sites);
+  ASSERT_THAT(monoclinic, IsOk());
+  EXPECT_NEAR(monoclinic->parts.at(0).positions.at(0).x, 5 - 15 * 0.5, 1e-9);
+  EXPECT_THAT(ErrorOf("a.cif", lengths + "_cell_angle_beta wide\n" + sites),
+              HasSubstr("without a unit cell"));
+}
+
 TEST_F(Molecules, CifThatIsWrong) {
   EXPECT_THAT(ErrorOf("a.cif", "hello"), HasSubstr("a CIF file begins with data_"));
   EXPECT_THAT(ErrorOf("a.cif", "data_a\n_cell_length_a 3\n"), HasSubstr("without coordinates"));
@@ -422,6 +529,36 @@ TEST_F(Molecules, XyzByAtomicNumbersAndWithNamedColumns) {
   EXPECT_THAT(extended->parts.at(0).positions, ElementsAre(Point3{1, 2, 3}));
   EXPECT_EQ(ValuesOf(*extended, "id"), (std::vector<double>{7}));
   EXPECT_EQ(ValuesOf(*extended, "forces_3"), (std::vector<double>{0.3}));
+}
+
+// VMD writes names of atoms in place of symbols.
+TEST_F(Molecules, XyzWithNamesOfAtoms) {
+  const auto elements = [&](const std::string& words, std::string* note = nullptr) {
+    std::string text;
+    int count = 0;
+    for (const absl::string_view word : absl::StrSplit(words, ' '))
+      absl::StrAppend(&text, word, " ", 9 * count, " 0 0 ", count, "\n"), ++count;
+    const auto model = ImportAs("a.xyz", absl::StrCat(count, "\nnames\n", text));
+    EXPECT_TRUE(model.ok()) << model.status();
+    if (!model.ok()) return std::vector<double>();
+    if (note != nullptr) *note = model->note;
+    std::vector<double> numbers(static_cast<size_t>(count));
+    const std::vector<double> order = ValuesOf(*model, "column 5"),
+                              found = ValuesOf(*model, "element");
+    for (size_t i = 0; i < order.size(); ++i) numbers[static_cast<size_t>(order[i])] = found[i];
+    return numbers;
+  };
+  std::string note;
+  EXPECT_EQ(elements("CA1 CA2 HO1", &note), (std::vector<double>{6, 6, 1}));
+  EXPECT_EQ(note, "3 atoms have names, such as CA1, whose first letter is taken for the element");
+  // CB is not a symbol, so CA is not calcium and NE is not neon.
+  EXPECT_EQ(elements("CA CB NE", &note), (std::vector<double>{6, 6, 7}));
+  EXPECT_THAT(note, HasSubstr("3 atoms have names, such as CB"));
+  EXPECT_EQ(elements("CA O NE", &note), (std::vector<double>{20, 8, 10}));
+  EXPECT_EQ(note, "");
+  EXPECT_EQ(elements("Ca1 Na2 FE1 CL2 ZN3 C12", &note),
+            (std::vector<double>{20, 11, 26, 17, 30, 6}));
+  EXPECT_EQ(note, "");
 }
 
 TEST_F(Molecules, PointCloudsAreNotTakenForMolecules) {

@@ -210,22 +210,51 @@ std::optional<double> XyzNumber(absl::string_view word) {
   return value;
 }
 
-// Returns null if `word` is not an element; UnknownElement() for dummy atoms and unknown names.
-const ChemicalElement* XyzElementOf(absl::string_view word) {
-  if (const std::optional<uint64_t> number = AtomCountOf(word))
-    return *number > 0 && *number <= 118 ? FindElement(static_cast<int>(*number)) : nullptr;
-  size_t letters = 0;
-  while (letters < word.size() && absl::ascii_isalpha(static_cast<unsigned char>(word[letters])))
-    ++letters;
-  if (letters == 0) return nullptr;
-  if (const ChemicalElement* element = FindElement(word.substr(0, letters))) return element;
-  // For a name such as OW or CA1, the first letter counts.
+// How the first column of chemistry's XYZ says which element an atom is.
+enum class XyzSpelling : uint8_t {
+  kSymbol,  // "Ca", "CL", "Fe2" or a number of protons
+  kEither,  // "CA": calcium, or the alpha carbon of a protein
+  kName,    // "CA1", "OW", "HG11": the element is the first letter
+};
+
+struct XyzElement {
+  const ChemicalElement* element = nullptr;  // null if the word is not an element
+  XyzSpelling spelling = XyzSpelling::kSymbol;
+};
+
+// Returns whether a symbol in capitals is more likely the name of an atom: a letter for the
+// element, and one for the place in a residue. Symbols that are not used as names ("FE1", "CL2")
+// are not among them.
+bool IsXyzName(absl::string_view capitals) {
+  static constexpr absl::string_view kNames =
+      " CA CD CE CF CM CN HE HF HG HO HS NA NB ND NE NH NO NP OG PA PB PD SB SG ";
+  return absl::StrContains(kNames, absl::StrCat(" ", capitals, " "));
+}
+
+// Returns the element of a name; UnknownElement() for dummy atoms and unknown names.
+const ChemicalElement* ElementOfFirstLetter(absl::string_view word) {
   const ChemicalElement* element = FindElement(word.substr(0, 1));
   return element != nullptr ? element : &UnknownElement();
 }
 
+XyzElement XyzElementOf(absl::string_view word) {
+  if (const std::optional<uint64_t> number = AtomCountOf(word))
+    return {*number > 0 && *number <= 118 ? FindElement(static_cast<int>(*number)) : nullptr};
+  size_t letters = 0;
+  while (letters < word.size() && absl::ascii_isalpha(static_cast<unsigned char>(word[letters])))
+    ++letters;
+  if (letters == 0) return {};
+  const ChemicalElement* symbol = FindElement(word.substr(0, letters));
+  if (symbol == nullptr || (letters < word.size() && IsXyzName(word.substr(0, letters)))) {
+    const ChemicalElement* element = ElementOfFirstLetter(word);
+    const bool is_known = element != &UnknownElement();
+    return {element, is_known ? XyzSpelling::kName : XyzSpelling::kSymbol};
+  }
+  return {symbol, IsXyzName(word) ? XyzSpelling::kEither : XyzSpelling::kSymbol};
+}
+
 bool IsXyzAtom(const XyzWords& words, bool by_number) {
-  return words.size() >= 4 && XyzElementOf(words[0]) != nullptr &&
+  return words.size() >= 4 && XyzElementOf(words[0]).element != nullptr &&
          AtomCountOf(words[0]).has_value() == by_number && XyzNumber(words[1]) &&
          XyzNumber(words[2]) && XyzNumber(words[3]);
 }
@@ -274,6 +303,7 @@ class XyzReader {
 
   absl::Status ReadFrame();
   void CountTheRest(Model* model);
+  void ResolveNames(Model* model);
   Molecule Take() && { return std::move(molecule_); }
 
  private:
@@ -286,6 +316,9 @@ class XyzReader {
   XyzLines lines_;
   XyzLayout layout_;
   Molecule molecule_;
+  std::vector<std::pair<size_t, absl::string_view>> either_;  // atoms that kEither holds for
+  uint64_t names_ = 0;
+  absl::string_view first_name_;
 };
 
 absl::Status XyzReader::ReadAtom(const XyzWords& words) {
@@ -294,7 +327,8 @@ absl::Status XyzReader::ReadAtom(const XyzWords& words) {
     return WrongLine(absl::StrCat("has ", words.size(), " columns"),
                      "an element and its coordinates x y z are expected");
   }
-  atom.element = XyzElementOf(words[layout_.element]);
+  const XyzElement found = XyzElementOf(words[layout_.element]);
+  atom.element = found.element;
   if (atom.element == nullptr) {
     return WrongLine(absl::StrCat("begins with \"",
                                   EscapeForTerminal(words[layout_.element].substr(0, 24)), "\""),
@@ -311,6 +345,9 @@ absl::Status XyzReader::ReadAtom(const XyzWords& words) {
     }
     *numbers[i] = *value;
   }
+  if (found.spelling == XyzSpelling::kEither)
+    either_.emplace_back(molecule_.atoms.size(), words[layout_.element]);
+  if (found.spelling == XyzSpelling::kName && ++names_ == 1) first_name_ = words[layout_.element];
   molecule_.atoms.push_back(atom);
   for (size_t i = 0; i < layout_.others.size(); ++i) {
     const size_t column = layout_.others[i].first;
@@ -349,6 +386,18 @@ absl::Status XyzReader::ReadFrame() {
     if (absl::Status status = ReadAtom(words); !status.ok()) return status;
   }
   return absl::OkStatus();
+}
+
+// A file that has names has them for all atoms, so ambiguous words are names, too.
+void XyzReader::ResolveNames(Model* model) {
+  if (names_ == 0) return;
+  for (const auto& [atom, name] : either_)
+    molecule_.atoms[atom].element = ElementOfFirstLetter(name);
+  const uint64_t names = names_ + either_.size();
+  AddNote(absl::StrCat(names, names == 1 ? " atom has a name" : " atoms have names", ", such as ",
+                       EscapeForTerminal(first_name_.substr(0, 24)),
+                       ", whose first letter is taken for the element"),
+          model);
 }
 
 void XyzReader::CountTheRest(Model* model) {
@@ -446,6 +495,7 @@ absl::StatusOr<Model> ReadXyzMolecule(const SourceFile& file, MoleculeStyle styl
   if (absl::Status status = reader.ReadFrame(); !status.ok()) return status;
   Model model;
   model.format = "XYZ molecule";
+  reader.ResolveNames(&model);
   reader.CountTheRest(&model);
   absl::Status status = DrawMolecule(file, std::move(reader).Take(), style, attributes, &model);
   if (!status.ok()) return status;

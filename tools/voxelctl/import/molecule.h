@@ -42,7 +42,8 @@ absl::Status DrawMolecule(const SourceFile& file, Molecule molecule, MoleculeSty
 // an element and its coordinates on each line.
 bool IsXyzMolecule(absl::string_view text);
 
-// Reads the first frame. Elements are symbols, symbols with a label ("C12") or atomic numbers.
+// Reads the first frame. Elements are symbols, symbols with a label ("C12"), atomic numbers, or
+// names of atoms in capitals ("CA1", "OW"), whose first letter is the element; a note says so.
 // Columns after the coordinates become attributes: those that the comment names (Properties= of
 // extended XYZ), otherwise "column 5" and so on. Further frames and lines that belong to no frame
 // are counted. Errors: InvalidArgument with the line's number.
