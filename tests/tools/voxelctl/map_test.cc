@@ -150,6 +150,23 @@ TEST(GeoJson, ColoursOfSimplestyle) {
                                                    {"symbols of points", 1}}));
 }
 
+TEST(GeoJson, WidthsSizesAndFurtherNumbersAreCounted) {
+  const auto point = [](const std::string& properties) {
+    return Feature(properties, R"({"type":"Point","coordinates":[1,2]})");
+  };
+  const absl::StatusOr<Model> model = ImportText(
+      Collection(Feature(R"({"stroke-width":20})", Line("[[0,0,1,2],[1,0,1,2,3]]")) + "," +
+                 Feature(R"({"stroke-width":"0.5"})", Line("[[0,0],[1,0]]")) + "," +
+                 Feature(R"({"stroke-width":2,"marker-size":"medium"})", Line("[[0,0],[1,0]]")) +
+                 "," + point(R"({"marker-size":"large"})") + "," +
+                 point(R"({"marker-size":"","marker-symbol":""})")),
+      false);
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"widths of lines", 2},
+                                                   {"further numbers of positions", 3},
+                                                   {"sizes of points", 1}}));
+}
+
 TEST(GeoJson, MapsWithoutColoursHaveNone) {
   const absl::StatusOr<Model> model =
       ImportText(Feature(R"({"name":"red"})", Line("[[0,0],[1,0]]")), false);
@@ -188,6 +205,50 @@ TEST(TopoJson, ColoursAndNumbersOfTheFirstThatHasAnArc) {
               ElementsAre(Rgb{255, 0, 0}, Rgb{255, 0, 0}, Rgb{0, 255, 0}, Rgb{0, 255, 0}));
   EXPECT_THAT(ValuesOf(model->parts[0], "n"), ElementsAre(1.f, 1.f, 2.f, 2.f));
   EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"geometries without coordinates", 1}}));
+}
+
+// TopoJSON's specification allows properties of every geometry object, including collections.
+TEST(TopoJson, GeometriesHaveThePropertiesOfTheirCollection) {
+  const absl::StatusOr<Model> model = ImportText(
+      R"({"type":"Topology","objects":{"a":{"type":"GeometryCollection","properties":{"stroke":"#f00","v":3},)"
+      R"("geometries":[{"type":"LineString","arcs":[0]},)"
+      R"({"type":"GeometryCollection","properties":{"stroke":"#0f0","w":1},"geometries":[)"
+      R"({"type":"LineString","arcs":[1]},{"type":"LineString","arcs":[2],"properties":{"v":5}}]},)"
+      R"({"type":"Point","coordinates":[1,1],"properties":{}}]},)"
+      R"("b":{"type":"LineString","arcs":[3],"properties":{"stroke":"#00f"}}},)"
+      R"("arcs":[[[0,0],[1,0]],[[1,0],[2,0]],[[2,0],[3,0]],[[3,0],[4,0]]]})",
+      false, "map.topojson");
+  ASSERT_THAT(model, IsOk());
+  const Rgb red = {255, 0, 0}, green = {0, 255, 0}, blue = {0, 0, 255};
+  EXPECT_THAT(model->parts.at(0).colors,
+              ElementsAre(red, red, green, green, green, green, blue, blue));
+  const auto none = testing::IsNan();
+  EXPECT_THAT(ValuesOf(model->parts[0], "v"), ElementsAre(3., 3., 3., 3., 5., 5., none, none));
+  EXPECT_THAT(ValuesOf(model->parts[0], "w"), ElementsAre(none, none, 1., 1., 1., 1., none, none));
+  EXPECT_THAT(ValuesOf(model->parts.at(1), "v"), ElementsAre(3.));
+  EXPECT_TRUE(model->left_out.empty());
+}
+
+// TopoJSON's specification defines transforms and deltas for x and y only.
+TEST(TopoJson, HeightsAreAnAttribute) {
+  const std::string objects =
+      R"({"type":"Topology","objects":{"a":{"type":"LineString","arcs":[0]},"b":)"
+      R"({"type":"Point","coordinates":[1,1,7]}},)";
+  for (const char* rest :
+       {R"("arcs":[[[0,0,100],[10,0,200],[10,10]]]})",
+        R"("transform":{"scale":[2,2],"translate":[0,0]},"arcs":[[[0,0,100],[5,0,200],[0,5]]]})"}) {
+    const absl::StatusOr<Model> model = ImportText(objects + rest, false, "map.topojson");
+    ASSERT_THAT(model, IsOk());
+    EXPECT_THAT(Segments(model->parts.at(0)),
+                ElementsAre(std::pair(Point3{0, 0, 0}, Point3{10, 0, 0}),
+                            std::pair(Point3{10, 0, 0}, Point3{10, 10, 0})));
+    EXPECT_THAT(ValuesOf(model->parts[0], "height"), ElementsAre(100., 200., testing::IsNan()));
+    EXPECT_THAT(ValuesOf(model->parts.at(1), "height"), ElementsAre(7.));
+    TempFolder folder;
+    const absl::StatusOr<Model> plain = ReadHere(folder.Write("a.topojson", objects + rest), {});
+    ASSERT_THAT(plain, IsOk());
+    EXPECT_EQ(plain->left_out, (std::vector<LeftOut>{{"heights", 3}}));
+  }
 }
 
 TEST(TopoJson, AnArcOfOnePositionIsNotShown) {

@@ -32,7 +32,7 @@ class GeoJsonReader {
                      absl::StrCat(expected, " is expected"));
   }
   absl::Status ReadMembers(const json& object, const char* key, const std::string& where);
-  absl::Status ReadPosition(const json& position, const std::string& where, LonLat* out) const;
+  absl::Status ReadPosition(const json& position, const std::string& where, LonLat* out);
   absl::Status ReadCoordinates(const json& coordinates, const std::string& where, int depth,
                                bool closed, bool points);
 
@@ -41,13 +41,10 @@ class GeoJsonReader {
 };
 
 absl::Status GeoJsonReader::ReadPosition(const json& position, const std::string& where,
-                                         LonLat* out) const {
-  if (!position.is_array() || position.size() < 2 || !position[0].is_number() ||
-      !position[1].is_number()) {
-    return Wrong(where, "a position [longitude, latitude]");
-  }
-  *out = {position[0].get<double>(), position[1].get<double>()};
-  if (position.size() > 2 && position[2].is_number()) out->height = position[2].get<double>();
+                                         LonLat* out) {
+  const std::optional<LonLat> found = PositionOf(position, &lines_);
+  if (!found) return Wrong(where, "a position [longitude, latitude]");
+  *out = *found;
   return absl::OkStatus();
 }
 
@@ -137,6 +134,15 @@ absl::Status GeoJsonReader::ReadObject(const json& object, const std::string& wh
 
 }  // namespace
 
+std::optional<LonLat> PositionOf(const json& value, MapLines* lines) {
+  if (!value.is_array() || value.size() < 2 || !value[0].is_number() || !value[1].is_number())
+    return std::nullopt;
+  LonLat position{value[0].get<double>(), value[1].get<double>()};
+  if (value.size() > 2 && value[2].is_number()) position.height = value[2].get<double>();
+  if (value.size() > 3) lines->LeaveOut("further numbers of positions", value.size() - 3);
+  return position;
+}
+
 MapFeature FeatureOf(const json* properties, MapLines* lines) {
   MapFeature feature;
   if (properties == nullptr || !properties->is_object()) return feature;
@@ -164,7 +170,15 @@ MapFeature FeatureOf(const json* properties, MapLines* lines) {
   if (fill) lines->LeaveOut("fills of areas");
   const auto symbol = properties->find("marker-symbol");
   if (symbol != properties->end() && symbol->is_string() && *symbol != "")
-    lines->LeaveOut("symbols of points");
+    lines->LeaveOut(kPointSymbols);
+  // All lines are equally wide, and all points equally large. The defaults of simplestyle are a
+  // width of 2 and the size "medium".
+  const auto differs = [&](const char* key, const json& initial) {
+    const auto found = properties->find(key);
+    return found != properties->end() && !found->is_null() && *found != "" && *found != initial;
+  };
+  if (differs("stroke-width", 2) && differs("stroke-width", "2")) lines->LeaveOut(kLineWidths);
+  if (differs("marker-size", "medium")) lines->LeaveOut(kPointSizes);
   for (const auto& [name, value] : properties->items()) {
     if (value.is_number()) feature.numbers.emplace_back(name, value.get<double>());
   }

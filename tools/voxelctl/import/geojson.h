@@ -1,7 +1,13 @@
 // Reads maps: GeoJSON (RFC 7946) and TopoJSON (its specification, version 1).
+//
+// GDAL also reads both formats, but these readers are our own, because voxelctl shows maps without
+// the optional package voxeld-import: the demonstration shows a globe from TopoJSON. JSON needs
+// only nlohmann-json, which voxelctl uses anyway, while GDAL needs 81 further packages (174 MiB).
+// GDAL would also draw an arc of TopoJSON once for each neighbour that shares it.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string_view>
 
 #include "absl/status/statusor.h"
@@ -12,6 +18,10 @@
 namespace voxeld::voxelctl {
 
 inline constexpr std::string_view kNoCoordinates = "geometries without coordinates";
+
+// Reads a position: two numbers, and a height if the third is one. Counts the numbers after it in
+// `lines`. Returns nothing if `value` is not a position.
+std::optional<LonLat> PositionOf(const nlohmann::json& value, MapLines* lines);
 
 // Reads properties: the colours of simplestyle 1.1 (stroke, or otherwise fill, and marker-color
 // with their opacities) and all numbers. Counts in `lines` the parts of a style that are not drawn.
@@ -26,7 +36,8 @@ absl::StatusOr<Model> ReadGeoJson(const SourceFile& file, const nlohmann::json& 
 // Reads a Topology. Arcs are decoded (deltas and, if present, the transform), and each arc that an
 // object refers to is drawn once, however many neighbours share it. So the rings of all polygons
 // are closed and no border is doubled; a shared arc has the colour and the numbers of the first
-// object.
+// object. Geometries have the properties of the collection around them, unless they have the same
+// ones themselves. Heights are neither deltas nor transformed.
 absl::StatusOr<Model> ReadTopoJson(const SourceFile& file, const nlohmann::json& document,
                                    bool globe, bool attributes = false);
 

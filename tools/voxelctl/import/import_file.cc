@@ -184,7 +184,8 @@ const std::vector<Format>& OwnFormats() {
       {"maps", "GeoJSON, TopoJSON", ".geojson .topojson .json", "",
        "lines, points and the outlines of areas, simplestyle's colours; numbers of properties by "
        "--color-by; --globe puts them on a sphere",
-       "fills of areas, heights (except by --color-by)", "world-atlas: 4"},
+       "fills of areas, widths of lines, sizes of points, heights (except by --color-by)",
+       "world-atlas: 4"},
   };
   return formats;
 }

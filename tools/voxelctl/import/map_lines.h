@@ -17,6 +17,11 @@
 
 namespace voxeld::voxelctl {
 
+// Parts of styles that are left out, in several formats.
+inline constexpr std::string_view kLineWidths = "widths of lines";
+inline constexpr std::string_view kPointSizes = "sizes of points";
+inline constexpr std::string_view kPointSymbols = "symbols of points";
+
 // Degrees on a globe; any units on a flat map.
 struct LonLat {
   double lon = 0, lat = 0;

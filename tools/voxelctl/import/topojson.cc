@@ -1,5 +1,6 @@
 #include <array>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,20 +25,28 @@ class TopoJsonReader {
   absl::StatusOr<Model> Read(const json& document);
 
  private:
+  // The properties of the collections around a geometry, and the feature that those of its
+  // geometries share that have no properties of their own.
+  struct Inherited {
+    json properties;
+    std::optional<uint32_t> feature;
+  };
+
   absl::Status Wrong(const std::string& where, absl::string_view expected) const {
     return FileError(file_, absl::StrCat(where, " is not as TopoJSON wants it"),
                      absl::StrCat(expected, " is expected"));
   }
   absl::Status ReadPair(const json& value, const std::string& where,
                         std::array<double, 2>* out) const;
+  absl::Status ReadPosition(const json& value, const std::string& where, LonLat* out);
   absl::Status ReadTransform(const json& document);
   absl::Status MarkArcs(const json& arcs, const std::string& where, uint32_t feature);
   absl::Status ReadPoints(const json& coordinates, const std::string& where);
-  absl::Status ReadGeometry(const json& geometry, const std::string& where);
+  absl::Status ReadGeometry(const json& geometry, const std::string& where, Inherited* inherited);
   absl::Status DrawArc(const json& arc, const std::string& where);
 
-  LonLat Place(double x, double y) const {
-    return {x * scale_[0] + translate_[0], y * scale_[1] + translate_[1]};
+  LonLat Place(const LonLat& at) const {
+    return {at.lon * scale_[0] + translate_[0], at.lat * scale_[1] + translate_[1], at.height};
   }
 
   const SourceFile& file_;
@@ -53,6 +62,14 @@ absl::Status TopoJsonReader::ReadPair(const json& value, const std::string& wher
     return Wrong(where, "an array of two numbers");
   }
   *out = {value[0].get<double>(), value[1].get<double>()};
+  return absl::OkStatus();
+}
+
+absl::Status TopoJsonReader::ReadPosition(const json& value, const std::string& where,
+                                          LonLat* out) {
+  const std::optional<LonLat> found = PositionOf(value, &lines_);
+  if (!found) return Wrong(where, "an array of two numbers");
+  *out = *found;
   return absl::OkStatus();
 }
 
@@ -103,13 +120,13 @@ absl::Status TopoJsonReader::ReadPoints(const json& coordinates, const std::stri
     }
     return absl::OkStatus();
   }
-  std::array<double, 2> position{};
-  absl::Status status = ReadPair(coordinates, where, &position);
-  if (!status.ok()) return status;
-  return lines_.AddPoint(Place(position[0], position[1]));
+  LonLat position;
+  absl::Status status = ReadPosition(coordinates, where, &position);
+  return status.ok() ? lines_.AddPoint(Place(position)) : status;
 }
 
-absl::Status TopoJsonReader::ReadGeometry(const json& geometry, const std::string& where) {
+absl::Status TopoJsonReader::ReadGeometry(const json& geometry, const std::string& where,
+                                          Inherited* inherited) {
   if (!geometry.is_object()) return Wrong(where, "an object");
   const auto type = geometry.find("type");
   if (type == geometry.end() || type->is_null()) {
@@ -120,18 +137,28 @@ absl::Status TopoJsonReader::ReadGeometry(const json& geometry, const std::strin
     const auto it = geometry.find(key);
     return it == geometry.end() ? nullptr : &*it;
   };
+  const json* own = member("properties");
+  Inherited joined;
+  if (own != nullptr && own->is_object() && !own->empty()) {
+    joined.properties = inherited->properties;
+    joined.properties.update(*own);
+    inherited = &joined;
+  }
   if (*type == "GeometryCollection") {
     const json* geometries = member("geometries");
     if (geometries == nullptr || !geometries->is_array())
       return Wrong(absl::StrCat(where, ".geometries"), "an array");
     for (size_t i = 0; i < geometries->size(); ++i) {
       absl::Status status =
-          ReadGeometry((*geometries)[i], absl::StrCat(where, ".geometries[", i, "]"));
+          ReadGeometry((*geometries)[i], absl::StrCat(where, ".geometries[", i, "]"), inherited);
       if (!status.ok()) return status;
     }
     return absl::OkStatus();
   }
-  const uint32_t feature = lines_.BeginFeature(FeatureOf(member("properties"), &lines_));
+  if (!inherited->feature)
+    inherited->feature = lines_.BeginFeature(FeatureOf(&inherited->properties, &lines_));
+  const uint32_t feature = *inherited->feature;
+  lines_.ResumeFeature(feature);
   if (*type == "Point" || *type == "MultiPoint") {
     const json* coordinates = member("coordinates");
     const std::string at = absl::StrCat(where, ".coordinates");
@@ -153,13 +180,14 @@ absl::Status TopoJsonReader::ReadGeometry(const json& geometry, const std::strin
 absl::Status TopoJsonReader::DrawArc(const json& arc, const std::string& where) {
   if (!arc.is_array() || arc.empty()) return Wrong(where, "an array of positions");
   std::vector<LonLat> line(arc.size());
-  std::array<double, 2> at{};
+  LonLat before;
   for (size_t i = 0; i < line.size(); ++i) {
-    std::array<double, 2> value{};
-    absl::Status status = ReadPair(arc[i], absl::StrCat(where, "[", i, "]"), &value);
+    LonLat at;
+    absl::Status status = ReadPosition(arc[i], absl::StrCat(where, "[", i, "]"), &at);
     if (!status.ok()) return status;
-    at = quantized_ ? std::array<double, 2>{at[0] + value[0], at[1] + value[1]} : value;
-    line[i] = Place(at[0], at[1]);
+    if (quantized_) at.lon += before.lon, at.lat += before.lat;
+    line[i] = Place(at);
+    before = at;
   }
   if (line.size() == 1) {  // simplification leaves such arcs
     lines_.LeaveOut("arcs of one position");
@@ -177,7 +205,8 @@ absl::StatusOr<Model> TopoJsonReader::Read(const json& document) {
   if (!status.ok()) return status;
   users_.assign(arcs->size(), kNobody);
   for (const auto& [name, geometry] : objects->items()) {
-    status = ReadGeometry(geometry, absl::StrCat("objects.", EscapeForTerminal(name)));
+    Inherited none{json::object(), {}};
+    status = ReadGeometry(geometry, absl::StrCat("objects.", EscapeForTerminal(name)), &none);
     if (!status.ok()) return status;
   }
   for (size_t i = 0; i < users_.size(); ++i) {
