@@ -3,6 +3,8 @@
 #include <cpl_conv.h>
 #include <cpl_error.h>
 #include <cpl_vsi.h>
+#include <libxml/parser.h>
+#include <libxml/tree.h>
 #include <libxml/xmlreader.h>
 #include <ogr_featurestyle.h>
 #include <ogr_spatialref.h>
@@ -120,18 +122,6 @@ class FilesInMemory {
   }
 };
 
-uint64_t CountElements(absl::string_view text, absl::string_view name) {
-  uint64_t count = 0;
-  const std::string begin = absl::StrCat("<", name);
-  for (size_t at = text.find(begin); at != absl::string_view::npos; at = text.find(begin, at + 1)) {
-    const size_t next = at + begin.size();
-    if (next < text.size() && (text[next] == '>' || text[next] == '/' ||
-                               absl::ascii_isspace(static_cast<unsigned char>(text[next]))))
-      ++count;
-  }
-  return count;
-}
-
 // Old files begin with a folder, document or placemark, which LIBKML expects within <kml>. Returns:
 // the text wrapped in that element; empty if `text` begins otherwise.
 std::string WithRoot(absl::string_view text) {
@@ -157,9 +147,92 @@ std::string WithRoot(absl::string_view text) {
   return "";
 }
 
-// Checks places, because GDAL reads one that is not a number as 0. Errors: InvalidArgument with the
-// line of the first such place.
-absl::Status CheckPlacesOfGpx(const SourceFile& file) {
+absl::string_view NameOf(const xmlNode& node) {
+  return node.type == XML_ELEMENT_NODE && node.name != nullptr
+             ? reinterpret_cast<const char*>(node.name)
+             : absl::string_view();
+}
+
+// Returns whether the element itself, not one within it, is switched off.
+bool IsSwitchedOff(const xmlNode& element) {
+  for (const xmlNode* child = element.children; child != nullptr; child = child->next) {
+    if (NameOf(*child) != "visibility") continue;
+    std::string text;
+    for (const xmlNode* part = child->children; part != nullptr; part = part->next) {
+      if (part->type == XML_TEXT_NODE && part->content != nullptr)
+        absl::StrAppend(&text, reinterpret_cast<const char*>(part->content));
+    }
+    const absl::string_view value = absl::StripAsciiWhitespace(text);
+    if (value == "0" || value == "false") return true;
+  }
+  return false;
+}
+
+// The parts of a KML file that GDAL ignores: placemarks that the folders around them hide, and
+// elements that are not shown.
+struct KmlContents {
+  uint64_t hidden = 0;
+  std::vector<std::pair<const char*, uint64_t>> left_out;  // kinds
+  std::string visible;  // the file without its hidden placemarks; empty if it has none
+};
+
+// Requires valid XML: otherwise it finds nothing, and GDAL reports the error.
+KmlContents ScanKml(absl::string_view text) {
+  static constexpr std::pair<absl::string_view, const char*> kKinds[] = {
+      {"GroundOverlay", "ground overlays"},
+      {"ScreenOverlay", "screen overlays"},
+      {"PhotoOverlay", "photo overlays"},
+      {"NetworkLink", "network links"},
+      {"Model", "models"},
+      {"Tour", "tours"}};
+  KmlContents contents;
+  for (const auto& [element, kind] : kKinds) contents.left_out.emplace_back(kind, 0);
+  // A coordinate list may exceed libxml2's limit for texts. Without entities no text can grow.
+  const int huge = absl::StrContains(text, "<!ENTITY") ? 0 : XML_PARSE_HUGE;
+  const std::unique_ptr<xmlDoc, decltype(&xmlFreeDoc)> document(
+      xmlReadMemory(text.data(), static_cast<int>(text.size()), nullptr, nullptr,
+                    XML_PARSE_NONET | XML_PARSE_NOERROR | XML_PARSE_NOWARNING | huge),
+      &xmlFreeDoc);
+  xmlNode* node = document == nullptr ? nullptr : xmlDocGetRootElement(document.get());
+  std::vector<bool> off;             // of the elements around the next one
+  std::vector<xmlNode*> placemarks;  // hidden ones
+  // Visits an element before those within it.
+  while (node != nullptr) {
+    const absl::string_view name = NameOf(*node);
+    for (size_t i = 0; i < std::size(kKinds); ++i)
+      contents.left_out[i].second += name == kKinds[i].first ? 1 : 0;
+    const bool is_off = (!off.empty() && off.back()) || IsSwitchedOff(*node);
+    if (name == "Placemark" && is_off) placemarks.push_back(node);
+    if (node->children != nullptr && node->type == XML_ELEMENT_NODE) {
+      off.push_back(is_off);
+      node = node->children;
+      continue;
+    }
+    while (node != nullptr && node->next == nullptr) {
+      node = off.empty() ? nullptr : node->parent;
+      if (!off.empty()) off.pop_back();
+    }
+    if (node != nullptr) node = off.empty() ? nullptr : node->next;
+  }
+  contents.hidden = placemarks.size();
+  if (placemarks.empty()) return contents;
+  for (xmlNode* placemark : placemarks) {
+    xmlUnlinkNode(placemark);
+    xmlFreeNode(placemark);
+  }
+  xmlChar* bytes = nullptr;
+  int size = 0;
+  xmlDocDumpMemory(document.get(), &bytes, &size);
+  if (bytes == nullptr) throw std::bad_alloc();
+  contents.visible.assign(reinterpret_cast<const char*>(bytes), static_cast<size_t>(size));
+  xmlFree(bytes);
+  return contents;
+}
+
+// Checks places, because GDAL reads one that is not a number as 0. Counts the colours that
+// extensions give to tracks and routes (DisplayColor of Garmin, color of others); GPX has none
+// itself. Errors: InvalidArgument with the line of the first invalid place.
+absl::Status CheckGpx(const SourceFile& file, uint64_t* colors) {
   const std::unique_ptr<xmlTextReader, decltype(&xmlFreeTextReader)> reader(
       xmlReaderForMemory(file.bytes.data(), static_cast<int>(file.bytes.size()), nullptr, nullptr,
                          XML_PARSE_NONET | XML_PARSE_NOERROR | XML_PARSE_NOWARNING),
@@ -169,6 +242,7 @@ absl::Status CheckPlacesOfGpx(const SourceFile& file) {
     if (xmlTextReaderNodeType(reader.get()) != XML_READER_TYPE_ELEMENT) continue;
     const absl::string_view element =
         reinterpret_cast<const char*>(xmlTextReaderConstLocalName(reader.get()));
+    if (element == "DisplayColor" || element == "color") ++*colors;
     if (element != "wpt" && element != "rtept" && element != "trkpt") continue;
     for (const auto& [name, most] : {std::pair("lat", 90.0), std::pair("lon", 180.0)}) {
       const std::unique_ptr<xmlChar, void (*)(void*)> text(
@@ -210,7 +284,6 @@ class GdalMapReader {
   void AddNumbers(const OGRFeature& feature, MapFeature* style) const;
   absl::Status Draw(const OGRGeometry& geometry);
   absl::Status DrawLine(const OGRSimpleCurve& line, bool closed);
-  void CountElementsOfKml();
 
   const SourceFile& file_;
   const bool globe_;
@@ -218,11 +291,6 @@ class GdalMapReader {
   std::vector<SourceFile> beside_;
   std::unique_ptr<OGRCoordinateTransformation> to_degrees_;
 };
-
-bool IsHidden(const OGRFeature& feature) {
-  const int field = feature.GetFieldIndex("voxeld:VISIBILITY");
-  return field >= 0 && feature.IsFieldSetAndNotNull(field) && feature.GetFieldAsInteger(field) == 0;
-}
 
 // Returns whether the feature is a picture on the ground, of which LIBKML provides the outline.
 bool IsOverlay(const OGRFeature& feature) {
@@ -241,6 +309,7 @@ std::optional<Rgb> ColorOf(OGRStyleTool* tool, const char* text) {
 MapFeature GdalMapReader::StyleOf(const OGRFeature& feature) {
   MapFeature style;
   std::optional<Rgb> fill;
+  bool is_wide = false, is_large = false, has_symbol = false;
   OGRStyleMgr styles;
   styles.InitFromFeature(const_cast<OGRFeature*>(&feature));
   const int parts = feature.GetStyleString() == nullptr ? 0 : styles.GetPartCount();
@@ -251,15 +320,27 @@ MapFeature GdalMapReader::StyleOf(const OGRFeature& feature) {
     if (auto* const pen = dynamic_cast<OGRStylePen*>(tool.get())) {
       const char* const color = pen->Color(is_default);
       if (!is_default) style.line = ColorOf(pen, color);
+      pen->SetUnit(OGRSTUPixel);
+      const double width = pen->Width(is_default);
+      is_wide |= !is_default && width != 1;
     } else if (auto* const brush = dynamic_cast<OGRStyleBrush*>(tool.get())) {
       const char* const color = brush->ForeColor(is_default);
       if (!is_default) fill = ColorOf(brush, color);
     } else if (auto* const symbol = dynamic_cast<OGRStyleSymbol*>(tool.get())) {
       const char* const color = symbol->Color(is_default);
       if (!is_default) style.point = ColorOf(symbol, color);
+      const double size = symbol->Size(is_default);
+      is_large |= !is_default && size != 1;
+      const char* const id = symbol->Id(is_default);
+      has_symbol |= !is_default && id != nullptr && *id != '\0';
     }
   }
+  // A style may be for points and lines: only the part that the geometry uses counts.
   const OGRGeometry* const geometry = feature.GetGeometryRef();
+  const bool is_point = geometry != nullptr && geometry->getDimension() == 0;
+  lines_.LeaveOut(kLineWidths, is_wide && !is_point ? 1 : 0);
+  lines_.LeaveOut(kPointSizes, is_large && is_point ? 1 : 0);
+  lines_.LeaveOut(kPointSymbols, has_symbol && is_point ? 1 : 0);
   if (fill && geometry != nullptr && geometry->getDimension() == 2)
     lines_.LeaveOut("fills of areas");
   if (!style.line) style.line = fill;
@@ -332,11 +413,7 @@ absl::Status GdalMapReader::Draw(const OGRGeometry& geometry) {
 }
 
 absl::Status GdalMapReader::ReadFeature(const OGRFeature& feature) {
-  if (IsOverlay(feature)) return absl::OkStatus();  // already counted by CountElementsOfKml
-  if (IsHidden(feature)) {
-    lines_.LeaveOut("hidden features");
-    return absl::OkStatus();
-  }
+  if (IsOverlay(feature)) return absl::OkStatus();  // already counted by ScanKml
   const OGRGeometry* const geometry = feature.GetGeometryRef();
   if (geometry == nullptr) {
     lines_.LeaveOut("features without a geometry");
@@ -389,18 +466,6 @@ absl::Status GdalMapReader::ReadLayer(OGRLayer* layer) {
   return absl::OkStatus();
 }
 
-void GdalMapReader::CountElementsOfKml() {
-  const std::pair<const char*, const char*> kinds[] = {{"GroundOverlay", "ground overlays"},
-                                                       {"ScreenOverlay", "screen overlays"},
-                                                       {"PhotoOverlay", "photo overlays"},
-                                                       {"NetworkLink", "network links"},
-                                                       {"Model", "models"}};
-  for (const auto& [element, kind] : kinds) {
-    const uint64_t count = CountElements(file_.bytes, element);
-    if (count > 0) lines_.LeaveOut(kind, count);
-  }
-}
-
 absl::StatusOr<Model> GdalMapReader::Read() {
   struct Format {
     const char* extension;
@@ -418,11 +483,20 @@ absl::StatusOr<Model> GdalMapReader::Read() {
                      "maps do not need that");
   }
   if (file_.extension == "gpx") {
-    if (absl::Status status = CheckPlacesOfGpx(file_); !status.ok()) return status;
+    uint64_t colors = 0;
+    if (absl::Status status = CheckGpx(file_, &colors); !status.ok()) return status;
+    lines_.LeaveOut("colours of tracks", colors);
   }
   PrepareGdal();
   const QuietErrors quiet;
-  const std::string with_root = file_.extension == "kml" ? WithRoot(file_.bytes) : "";
+  std::string prepared;  // the text that GDAL reads instead of the file
+  if (file_.extension == "kml") {
+    prepared = WithRoot(file_.bytes);
+    KmlContents contents = ScanKml(prepared.empty() ? file_.bytes : prepared);
+    for (const auto& [kind, count] : contents.left_out) lines_.LeaveOut(kind, count);
+    lines_.LeaveOut("hidden features", contents.hidden);
+    if (!contents.visible.empty()) prepared = std::move(contents.visible);
+  }
   FilesInMemory memory;
   if (!is_xml) {
     const std::string path = std::filesystem::path(file_.path).filename().string();
@@ -437,8 +511,7 @@ absl::StatusOr<Model> GdalMapReader::Read() {
       memory.Add(extension, beside_.back().bytes);
     }
   }
-  const std::string name =
-      memory.Add(format.extension, with_root.empty() ? file_.bytes : with_root);
+  const std::string name = memory.Add(format.extension, prepared.empty() ? file_.bytes : prepared);
   const char* const drivers[] = {format.driver, nullptr};
   const GDALDatasetUniquePtr data(GDALDataset::Open(
       name.c_str(), GDAL_OF_VECTOR | GDAL_OF_READONLY | GDAL_OF_VERBOSE_ERROR, drivers));
@@ -450,7 +523,6 @@ absl::StatusOr<Model> GdalMapReader::Read() {
         absl::StrCat("a map in the format ", format.name, " is expected"));
   }
   CPLErrorReset();
-  if (file_.extension == "kml") CountElementsOfKml();
   for (OGRLayer* layer : data->GetLayers()) {
     if (absl::Status status = ReadLayer(layer); !status.ok()) return status;
   }

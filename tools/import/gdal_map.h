@@ -4,9 +4,10 @@
 // drivers for them are registered (LIBKML, not KML, which has neither styles nor numbers). It gets
 // files in memory and has neither plug-ins nor network, and neither environment variables nor
 // configuration files change what it does. GeoJSON and TopoJSON, which every build reads, have
-// readers of our own. GDAL loses the visibility of KML's folders and styles in other files. If
-// points of a GPX track have no elevation it is 0, and times and other numbers of a track's points
-// are not read.
+// readers of our own (geojson.h says why). GDAL ignores the visibility of KML's folders, so hidden
+// placemarks are removed before it reads the file. It loses styles in other files. If points of a
+// GPX track have no elevation it is 0, and times and other numbers of a track's points are not
+// read.
 #pragma once
 
 #include <string>

@@ -114,7 +114,8 @@ const std::vector<Reader>& Readers() {
       {{"maps", "Shapefile, GPX, KML", ".shp .gpx .kml", "GDAL 3.6",
         "lines, points and the outlines of areas, KML's styles; numbers by --color-by; projected "
         "coordinates for --globe",
-        "fills of areas, heights (except by --color-by), KML's overlays and models",
+        "fills of areas, widths of lines, heights (except by --color-by), KML's icons, overlays, "
+        "models and tours, colours of GPX tracks",
         "libkml: 7 of 20"},
        [](const SourceFile& file, const ImportOptions& options) {
          return ReadGdalMap(file, options.globe, options.attributes);

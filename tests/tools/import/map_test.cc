@@ -25,6 +25,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::IsNan;
+using ::testing::UnorderedElementsAre;
 
 // Numbers in both byte orders.
 template <typename T>
@@ -322,8 +323,74 @@ TEST_F(Maps, ColoursAndNumbersOfKml) {
   EXPECT_THAT(numbers[2], IsNan());
   EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"ground overlays", 1},
                                                    {"network links", 1},
-                                                   {"fills of areas", 1},
-                                                   {"hidden features", 1}}));
+                                                   {"hidden features", 1},
+                                                   {"fills of areas", 1}}));
+}
+
+// In KML, a feature is visible only if all folders and documents around it are visible, too.
+TEST_F(Maps, WhatIsInHiddenFoldersOfKmlIsHidden) {
+  const auto line = [](int y, const std::string& before = "") {
+    return absl::StrCat("<Placemark>", before, "<LineString><coordinates>0,", y, " 10,", y,
+                        "</coordinates></LineString></Placemark>");
+  };
+  const std::string hidden = "<visibility>0</visibility>";
+  const auto model = Import(
+      "a.kml",
+      Kml("<Folder>" + hidden + line(1) + "<Folder><visibility>1</visibility>" + line(2) +
+          "<Placemark><visibility>1</visibility><MultiGeometry><Point><coordinates>1,1"
+          "</coordinates></Point></MultiGeometry></Placemark></Folder></Folder><Folder>" +
+          line(3) + line(4, hidden) + "<Folder>" + line(5) + "<visibility> false </visibility>" +
+          "</Folder><!-- " + hidden + " --></Folder>" + line(6)));
+  ASSERT_THAT(model, IsOk());
+  ASSERT_EQ(model->parts.size(), 1u);
+  EXPECT_THAT(Segments(model->parts[0]),
+              UnorderedElementsAre(std::pair(Point3{0, 3, 0}, Point3{10, 3, 0}),
+                                   std::pair(Point3{0, 6, 0}, Point3{10, 6, 0})));
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"hidden features", 5}}));
+  EXPECT_THAT(Error("a.kml", "<Document>" + hidden + line(1) + "</Document>"),
+              HasSubstr("hidden features (1)"));
+  // A root without a namespace, and an undeclared prefix.
+  const auto loose =
+      Import("a.kml", "<kml><Document><gx:balloonVisibility>0</gx:balloonVisibility>" + line(1) +
+                          "<Folder>" + hidden + line(2) + "</Folder></Document></kml>");
+  ASSERT_THAT(loose, IsOk());
+  EXPECT_EQ(Segments(loose->parts.at(0)).size(), 1u);
+  EXPECT_EQ(loose->left_out, (std::vector<LeftOut>{{"hidden features", 1}}));
+}
+
+TEST_F(Maps, StylesOfKmlThatAreNotShownAreCounted) {
+  const auto model = Import(
+      "a.kml",
+      Kml(R"(<Style id="s"><LineStyle><color>ff0000ff</color><width>4</width></LineStyle>)"
+          R"(<IconStyle><scale>2</scale><Icon><href>a.png</href></Icon></IconStyle></Style>)"
+          R"(<Style id="plain"><LineStyle><color>ff0000ff</color><width>1</width></LineStyle>)"
+          R"(<IconStyle><color>ff00ff00</color><scale>1</scale></IconStyle></Style>)"
+          R"(<Placemark><styleUrl>#s</styleUrl><LineString><coordinates>0,0 9,0</coordinates></LineString></Placemark>)"
+          R"(<Placemark><styleUrl>#s</styleUrl><Point><coordinates>1,1</coordinates></Point></Placemark>)"
+          R"(<Placemark><styleUrl>#plain</styleUrl><LineString><coordinates>0,0 9,0</coordinates></LineString></Placemark>)"
+          R"(<Placemark><styleUrl>#plain</styleUrl><Point><coordinates>1,1</coordinates></Point></Placemark>)"
+          R"(<gx:Tour xmlns:gx="http://www.google.com/kml/ext/2.2"><gx:Playlist/></gx:Tour>)"
+          R"(<!-- <NetworkLink/> -->)"));
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(
+      model->left_out,
+      (std::vector<LeftOut>{
+          {"tours", 1}, {"widths of lines", 1}, {"sizes of points", 1}, {"symbols of points", 1}}));
+}
+
+TEST_F(Maps, ColoursOfGpxTracksAreCounted) {
+  const std::string segment =
+      R"(<trkseg><trkpt lat="0" lon="0"><extensions><hr>90</hr></extensions></trkpt>)"
+      R"(<trkpt lat="5" lon="10"/></trkseg>)";
+  const auto model = Import(
+      "a.gpx",
+      Gpx(R"(<trk><extensions><g:TrackExtension xmlns:g="http://www.garmin.com/xmlschemas/GpxExtensions/v3">)"
+          R"(<g:DisplayColor>Red</g:DisplayColor></g:TrackExtension></extensions>)" +
+          segment + R"(</trk><trk><extensions><color>#00ff00</color></extensions>)" + segment +
+          "</trk><trk>" + segment + "</trk>"));
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(Segments(model->parts.at(0)).size(), 3u);
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"colours of tracks", 2}}));
 }
 
 TEST_F(Maps, KmlWithoutItsRoot) {
