@@ -123,7 +123,8 @@ const std::vector<Reader>& Readers() {
       {{"drawings", "SVG", ".svg .svgz", "librsvg 2.54",
         "SVG 1.1 and parts of 2, with CSS, texts, gradients, patterns, clips, masks, markers and "
         "embedded PNG and JPEG pictures",
-        "scripts, animations, filters, foreign objects, SVG fonts, other files",
+        "scripts, animations, filters, foreign objects, SVG fonts, other files, properties and "
+        "functions of CSS that librsvg does not know",
         "846 of the 848 files on a Debian system; gromacs-data and others: 4,151 of 4,152 (one "
         "holds only a font)"},
        [](const SourceFile& file, const ImportOptions& options) {

@@ -8,12 +8,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <unordered_map>
 #include <unordered_set>
 #include <utility>
 
+#include "absl/container/flat_hash_set.h"
 #include "absl/strings/ascii.h"
 #include "absl/strings/escaping.h"
 #include "absl/strings/match.h"
@@ -48,6 +50,47 @@ constexpr absl::string_view kKnown =
     "image "
     "line linearGradient marker mask metadata missing-glyph path pattern polygon polyline "
     "radialGradient rect stop style svg switch symbol text title tref tspan use view vkern ";
+
+// Properties that librsvg 2.54 ignores although they change the picture.
+constexpr absl::string_view kIgnoredProperties =
+    " alignment-baseline all backdrop-filter clip color-interpolation d dominant-baseline "
+    "font-feature-settings font-kerning font-size-adjust font-variant-caps font-variation-settings "
+    "inline-size kerning mask-border mask-image offset-path outline rotate scale shape-inside "
+    "shape-subtract text-decoration-line text-emphasis text-shadow text-transform transform-box "
+    "transform-origin translate vector-effect white-space word-spacing zoom ";
+// Properties of the page, which are those of the outermost element.
+constexpr absl::string_view kPageProperties = " background background-color background-image ";
+// Attributes that it ignores.
+constexpr absl::string_view kIgnoredAttributes =
+    " alignment-baseline clip color-interpolation dominant-baseline font-size-adjust kerning "
+    "transform-origin vector-effect word-spacing pathLength ";
+constexpr absl::string_view kIgnoredAttributesOfTexts = " lengthAdjust rotate textLength ";
+// Values with which these have no effect.
+constexpr absl::string_view kInitialValues[] = {
+    "",         "none",       "normal",   "auto",    "0",      "0px",        "0 0",
+    "0px 0px",  "0,0",        "srgb",     "inherit", "unset",  "revert",     "initial",
+    "baseline", "alphabetic", "view-box", "spacing", "nowrap", "transparent"};
+// Attributes whose values may have functions.
+constexpr absl::string_view kValueAttributes =
+    " clip-path color cursor cx cy fill fill-opacity flood-color font-size height mask opacity r "
+    "rx "
+    "ry stop-color stop-opacity stroke stroke-dasharray stroke-dashoffset stroke-opacity "
+    "stroke-width width x x1 x2 y y1 y2 ";
+constexpr absl::string_view kKnownFunctions =
+    " url rgb rgba hsl hsla matrix translate translatex translatey scale scalex scaley rotate skew "
+    "skewx skewy icc-color ";
+constexpr size_t kMostIgnoredKinds = 40;  // that are named
+constexpr size_t kLongestName = 40;
+
+// Returns whether `word` is one of `words`, which have spaces around them.
+bool HasWord(absl::string_view words, absl::string_view word) {
+  if (word.empty()) return false;
+  for (size_t at = words.find(word); at != absl::string_view::npos; at = words.find(word, at + 1)) {
+    const size_t end = at + word.size();
+    if (at > 0 && words[at - 1] == ' ' && end < words.size() && words[end] == ' ') return true;
+  }
+  return false;
+}
 
 struct NamedKind {
   absl::string_view element, kind;
@@ -183,6 +226,78 @@ void ForEachUrl(absl::string_view text, Visit visit) {
   }
 }
 
+bool IsInitialValue(absl::string_view value) {
+  const std::string lower = absl::AsciiStrToLower(value);
+  return std::find(std::begin(kInitialValues), std::end(kInitialValues), lower) !=
+         std::end(kInitialValues);
+}
+
+// Returns where the string, comment or text in parentheses that begins at `at` ends; `at` if none
+// begins there.
+size_t EndOfGroup(absl::string_view text, size_t at) {
+  const char first = text[at];
+  if (first == '"' || first == '\'') {
+    size_t end = at + 1;
+    while (end < text.size() && text[end] != first) end += text[end] == '\\' ? 2 : 1;
+    return std::min(end + 1, text.size());
+  }
+  if (absl::StartsWith(text.substr(at), "/*")) {
+    const size_t end = text.find("*/", at + 2);
+    return end == absl::string_view::npos ? text.size() : end + 2;
+  }
+  if (first != '(') return at;
+  int depth = 0;
+  for (size_t end = at; end < text.size(); ++end) {
+    depth += text[end] == '(' ? 1 : text[end] == ')' ? -1 : 0;
+    if (depth == 0) return end + 1;
+  }
+  return text.size();
+}
+
+// Calls `visit` with the name and the value of each declaration of a style or a style sheet, and
+// with the selectors of its rule (empty in a style). Skips the rules within @media and others,
+// which librsvg ignores and ReadStyleSheet counts.
+template <typename Visit>
+void ForEachDeclaration(absl::string_view text, Visit visit) {
+  size_t begin = 0;
+  uint64_t depth = 0;
+  bool in_at_rule = false;
+  absl::string_view selectors;
+  const auto end_at = [&](size_t at) {
+    const absl::string_view one = text.substr(begin, at - begin);
+    const size_t colon = one.find(':');
+    if (colon == absl::string_view::npos || in_at_rule) return;
+    absl::string_view value = absl::StripAsciiWhitespace(one.substr(colon + 1));
+    value = absl::StripAsciiWhitespace(value.substr(0, value.rfind("!important")));
+    const std::string name =
+        absl::AsciiStrToLower(absl::StripAsciiWhitespace(one.substr(0, colon)));
+    visit(name, value, selectors);
+  };
+  for (size_t at = 0; at < text.size();) {
+    const size_t end = EndOfGroup(text, at);
+    if (end > at) {
+      // A comment is not a part of the name after it.
+      const bool is_before = absl::StripAsciiWhitespace(text.substr(begin, at - begin)).empty();
+      if (text[at] == '/' && is_before) begin = end;
+      at = end;
+      continue;
+    }
+    const char c = text[at];
+    if (c == '{') {
+      if (depth++ == 0) {
+        selectors = absl::StripAsciiWhitespace(text.substr(begin, at - begin));
+        in_at_rule = absl::StartsWith(selectors, "@");
+      }
+    } else if (c == ';' || c == '}') {
+      end_at(at);
+      if (c == '}' && depth > 0 && --depth == 0) selectors = "", in_at_rule = false;
+    }
+    ++at;
+    if (c == '{' || c == ';' || c == '}') begin = at;
+  }
+  end_at(text.size());
+}
+
 // Returns whether rules for this medium do not apply to a normal screen.
 bool IsOtherMedium(absl::string_view medium) {
   return medium == "print" || medium == "speech" ||
@@ -304,6 +419,75 @@ class Scanner {
     unknown_.emplace_back(EscapeForTerminal(name.substr(0, 60)), 1);
   }
 
+  void CountIgnored(absl::string_view kind) {
+    if (ignored_kinds_.contains(kind) || ignored_kinds_.size() < kMostIgnoredKinds) {
+      ignored_kinds_.emplace(kind);
+      Count(kind);
+    } else {
+      Count("other properties");
+    }
+  }
+
+  // Counts a value with a function that librsvg does not know: it ignores the whole value.
+  void CountFunctions(absl::string_view value) {
+    for (size_t at = value.find('('); at != absl::string_view::npos; at = value.find('(', at + 1)) {
+      size_t begin = at;
+      while (begin > 0 && (absl::ascii_isalnum(static_cast<unsigned char>(value[begin - 1])) ||
+                           value[begin - 1] == '-'))
+        --begin;
+      const std::string name = absl::AsciiStrToLower(value.substr(begin, at - begin));
+      if (name == "url") at = std::min(value.find(')', at), value.size() - 1);
+      if (name.empty() || name.size() > kLongestName || HasWord(kKnownFunctions, name)) continue;
+      return CountIgnored(absl::StrCat("values with ", name, "()"));
+    }
+  }
+
+  void CountDeclaration(absl::string_view name, absl::string_view value, bool of_page) {
+    if (HasWord(kIgnoredProperties, name) || (of_page && HasWord(kPageProperties, name))) {
+      const bool is_one = value == "1" && (name == "scale" || name == "zoom");
+      if (!IsInitialValue(value) && !is_one) CountIgnored(absl::StrCat(name, " properties"));
+      return;
+    }
+    // librsvg ignores transforms with percentages or turns.
+    if (name == "transform" && (absl::StrContains(value, '%') || absl::StrContains(value, "turn")))
+      return CountIgnored("transform properties");
+    for (const absl::string_view other :
+         {"filter", "animation", "transition", "-", "src", "content", "background", "@"}) {
+      if (absl::StartsWith(name, other)) return;
+    }
+    CountFunctions(value);
+  }
+
+  // Counts the attributes of an element, and the properties in its style, that librsvg ignores.
+  void CountIgnoredAttributes(absl::string_view element, int count, const xmlChar** attributes) {
+    const bool is_text = element == "text" || element == "tspan" || element == "tref";
+    bool has_transform = false, has_style_transform = false;
+    for (int i = 0; i < count; ++i) {
+      const absl::string_view key = View(attributes[5 * i]);
+      const absl::string_view value = absl::StripAsciiWhitespace(
+          absl::string_view(reinterpret_cast<const char*>(attributes[5 * i + 3]),
+                            static_cast<size_t>(attributes[5 * i + 4] - attributes[5 * i + 3])));
+      if (attributes[5 * i + 1] != nullptr) continue;  // of a namespace
+      has_transform |= key == "transform";
+      const bool is_ignored = HasWord(kIgnoredAttributes, key) ||
+                              (is_text && HasWord(kIgnoredAttributesOfTexts, key)) ||
+                              (element == "symbol" && (key == "refX" || key == "refY"));
+      if (is_ignored && !IsInitialValue(value)) CountIgnored(absl::StrCat(key, " attributes"));
+      if (HasWord(kValueAttributes, key)) CountFunctions(value);
+      if (is_text && (key == "x" || key == "y" || key == "dx" || key == "dy") &&
+          value.find_first_of(" ,\t\r\n") != absl::string_view::npos)
+        CountIgnored("positions of single letters");
+      if (key != "style") continue;
+      ForEachDeclaration(value,
+                         [&](absl::string_view name, absl::string_view of, absl::string_view) {
+                           has_style_transform |= name == "transform" && !IsInitialValue(of);
+                           CountDeclaration(name, of, elements_.empty());
+                         });
+    }
+    // In CSS the property overrides the attribute; in librsvg it is the other way round.
+    if (has_transform && has_style_transform) CountIgnored("transform properties");
+  }
+
   // Elements in entities would be drawn without being checked here.
   void Entity(void* context, absl::string_view name, absl::string_view content) {
     if (!absl::StrContains(content, '<')) return;
@@ -385,6 +569,7 @@ class Scanner {
     if (wrong_points && (name == "polygon" || name == "polyline"))
       Count("polygons with wrong points");
     if (filtered && name != "filter") Count("filters");
+    if (!absl::StartsWith(name, "fe")) CountIgnoredAttributes(name, count, attributes);
     if (name == "use" || name == "pattern") {
       absl::string_view id = absl::StripAsciiWhitespace(href);
       if (absl::ConsumePrefix(&id, "#")) {
@@ -455,7 +640,12 @@ class Scanner {
       if (at == std::string::npos) at = style_.size();
       if (SetsFilter(absl::string_view(style_).substr(from, at - from))) Count("filters");
     }
-    if (absl::StrContains(style_, "var(--")) Count("style sheets with variables");
+    ForEachDeclaration(
+        style_, [&](absl::string_view name, absl::string_view value, absl::string_view selectors) {
+          const bool of_page =
+              absl::StrContains(selectors, "svg") || absl::StrContains(selectors, ":root");
+          CountDeclaration(name, value, of_page);
+        });
     const absl::string_view text = style_;
     for (size_t at = text.find('@'); at != absl::string_view::npos; at = text.find('@', at + 1)) {
       absl::string_view rest = text.substr(at + 1);
@@ -564,6 +754,7 @@ class Scanner {
   std::vector<std::string> used_;
   std::unordered_set<std::string> style_targets_;
   std::vector<std::pair<std::string, uint64_t>> unknown_;
+  absl::flat_hash_set<std::string> ignored_kinds_;
   uint32_t left_out_depth_ = 0;
   int brackets_ = 0;
   bool in_style_ = false;

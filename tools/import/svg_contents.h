@@ -13,7 +13,7 @@
 namespace voxeld::voxelctl {
 
 struct SvgContents {
-  std::vector<LeftOut> left_out;  // elements and rules that librsvg ignores
+  std::vector<LeftOut> left_out;  // elements, rules, properties and functions that librsvg ignores
   uint64_t texts = 0;
   bool can_draw_texts = true;  // false if librsvg would fail on large sizes or long texts
 };

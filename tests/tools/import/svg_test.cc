@@ -551,7 +551,7 @@ TEST_F(Drawings, WhatIsNotDrawnIsCounted) {
           "height='9' "
           "fill='red' filter='url(#f)'/><g style='fill:red; filter : blur(2px)'/><g filter='none'/>"
           "<style>g{filter:url(#f)} a{filter:none} b{backdrop-filter:x}</style>"),
-      ElementsAre(LeftOut{"filters", 3}));
+      ElementsAre(LeftOut{"filters", 3}, LeftOut{"backdrop-filter properties", 1}));
   EXPECT_THAT(
       left_out("<hatch/><hatch><hatchpath/></hatch><meshgradient/>"),
       UnorderedElementsAre(LeftOut{"<hatch> elements", 2}, LeftOut{"<meshgradient> elements", 1}));
@@ -564,7 +564,7 @@ TEST_F(Drawings, WhatIsNotDrawnIsCounted) {
                "a{fill:var(--x)}</style>"),
       UnorderedElementsAre(LeftOut{"imported style sheets", 1}, LeftOut{"fonts", 1},
                            LeftOut{"@media rules", 1}, LeftOut{"animations", 1},
-                           LeftOut{"style sheets with variables", 1}));
+                           LeftOut{"values with var()", 1}));
   EXPECT_THAT(
       left_out("<metadata><a xmlns='x:y'/></metadata><title>a</title><desc/><view/>"
                "<n:namedview xmlns:n='http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd'/>"),
@@ -573,6 +573,73 @@ TEST_F(Drawings, WhatIsNotDrawnIsCounted) {
   for (int i = 0; i < 100; ++i) absl::StrAppend(&many, "<x", i, "/>");
   EXPECT_THAT(left_out(many),
               AllOf(testing::SizeIs(21), testing::Contains(LeftOut{"other elements", 80})));
+}
+
+// Features of SVG 2 and CSS that librsvg 2.54 ignores, in attributes, styles and style sheets.
+TEST_F(Drawings, PropertiesThatAreNotDrawnAreCounted) {
+  const auto left_out = [&](const std::string& content, const std::string& page = "") {
+    return ReadAll(Svg("<rect width='100' height='100' fill='lime'/>" + content,
+                       "viewBox='0 0 100 100' " + page))
+        .left_out;
+  };
+  const auto rect = [](const std::string& attributes) {
+    return "<rect width='9' height='9' fill='red' " + attributes + "/>";
+  };
+  const auto one = [](const std::string& kind) { return ElementsAre(LeftOut{kind, 1}); };
+  EXPECT_THAT(left_out(rect("transform='scale(0.5)' transform-origin='100 100'")),
+              one("transform-origin attributes"));
+  EXPECT_THAT(left_out(rect("style='transform-origin: center;'")),
+              one("transform-origin properties"));
+  EXPECT_THAT(left_out(rect("vector-effect='non-scaling-stroke'")),
+              one("vector-effect attributes"));
+  EXPECT_THAT(left_out(rect("style='clip-path: circle(10px at 20px 20px)'")),
+              one("values with circle()"));
+  EXPECT_THAT(left_out(rect("clip-path='inset(3px)'")), one("values with inset()"));
+  EXPECT_THAT(left_out(rect("style='fill:red; mask: linear-gradient(red, blue)'")),
+              one("values with linear-gradient()"));
+  EXPECT_THAT(left_out("<path style=\"d: path('M50 50; H100')\"/>"), one("d properties"));
+  EXPECT_THAT(left_out(rect("style='width: calc(50%)'")), one("values with calc()"));
+  EXPECT_THAT(left_out("<g fill='var(--a, blue)'/>"), one("values with var()"));
+  EXPECT_THAT(left_out("<g stroke='oklch(60% .2 200)'/>"), one("values with oklch()"));
+  EXPECT_THAT(left_out(rect("style='rotate:30deg;zoom:1'")), one("rotate properties"));
+  EXPECT_THAT(left_out(rect("style='transform:translate(10%)'")), one("transform properties"));
+  EXPECT_THAT(left_out(rect("transform='scale(2)' style='transform:translate(1px)'")),
+              one("transform properties"));
+  EXPECT_THAT(left_out("<path d='M0 0H9' pathLength='1'/>"), one("pathLength attributes"));
+  EXPECT_THAT(left_out("<symbol refX='3'/>"), one("refX attributes"));
+  EXPECT_THAT(left_out("<text textLength='90'>a</text>"), one("textLength attributes"));
+  EXPECT_THAT(left_out("<text><tspan rotate='30'>a</tspan></text>"), one("rotate attributes"));
+  EXPECT_THAT(left_out("<text x='1 2 3' y='4'>abc</text>"), one("positions of single letters"));
+  EXPECT_THAT(left_out("<text style='dominant-baseline:hanging'>a</text>"),
+              one("dominant-baseline properties"));
+  EXPECT_THAT(left_out("", "style='background: #000'"), one("background properties"));
+  EXPECT_THAT(
+      left_out("<style>/* d: 1; */ svg{background-color:red} a:hover , b{ vector-effect : "
+               "fixed-position !important; fill:url(#a;b(c))} c{d:none;zoom:2} "
+               "@media print{e{zoom:3}} f{fill:color-mix(in srgb, red, rgb(0,0,0))}</style>"),
+      UnorderedElementsAre(LeftOut{"background-color properties", 1},
+                           LeftOut{"vector-effect properties", 1}, LeftOut{"zoom properties", 1},
+                           LeftOut{"values with color-mix()", 1}));
+  std::string many;
+  for (int i = 0; i < 100; ++i) absl::StrAppend(&many, "<g fill='f", i, "()'/>");
+  EXPECT_THAT(left_out(many),
+              AllOf(testing::SizeIs(41), testing::Contains(LeftOut{"other properties", 60})));
+}
+
+// Initial values, as Inkscape writes them, and properties that do not affect a still picture.
+TEST_F(Drawings, PropertiesWithoutEffectAreNotCounted) {
+  const std::string style =
+      "font-variant-caps:normal;word-spacing:0px;white-space:normal;inline-size:0;"
+      "vector-effect:none;dominant-baseline:auto;transform-origin:0 0;color-interpolation:sRGB;"
+      "clip-path:none;mask:none;-inkscape-font-specification:\"a(b)\";cursor:pointer;"
+      "animation:a 2s cubic-bezier(1,2,3,4);--own:calc(1px);background:#fff;"
+      "fill:rgb(0 0 0);stroke:url(#a) hsl(1,2%,3%);transform:translateX(3px) rotate(3deg)";
+  EXPECT_THAT(ReadAll(Svg("<rect width='100' height='100' fill='lime'/><g style='" + style +
+                          "' data-name='a (calc(1))' onclick='f()'><text x=' 5 ' rotate='0'/></g>"
+                          "<g transform='rotate(3)'/><style>g{" +
+                          style + "} @keyframes k{}</style>"))
+                  .left_out,
+              ElementsAre(LeftOut{"animations", 1}));
 }
 
 TEST_F(Drawings, PicturesOfTheFileAreDrawnAndOthersAreNot) {
