@@ -459,7 +459,7 @@ TEST(ContainedFrames, HalfAnAnswerKeepsTheParentWaitingNoLongerThanItsLimits) {
 TEST(ContainedFrames, AnAnswerInDropsHasTheSameLimit) {
   const auto frames = PointFrames(
       [](int64_t, Model&) {
-        Send(std::string("VXMODEL\1\0\0\0\0", 12));
+        Send(std::string("VXMODEL\2\0\0\0\0", 12));
         for (;;) {
           Send(std::string(1, '\0'));
           ::usleep(1000);
@@ -481,21 +481,22 @@ TEST(ContainedFrames, AnswersThatNobodyAskedForDoNotBlockTheParent) {
 }
 
 TEST(Contained, AnswersThatNoReaderGivesAreRefused) {
-  const std::string ok = std::string("VXMODEL\1\0\0\0\0", 12), none(8, '\0');
+  const std::string ok = std::string("VXMODEL\2\0\0\0\0", 12), none(8, '\0');
   const std::string many("\xff\xff\xff\x7f\0\0\0\0", 8);    // 2³¹ − 1
   const std::string head = ok + none + none + none + none;  // the texts and what is left out
+  // What follows is up, the unit and three flags, which are 12 bytes.
   struct Case {
     std::string bytes, says;
   };
   for (const auto& [bytes, says] :
        {Case{"", "gave up"}, Case{"VXMODEL", "gave up"},
         Case{std::string(64, 'x'), "gave an answer that is none"},
-        Case{std::string("VXMODEL\2\0\0\0\0", 12), "are of different releases"},
+        Case{std::string("VXMODEL\1\0\0\0\0", 12), "are of different releases"},
         Case{ok, "gave up halfway"}, Case{ok + many, "gave up halfway"},
-        Case{head + "\7", "gave up halfway"},                                // the up axis
-        Case{head + std::string(4, '\0') + many, "gave up halfway"},         // parts
-        Case{head + std::string(4, '\0') + "\1" + none, "gave up halfway"},  // not an integer
-        Case{head + std::string(4, '\0') + "\1" + std::string(7, '\0') + "\x09",
+        Case{head + "\7", "gave up halfway"},                                 // up
+        Case{head + std::string(12, '\0') + many, "gave up halfway"},         // parts
+        Case{head + std::string(12, '\0') + "\1" + none, "gave up halfway"},  // no whole number
+        Case{head + std::string(12, '\0') + "\1" + std::string(7, '\0') + "\x09",
              "gave up halfway"}}) {  // the kind of a part
     const auto model = ReadApart({.path = "p"}, [&bytes]() -> absl::StatusOr<Model> {
       Send(bytes);

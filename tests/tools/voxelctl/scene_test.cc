@@ -119,6 +119,27 @@ TEST(PlaceModels, SeveralShareOneSpaceUnlessEachIsAsked) {
   }
 }
 
+TEST(PlaceModels, ModelsOfOneSpaceHaveOneUnit) {
+  for (const bool each : {false, true}) {
+    Model models[3] = {Cloud({{0, 0, 0}, {1, 0, 0}}), Cloud({{0, 0, 0}, {100, 0, 0}}),
+                       Cloud({{0, 0, 0}, {4, 0, 0}})};
+    models[0].path = "metres.glb";
+    models[0].unit = 1;
+    models[1].unit = 0.01;
+    PlaceModels(models, DisplaySpace(), {.each = each});
+    const auto width = [&](size_t i) {
+      return models[i].parts[0].positions[1].x - models[i].parts[0].positions[0].x;
+    };
+    EXPECT_NEAR(width(1), width(0), 1e-9) << "100 cm are 1 m";
+    EXPECT_NEAR(width(2), each ? width(0) : 4 * width(0), 1e-9);
+    EXPECT_EQ(models[0].note, "");
+    EXPECT_EQ(models[1].note, "");
+    EXPECT_EQ(models[2].note, each ? ""
+                                   : "its unit of length is not known; it is shown as if it had "
+                                     "metres, as metres.glb");
+  }
+}
+
 TEST(PlaceModels, AGlobeKeepsItsCentreAndHoldsMeshesInside) {
   Model models[2] = {Cloud({{0, 0, 1}, {0.5, 0, 0}}), Cloud({{10, 10, 10}, {30, 20, 20}})};
   models[0].globe = true;

@@ -80,6 +80,7 @@ struct Model {
   std::string note;    // information about the reading, besides what is left out; usually empty
   std::vector<LeftOut> left_out;  // one entry per kind, with counts above 0
   Up up = Up::kZ;                 // the format's own; never kAuto
+  double unit = 0;                // the length of the positions' unit in metres; 0: unknown
   bool globe = false;             // on the unit sphere about the origin, already upright
   bool molecule = false;          // atoms and bonds
   bool lit_already = false;       // its colours include lighting (scans), so no shading is applied

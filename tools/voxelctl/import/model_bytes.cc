@@ -255,6 +255,7 @@ bool WriteModel(absl::StatusOr<Model> model, int descriptor) {
     writer.Value(one.count);
   }
   writer.Value(model->up);
+  writer.Value(model->unit);
   for (const bool flag : {model->globe, model->molecule, model->lit_already})
     writer.Value(static_cast<uint8_t>(flag));
   writer.Value(uint64_t{model->parts.size()});
@@ -293,6 +294,7 @@ absl::Status ReadModel(const SourceFile& file, const TakeBytes& take,
     one.count = reader.Value<uint64_t>();
   }
   read.up = reader.OneOf(Up::kZ);
+  read.unit = reader.Value<double>();
   read.globe = reader.Flag();
   read.molecule = reader.Flag();
   read.lit_already = reader.Flag();

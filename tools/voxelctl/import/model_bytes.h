@@ -7,8 +7,8 @@
 //
 //   answer    the eight bytes "VXMODEL" and kModelVersion; a u32, an absl::StatusCode; if that is not 0, a text, the error's message;
 //             if it is 0, the result: the number of frames (an i64), or a model
-//   model     path, format and note (texts); a list of what was left out; up (a u8, enum Up); the flags globe, molecule and
-//             lit_already; a list of parts; a list of volumes; a list of pictures (each a list of bytes)
+//   model     path, format and note (texts); a list of what was left out; up (a u8, enum Up); unit (f64); the flags globe,
+//             molecule and lit_already; a list of parts; a list of volumes; a list of pictures (each a list of bytes)
 //   left out  kind (a text); count (a u64)
 //   part      kind (a u8, enum Kind); thickness (f64); lists: positions and normals (3 f64 each), colours (3 u8 each), indices (u32),
 //             texture coordinates (2 f32 each); the picture (a u32); a list of attributes, each a name (a text) and a list of f64
@@ -31,7 +31,7 @@
 
 namespace voxeld::voxelctl {
 
-inline constexpr char kModelVersion = 1;
+inline constexpr char kModelVersion = 2;
 
 // Writes a model, or the error of reading it, as an answer. The memory of its arrays is released
 // while they are written, so that not both processes hold a large model. Returns: whether all of it

@@ -5,8 +5,11 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <string>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -109,6 +112,35 @@ void Scale(std::span<Model*> group, double scale) {
   }
 }
 
+// Returns the name of a unit that is `metres` long.
+std::string UnitName(double metres) {
+  static constexpr std::pair<double, absl::string_view> kNames[] = {
+      {1, "metres"},         {0.01, "centimetres"}, {0.001, "millimetres"},
+      {1e-6, "micrometres"}, {0.0254, "inches"},    {0.3048, "feet"}};
+  for (const auto& [unit, name] : kNames) {
+    if (std::abs(metres / unit - 1) < 1e-6) return std::string(name);
+  }
+  return absl::StrCat("units of ", metres, " m");
+}
+
+// Scales the models of a group to the unit of the first model that has one. Models without a unit
+// are not scaled, and get a note.
+void ScaleToOneUnit(std::span<Model*> group) {
+  const auto first =
+      std::find_if(group.begin(), group.end(), [](const Model* model) { return model->unit > 0; });
+  if (first == group.end()) return;
+  const double unit = (*first)->unit;
+  for (Model* model : group) {
+    if (model->unit > 0) {
+      if (model->unit != unit) Scale({&model, 1}, model->unit / unit);
+    } else {
+      AddNote(absl::StrCat("its unit of length is not known; it is shown as if it had ",
+                           UnitName(unit), ", as ", (*first)->path),
+              model);
+    }
+  }
+}
+
 Reach Measure(std::span<Model*> group) {
   Reach reach;
   ForEachReach(group, [&](const Point3& p, double r) { reach.Add(p, r); });
@@ -199,6 +231,7 @@ void PlaceModels(std::span<Model> models, const DisplaySpace& space,
     groups.back().push_back(&model);
   }
   for (std::vector<Model*>& group : groups) {
+    ScaleToOneUnit(group);
     Center(group);
     const Reach first = Measure(group);
     // Scales to unit size first, so that neither huge nor tiny units lose the ratios below.

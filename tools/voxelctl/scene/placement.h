@@ -33,7 +33,8 @@ struct PlacementOptions {
   bool each = false;
 };
 
-// Rotates, centres and scales the models' vertices in place, so that they lie within `space` when
+// Scales models that share one space to one unit of length, where their files have units; a note
+// names those without one. Rotates, centres and scales the models' vertices in place, so that they lie within `space` when
 // moved to space.center (and rotated about z). Globes keep their centre. Meshes beside a globe are
 // placed inside it. Requires: every model has a vertex.
 void PlaceModels(std::span<Model> models, const DisplaySpace& space,
