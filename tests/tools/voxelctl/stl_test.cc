@@ -115,6 +115,18 @@ TEST(StlAscii, AFacetOfFourVerticesIsTwoTriangles) {
       "1 0\nendloop\nendfacet\nendsolid\n");
 }
 
+TEST(StlAscii, ColorLinesAreCounted) {
+  const std::string facet =
+      "facet normal 0 0 1\nCOLOR 1 0 0\nouter loop\nvertex 0 0 0\nvertex 4 0 0\nvertex 4 1 0\n"
+      "endloop\nendfacet\n";
+  const TempFolder folder;
+  const auto model = ReadHere(
+      folder.Write("a.stl", "solid color\n" + facet + "color 0 1 0\n" + facet + "endsolid color\n"),
+      {});
+  ASSERT_THAT(model, IsOk());
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"colours of ASCII facets", 3}}));
+}
+
 TEST(StlColor, OfVisCamHasRedInTheHighBits) {
   const absl::StatusOr<Model> model = Stl(Rectangle("binary", 0xfc00, 0x801f));
   ASSERT_THAT(model, IsOk());

@@ -201,7 +201,42 @@ TEST_F(VoxFiles, OfKeyFramesTheFirstIsShown) {
   const auto model = Import(Vox(models + moving + Shape(1, 0)));
   ASSERT_THAT(model, IsOk());
   for (const Point3& p : model->parts.at(0).positions) EXPECT_LE(p.x, 3);
-  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"key frames after the first", 1}}));
+  EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"key frames after the first", 1},
+                                                   {"models outside the scene", 1}}));
+}
+
+// Version 0.98 wrote an animation as several models without nodes (PACK has their number).
+TEST_F(VoxFiles, OfAnAnimationWithoutNodesTheFirstFrameIsShown) {
+  const std::string one = Model3(4, 1, 1, {{3, 0, 0, 1}});
+  const std::string two = Model3(1, 4, 1, {{0, 3, 0, 2}});
+  for (const std::string& pack : {Chunk("PACK", Int(3)), std::string()}) {
+    const auto model = Import(Vox(pack + one + two + two));
+    ASSERT_THAT(model, IsOk());
+    EXPECT_EQ(Box(model->parts.at(0)), Corners(1, 0, 0, 2, 1, 1));
+    EXPECT_EQ(model->left_out, (std::vector<LeftOut>{{"frames after the first", 2}}));
+  }
+}
+
+TEST_F(VoxFiles, ModelsThatNoNodeShowsAreCounted) {
+  const std::string models = Model3(1, 1, 1, {{0, 0, 0, 1}}) + Model3(1, 1, 1, {{0, 0, 0, 2}}) +
+                             Model3(1, 1, 1, {{0, 0, 0, 3}});
+  const auto left_out = [&](const std::string& nodes) {
+    const auto model = Import(Vox(models + nodes));
+    EXPECT_TRUE(model.ok()) << model.status();
+    return model.ok() ? model->left_out : std::vector<LeftOut>();
+  };
+  using List = std::vector<LeftOut>;
+  EXPECT_EQ(left_out(Transform(0, 1, {}) + Shape(1, 1)), (List{{"models outside the scene", 2}}));
+  // Node 7 belongs to no group, so its model is outside the scene too.
+  EXPECT_EQ(left_out(Transform(0, 1, {}) + Shape(1, 1) + Shape(7, 0)),
+            (List{{"models outside the scene", 2}}));
+  // Hidden nodes and key frames are counted as such, and their models are not counted again.
+  EXPECT_EQ(
+      left_out(Group(0, {1, 3}) + Transform(1, 2, {}, {{"_hidden", "1"}}) + Group(2, {4}) +
+               Shape(4, 0) +
+               Chunk("nSHP", Int(3) + Dictionary({}) + Int(2) + Int(1) + Dictionary({{"_f", "0"}}) +
+                                 Int(2) + Dictionary({{"_f", "5"}}))),
+      (List{{"key frames after the first", 1}, {"hidden nodes", 1}}));
 }
 
 TEST_F(VoxFiles, MaterialsAndUnknownChunksAreCounted) {

@@ -168,13 +168,13 @@ const std::vector<Format>& OwnFormats() {
       {"meshes", "STL", ".stl", "",
        "ASCII and binary, several solids, the facets' colours of VisCAM, SolidView and Materialise "
        "Magics",
-       "–", "assimp-testmodels: 8"},
+       "colours in ASCII files", "assimp-testmodels: 8"},
       {"meshes, points", "PLY", ".ply", "",
        "ASCII and binary of either byte order, faces and strips, colours of vertices and faces, "
        "normals, intensities of points; other properties by --color-by",
        "pictures, other elements (edges, materials)", "assimp-testmodels: 7 of 8 (one is damaged)"},
       {"voxels", "MagicaVoxel", ".vox", "", "models where the scene's nodes put them, the palette",
-       "key frames after the first, hidden nodes and layers, materials", "–"},
+       "frames after the first, hidden nodes and layers, models outside the scene, materials", "–"},
       {"points, molecules", "text", ".xyz .txt .asc .pts .csv", "",
        "positions, colours, intensities and normals by the names or the number of columns, the "
        "other "

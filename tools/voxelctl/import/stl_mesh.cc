@@ -181,6 +181,7 @@ absl::StatusOr<Point3> ReadVertex(const SourceFile& file, StlWords* words) {
 // not a number.
 struct AsciiFacet {
   Point3 normal;
+  uint64_t colors = 0;  // lines that begin with "color"
   std::vector<Point3> corners;
 };
 
@@ -207,6 +208,8 @@ absl::StatusOr<AsciiFacet> ReadFacet(const SourceFile& file, StlWords* words) {
             "a facet is a triangle");
       }
       facet.corners.push_back(*vertex);
+    } else if (absl::EqualsIgnoreCase(word, "color")) {
+      ++facet.colors;
     } else if (absl::EqualsIgnoreCase(word, "facet") || absl::EqualsIgnoreCase(word, "endsolid")) {
       return FileError(file, absl::StrCat("the facet in line ", line, " has no \"endfacet\""),
                        "the file is damaged");
@@ -224,7 +227,7 @@ absl::StatusOr<AsciiFacet> ReadFacet(const SourceFile& file, StlWords* words) {
 absl::StatusOr<Model> ReadAsciiStl(const SourceFile& file, absl::string_view text) {
   StlWords words(text);
   Facets facets;
-  uint64_t count = 0;
+  uint64_t count = 0, colors = 0;
   bool open = false;
   for (absl::string_view word = words.Next(); !word.empty(); word = words.Next()) {
     if (absl::EqualsIgnoreCase(word, "solid")) {
@@ -237,10 +240,13 @@ absl::StatusOr<Model> ReadAsciiStl(const SourceFile& file, absl::string_view tex
       const absl::StatusOr<AsciiFacet> facet = ReadFacet(file, &words);
       if (!facet.ok()) return facet.status();
       ++count;
+      colors += facet->colors;
       const std::vector<Point3>& c = facet->corners;
       for (size_t i = 2; i < c.size(); ++i) {
         if (!facets.Add(facet->normal, {c[0], c[i - 1], c[i]}, std::nullopt)) return TooLarge(file);
       }
+    } else if (absl::EqualsIgnoreCase(word, "color")) {
+      ++colors;
     }
     // Other words are specific to an exporter and are ignored.
   }
@@ -248,7 +254,10 @@ absl::StatusOr<Model> ReadAsciiStl(const SourceFile& file, absl::string_view tex
     return FileError(file, "is ASCII STL without a facet", "at least one triangle is expected");
   }
   if (open) return Cut(file);
-  return std::move(facets).Finish(file);
+  Model model = std::move(facets).Finish(file);
+  // The format does not define these lines, and programs disagree about their numbers.
+  AddLeftOut("colours of ASCII facets", colors, &model);
+  return model;
 }
 
 }  // namespace

@@ -278,8 +278,11 @@ class VoxReader {
         }
         // An animated shape has a model for each key frame.
         const int32_t frame = FrameOf(bytes->Dictionary());
-        if (i > 0) ++scene_.later_frames;
-        if (i > 0 && frame >= first) continue;
+        if (i > 0) {
+          ++scene_.later_frames;
+          scene_.later_grids.insert(frame >= first ? child : node.children[0]);
+          if (frame >= first) continue;
+        }
         node.children = {child};
         first = frame;
       }

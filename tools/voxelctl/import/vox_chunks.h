@@ -44,6 +44,7 @@ struct VoxScene {
   std::array<Rgb, 256> palette = {};  // by a voxel's colour; 0 means none
   std::map<int32_t, VoxNode> nodes;   // 0 is the root; may be empty
   std::set<int32_t> hidden_layers;
+  std::set<int32_t> later_grids;  // models of key frames after the first
   // Contents that are left out:
   uint64_t later_frames = 0;    // key frames after the first of each node
   uint64_t materials = 0;       // glass, metal, light and the like: all but diffuse

@@ -50,12 +50,17 @@ class Builder {
 
   absl::StatusOr<Model> Build() {
     absl::Status status;
+    uint64_t frames = 0, outside = 0;
     if (scene_.nodes.empty()) {
-      for (size_t g = 0; g < scene_.grids.size() && status.ok(); ++g) {
-        status = Put(static_cast<int32_t>(g), Place());
-      }
+      // Version 0.98 had no nodes and stored an animation as several models (PACK).
+      status = Put(0, Place());
+      frames = scene_.grids.size() - 1;
     } else {
       status = Visit(0, Place(), 0);
+      for (size_t g = 0; g < scene_.grids.size(); ++g) {
+        const auto number = static_cast<int32_t>(g);
+        outside += known_.contains(number) || scene_.later_grids.contains(number) ? 0 : 1;
+      }
     }
     if (!status.ok()) return status;
     if (part_.positions.empty()) {
@@ -67,7 +72,9 @@ class Builder {
     model.up = Up::kZ;
     model.lit_already = true;
     model.parts.push_back(std::move(part_));
+    AddLeftOut("frames after the first", frames, &model);
     AddLeftOut("key frames after the first", scene_.later_frames, &model);
+    AddLeftOut("models outside the scene", outside, &model);
     AddLeftOut("hidden nodes", hidden_, &model);
     AddLeftOut("materials other than diffuse", scene_.materials, &model);
     AddLeftOut("chunks of unknown kinds", scene_.unknown_chunks, &model);
@@ -87,6 +94,7 @@ class Builder {
     const VoxNode& node = at->second;
     if (node.hidden || scene_.hidden_layers.contains(node.layer)) {
       ++hidden_;
+      PassHidden(number);
       return absl::OkStatus();
     }
     const Place here = node.kind == VoxNode::Kind::kTransform ? place * node : place;
@@ -98,7 +106,24 @@ class Builder {
     return absl::OkStatus();
   }
 
+  // Marks the models below a hidden node as known, so that only the node is counted.
+  void PassHidden(int32_t number) {
+    std::vector<int32_t> stack = {number};
+    while (!stack.empty()) {
+      const auto at = scene_.nodes.find(stack.back());
+      stack.pop_back();
+      if (at == scene_.nodes.end() || !passed_.insert(at->first).second) continue;
+      const std::vector<int32_t>& children = at->second.children;
+      if (at->second.kind == VoxNode::Kind::kShape) {
+        known_.insert(children.begin(), children.end());
+      } else {
+        stack.insert(stack.end(), children.begin(), children.end());
+      }
+    }
+  }
+
   absl::Status Put(int32_t number, const Place& place) {
+    known_.insert(number);
     if (number < 0 || static_cast<size_t>(number) >= scene_.grids.size()) {
       return FileError(file_, absl::StrCat("refers to model ", number),
                        absl::StrCat("it has ", scene_.grids.size()));
@@ -171,6 +196,8 @@ class Builder {
   const SourceFile& file_;
   const VoxScene& scene_;
   uint64_t visits_ = 0, hidden_ = 0;
+  absl::flat_hash_set<int32_t> known_;   // models that nodes of the scene show or hide
+  absl::flat_hash_set<int32_t> passed_;  // hidden nodes
   Part part_;
 };
 
