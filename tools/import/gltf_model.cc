@@ -191,6 +191,13 @@ struct Surface {
   std::array<double, 6> transform = {1, 0, 0, 0, 1, 0};
   Wrap wrap_u = Wrap::kRepeat, wrap_v = Wrap::kRepeat;
   bool lit = true, visible = true;
+  bool blended = false, masked = false;  // alphaMode
+  double cutoff = 0;                     // of a masked one
+
+  // Whether something can be seen where the material's alpha times the vertex's is `alpha`.
+  bool IsSeenAt(double alpha) const {
+    return masked ? alpha >= cutoff : blended ? alpha > 0 : true;
+  }
 };
 
 // Rotates counter-clockwise as the picture is viewed; its v points down.
@@ -210,10 +217,6 @@ Wrap WrapOf(int mode) {
   return mode == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE     ? Wrap::kClamp
          : mode == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? Wrap::kMirror
                                                          : Wrap::kRepeat;
-}
-
-bool IsLit(const std::array<double, 3>& emission) {
-  return emission[0] > 0 || emission[1] > 0 || emission[2] > 0;
 }
 
 // Returns whether this reader shows the extension, counts it in another way, or can ignore it
@@ -311,6 +314,8 @@ struct Elements {
   std::vector<uint32_t>
       kept;  // by the file's number: kNone, or the number of the kept vertex; empty: all are kept
   size_t vertices = 0;  // the number of kept vertices
+  // Elements whose vertices are all fully transparent are dropped; others have some such vertices.
+  uint64_t transparent = 0, partly_transparent = 0;
 };
 
 class Scene final : public GltfScene {
@@ -352,7 +357,6 @@ class Scene final : public GltfScene {
     std::map<int, uint32_t> pictures;  // by image
     std::map<int, std::vector<NodeMatrix>> skins;
     std::vector<NodeMatrix> globals;  // by node
-    std::set<int> shown_meshes;
   };
 
   void CheckReferences() const;
@@ -373,7 +377,10 @@ class Scene final : public GltfScene {
   void AddMesh(int node, Building* building);
   void AddPrimitive(const tinygltf::Primitive& primitive, int node,
                     std::span<const NodeMatrix> maps, Building* building);
-  Elements ElementsOf(const tinygltf::Primitive& primitive, uint64_t vertices) const;
+  std::vector<bool> SeenVertices(const tinygltf::Primitive& primitive, const Surface& surface,
+                                 uint64_t vertices) const;
+  Elements ElementsOf(const tinygltf::Primitive& primitive, uint64_t vertices,
+                      const std::vector<bool>& seen) const;
   void AddVectors(const tinygltf::Primitive& primitive, const char* name,
                   const std::vector<double>& weights, const Elements& elements,
                   std::vector<Point3>* out, Building* building) const;
@@ -385,6 +392,7 @@ class Scene final : public GltfScene {
                                  const Elements& elements, Building* building) const;
   std::vector<double> WeightsOf(int node, const GltfPose* pose) const;
   Part Bones(const std::vector<NodeMatrix>& globals) const;
+  uint64_t CountOutside() const;
   void CountLeftOut(Building* building) const;
 
   const GltfAccessor* Find(const std::map<std::string, int>& attributes, const char* name) const {
@@ -728,13 +736,12 @@ const Surface& Scene::SurfaceOf(int number, Building* building) {
   AddLeftOut("occlusion maps", material.occlusionTexture.index >= 0 ? 1 : 0, model);
 
   // A material that is always invisible is not drawn. Others are drawn opaque.
-  const double alpha = surface.base[3];
-  if (material.alphaMode == "BLEND" || material.alphaMode == "MASK") {
-    const bool masked = material.alphaMode == "MASK" && alpha < material.alphaCutoff;
-    surface.visible = !masked && alpha > 0;
-    if (surface.visible && (material.alphaMode == "BLEND" || base.index >= 0))
-      AddLeftOut("transparency of materials", 1, model);
-  }
+  surface.blended = material.alphaMode == "BLEND";
+  surface.masked = material.alphaMode == "MASK";
+  surface.cutoff = material.alphaCutoff;
+  surface.visible = surface.IsSeenAt(surface.base[3]);
+  if (surface.visible && (surface.blended || (surface.masked && base.index >= 0)))
+    AddLeftOut("transparency of materials", 1, model);
 
   if (base.index >= 0) UsePicture(base, &surface, building);
   std::array<double, 3> emission = {0, 0, 0};
@@ -842,7 +849,44 @@ std::vector<double> Scene::WeightsOf(int node, const GltfPose* pose) const {
   return own.weights.empty() ? gltf_.meshes[static_cast<size_t>(own.mesh)].weights : own.weights;
 }
 
-Elements Scene::ElementsOf(const tinygltf::Primitive& primitive, uint64_t vertices) const {
+// Returns for each vertex whether its own alpha leaves it visible; empty if all are.
+std::vector<bool> Scene::SeenVertices(const tinygltf::Primitive& primitive, const Surface& surface,
+                                      uint64_t vertices) const {
+  const GltfAccessor* const own = Find(primitive.attributes, "COLOR_0");
+  if (own == nullptr || own->components < 4 || !(surface.blended || surface.masked)) return {};
+  std::vector<bool> seen(vertices, true);
+  bool all = true;
+  ForEachElement(Normalized(*own), [&](uint64_t i, const double* v) {
+    if (i >= vertices || surface.IsSeenAt(surface.base[3] * v[3])) return;
+    seen[i] = all = false;
+  });
+  return all ? std::vector<bool>() : seen;
+}
+
+// Drops the elements whose vertices are all invisible.
+void DropTransparent(const std::vector<bool>& seen, Elements* elements) {
+  const size_t each = elements->kind == Kind::kPoints     ? 1
+                      : elements->kind == Kind::kSegments ? 2
+                                                          : 3;
+  std::vector<uint32_t>& all = elements->indices;
+  size_t to = 0;
+  for (size_t from = 0; from + each <= all.size(); from += each) {
+    size_t corners = 0;
+    for (size_t c = 0; c < each; ++c) corners += seen[all[from + c]] ? 1 : 0;
+    if (corners == 0) {
+      ++elements->transparent;
+      continue;
+    }
+    elements->partly_transparent += corners < each ? 1 : 0;
+    std::copy_n(all.begin() + static_cast<ptrdiff_t>(from), each,
+                all.begin() + static_cast<ptrdiff_t>(to));
+    to += each;
+  }
+  all.resize(to);
+}
+
+Elements Scene::ElementsOf(const tinygltf::Primitive& primitive, uint64_t vertices,
+                           const std::vector<bool>& seen) const {
   std::vector<uint32_t> order;  // vertices in the order in which they are drawn
   if (primitive.indices >= 0) {
     const GltfAccessor& indices = document_->accessors[static_cast<size_t>(primitive.indices)];
@@ -885,6 +929,7 @@ Elements Scene::ElementsOf(const tinygltf::Primitive& primitive, uint64_t vertic
       out = std::move(order);
       out.resize(count / 3 * 3);
   }
+  if (!seen.empty()) DropTransparent(seen, &elements);
   // Vertices that nothing refers to are dropped, because they would affect the model's size.
   std::vector<uint32_t> kept(vertices, kNone);
   for (const uint32_t index : out) kept[index] = 0;
@@ -1097,8 +1142,15 @@ void Scene::AddPrimitive(const tinygltf::Primitive& primitive, int node,
     throw Failure{absl::StrCat("refers to ", building->visited, " vertices, again and again"),
                   absl::StrCat("at most ", kMostVisited, " are visited")};
   }
-  const Elements elements = ElementsOf(primitive, positions->count);
-  if (elements.vertices == 0) return;
+  const Elements elements =
+      ElementsOf(primitive, positions->count, SeenVertices(primitive, surface, positions->count));
+  if (elements.vertices == 0)
+    return AddLeftOut("fully transparent surfaces", elements.transparent > 0 ? 1 : 0, &model);
+  AddLeftOut("fully transparent elements of surfaces", elements.transparent, &model);
+  if (surface.masked) {
+    AddLeftOut("partly transparent elements of surfaces, drawn opaque", elements.partly_transparent,
+               &model);
+  }
   building->vertices += elements.vertices * maps.size();
   building->indices += elements.indices.size() * maps.size();
   if (building->vertices > kMaxModelVertices || building->indices > kMaxModelIndices) {
@@ -1169,7 +1221,6 @@ void Scene::AddPrimitive(const tinygltf::Primitive& primitive, int node,
 
 void Scene::AddMesh(int number, Building* building) {
   const tinygltf::Node& node = gltf_.nodes[static_cast<size_t>(number)];
-  building->shown_meshes.insert(node.mesh);
   const std::vector<NodeMatrix> maps =
       InstancesOf(node, building->globals[static_cast<size_t>(number)]);
   for (const tinygltf::Primitive& primitive :
@@ -1192,6 +1243,30 @@ Part Scene::Bones(const std::vector<NodeMatrix>& globals) const {
   return part;
 }
 
+// Nodes with a mesh that no scene holds, and meshes that no node has.
+uint64_t Scene::CountOutside() const {
+  if (gltf_.scenes.empty()) return 0;
+  std::vector<bool> inside(gltf_.nodes.size());
+  std::vector<int> stack;
+  for (const tinygltf::Scene& scene : gltf_.scenes)
+    stack.insert(stack.end(), scene.nodes.begin(), scene.nodes.end());
+  while (!stack.empty()) {
+    const auto n = static_cast<size_t>(stack.back());
+    stack.pop_back();
+    if (n >= inside.size() || inside[n]) continue;
+    inside[n] = true;
+    stack.insert(stack.end(), gltf_.nodes[n].children.begin(), gltf_.nodes[n].children.end());
+  }
+  std::vector<bool> used(gltf_.meshes.size());
+  uint64_t outside = 0;
+  for (size_t n = 0; n < inside.size(); ++n) {
+    if (gltf_.nodes[n].mesh < 0) continue;
+    used[static_cast<size_t>(gltf_.nodes[n].mesh)] = true;
+    outside += inside[n] ? 0 : 1;
+  }
+  return outside + static_cast<uint64_t>(std::count(used.begin(), used.end(), false));
+}
+
 void Scene::CountLeftOut(Building* building) const {
   Model* const model = &building->model;
   if (gltf_.scenes.size() > 1) AddLeftOut("other scenes", gltf_.scenes.size() - 1, model);
@@ -1200,10 +1275,7 @@ void Scene::CountLeftOut(Building* building) const {
   AddLeftOut("lights", gltf_.lights.size(), model);
   AddLeftOut("hidden nodes", hidden_, model);
   AddLeftOut("material variants", variants_, model);
-  if (gltf_.scenes.size() <= 1 && hidden_ == 0) {
-    AddLeftOut("meshes outside the scene", gltf_.meshes.size() - building->shown_meshes.size(),
-               model);
-  }
+  AddLeftOut("meshes outside the scenes", CountOutside(), model);
   for (const auto& [name, count] : extensions_) {
     AddLeftOut(absl::StrCat(EscapeForTerminal(name.substr(0, 60)), " extensions"), count, model);
   }
@@ -1214,6 +1286,7 @@ Model Scene::Build(const GltfPose* pose, bool attributes) {
   building.model.path = file_.path;
   building.model.format = file_.extension == "glb" ? "glTF binary" : "glTF";
   building.model.up = Up::kY;
+  building.model.unit = 1;
   building.globals = GlobalsOf(pose);
   for (const int node : shown_) {
     if (gltf_.nodes[static_cast<size_t>(node)].mesh >= 0) AddMesh(node, &building);

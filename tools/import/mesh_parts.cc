@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "absl/strings/ascii.h"
@@ -97,6 +98,18 @@ uint8_t ColorByte(double value, bool linear) {
   value = std::min(value, 1.0);
   if (linear) value = value <= 0.0031308 ? 12.92 * value : 1.055 * std::pow(value, 1 / 2.4) - 0.055;
   return static_cast<uint8_t>(std::lround(value * 255));
+}
+
+bool IsLit(const std::array<double, 3>& emission) {
+  return emission[0] > 0 || emission[1] > 0 || emission[2] > 0;
+}
+
+std::optional<std::array<double, 3>> BaseColor(const std::optional<std::array<double, 3>>& own,
+                                               bool lit, bool has_vertex_colors) {
+  if (own) return own;
+  if (has_vertex_colors) return std::array<double, 3>{1, 1, 1};
+  if (lit) return std::array<double, 3>{0, 0, 0};
+  return std::nullopt;
 }
 
 void AddNormals(double crease_degrees, Part* part) {

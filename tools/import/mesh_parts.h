@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "absl/strings/string_view.h"
@@ -31,6 +32,15 @@ Point3 Direction(const Point3& p);
 // Returns: a channel from 0 to 1 as a byte; 0 if the value is not a number. `linear` means that the
 // value is linear light.
 uint8_t ColorByte(double value, bool linear);
+
+// Returns whether a surface emits light.
+bool IsLit(const std::array<double, 3>& emission);
+
+// Returns the colour that is multiplied by the vertex colours before emitted light is added: the
+// material's own colour `own`. Without one it is white if there are vertex colours, and black if the
+// surface only emits light. Returns nothing if the file gives the surface no colour.
+std::optional<std::array<double, 3>> BaseColor(const std::optional<std::array<double, 3>>& own,
+                                               bool lit, bool has_vertex_colors);
 
 // Gives a part of triangles its normals, by the winding of the triangles. A corner gets the mean
 // normal of the triangles around its vertex if its own triangle differs from it by less than

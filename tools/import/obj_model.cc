@@ -59,6 +59,15 @@ absl::string_view TakeWord(absl::string_view* line) {
   return word;
 }
 
+// Removes a comment behind a name: "red # paint" becomes "red". Names may contain blanks, and "#"
+// within a word.
+absl::string_view WithoutComment(absl::string_view name) {
+  for (size_t at = name.find('#'); at != absl::string_view::npos; at = name.find('#', at + 1)) {
+    if (at > 0 && IsBlank(name[at - 1])) return Trim(name.substr(0, at));
+  }
+  return name;
+}
+
 // The lines of a text. A line that ends in a backslash is joined to the next.
 class Lines {
  public:
@@ -546,13 +555,13 @@ void Statements::AddCloud() {
 
 void Statements::AddColors(const Material* material, const std::vector<CornerKey>& keys,
                            Part* part) {
-  const bool has_material =
-      material != nullptr && (material->has_color || !material->picture.empty());
-  if (!has_colors_ && !has_material) return;
+  const bool has_base = material != nullptr && (material->has_color || !material->picture.empty());
+  const std::optional<std::array<double, 3>> base =
+      BaseColor(has_base ? std::optional(material->color) : std::nullopt,
+                material != nullptr && IsLit(material->emission), has_colors_);
+  if (!base) return;
   // Some programs write vertex colours from 0 to 255.
   const double scale = greatest_color_ > 1 ? 255 : 1;
-  const std::array<double, 3> base =
-      material == nullptr ? std::array<double, 3>{1, 1, 1} : material->color;
   const std::array<double, 3> light = material == nullptr || part->picture != kNoPicture
                                           ? std::array<double, 3>{0, 0, 0}
                                           : material->emission;
@@ -561,7 +570,7 @@ void Statements::AddColors(const Material* material, const std::vector<CornerKey
     std::array<uint8_t, 3> bytes;
     for (size_t c = 0; c < 3; ++c) {
       const double own = has_colors_ ? colors_[key[0]][c] / scale : 1;
-      bytes[c] = ColorByte(base[c] * own + light[c], false);
+      bytes[c] = ColorByte((*base)[c] * own + light[c], false);
     }
     part->colors.push_back({bytes[0], bytes[1], bytes[2]});
   }
@@ -663,9 +672,18 @@ absl::Status Statements::Build() {
     return absl::OkStatus();
   }
   materials_by_number_.assign(names_.size(), nullptr);
+  // "Wire #25" may be a name, and "red # paint" a name with a comment, so whole names are tried
+  // first.
+  std::map<absl::string_view, const Material*> without_comments;
+  for (const auto& [name, material] : materials_)
+    without_comments.try_emplace(WithoutComment(name), &material);
   for (const auto& [name, number] : names_) {
-    const auto found = materials_.find(name);
-    if (found != materials_.end()) materials_by_number_[number] = &found->second;
+    if (const auto found = materials_.find(name); found != materials_.end()) {
+      materials_by_number_[number] = &found->second;
+      continue;
+    }
+    const auto found = without_comments.find(WithoutComment(name));
+    if (found != without_comments.end()) materials_by_number_[number] = found->second;
   }
   for (auto& [group, polygons] : groups_) {
     AddPart(group, polygons);
@@ -680,9 +698,8 @@ absl::Status Statements::Build() {
     const Material& material = *one;
     AddLeftOut("transparency of materials", material.transparent ? 1 : 0, model_);
     for (const char* kind : material.left_out) AddLeftOut(kind, 1, model_);
-    const bool has_light =
-        material.emission[0] > 0 || material.emission[1] > 0 || material.emission[2] > 0;
-    AddLeftOut("emission over pictures", has_light && !material.picture.empty() ? 1 : 0, model_);
+    AddLeftOut("emission over pictures",
+               IsLit(material.emission) && !material.picture.empty() ? 1 : 0, model_);
   }
   AddLeftOut("materials that no file defines", undefined, model_);
   return absl::OkStatus();

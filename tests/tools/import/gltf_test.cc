@@ -303,6 +303,79 @@ TEST_F(GltfFiles, UnlitSurfacesHaveNoNormalsAndInvisibleOnesAreNotDrawn) {
   EXPECT_THAT(blend.left_out, ElementsAre(LeftOut{"transparency of materials", 1}));
 }
 
+// A quad of two triangles and a third beside it; `alphas` of its nine vertices.
+TEST_F(GltfFiles, VerticesAlphaHidesElements) {
+  const auto read = [this](const std::string& material, const std::vector<float>& alphas,
+                           int mode = 4) {
+    Gltf gltf;
+    std::vector<float> positions, colors;
+    for (size_t v = 0; v < 9; ++v) {
+      const auto x = static_cast<float>(v), y = static_cast<float>(v % 3 == 1);
+      positions.insert(positions.end(), {x, y, 0});
+      colors.insert(colors.end(), {1, 0, 0, alphas[v]});
+    }
+    gltf.Add(positions, "VEC3");
+    gltf.Add(colors, "VEC4");
+    return ReadHere(
+        folder_.Write("a.gltf",
+                      gltf.Text(absl::StrCat(
+                          kOneNode,
+                          Mesh(absl::StrCat(R"("attributes":{"POSITION":0,"COLOR_0":1},"mode":)",
+                                            mode, R"(,"material":0)")),
+                          R"(,"materials":[)", material, "]"))),
+        {});
+  };
+  const std::string blend = R"({"alphaMode":"BLEND"})", mask = R"({"alphaMode":"MASK"})";
+  const std::vector<float> none(9, 0.f),
+      first = {0, 0, 0, 1, 1, 1, 1, 1, 1},
+      faint = {0.4f, 0.4f, 0.4f, 0.4f, 0.4f, 0.9f, 0.5f, 0.5f, 0.5f};
+  for (const std::string& material : {blend, mask})
+    EXPECT_THAT(read(material, none), Fails(Words{"shows no mesh"})) << material;
+  const auto opaque = read("{}", none);
+  ASSERT_THAT(opaque, IsOk());
+  EXPECT_EQ(opaque->parts.at(0).indices.size(), 9u) << "alpha counts only in the modes that say so";
+  EXPECT_THAT(opaque->left_out, IsEmpty());
+  const auto blended = read(blend, first);
+  ASSERT_THAT(blended, IsOk());
+  EXPECT_EQ(blended->parts.at(0).indices.size(), 6u);
+  EXPECT_EQ(blended->parts[0].positions.size(), 6u);
+  EXPECT_THAT(blended->left_out, ElementsAre(LeftOut{"transparency of materials", 1},
+                                             LeftOut{"fully transparent elements of surfaces", 1}));
+  // The material's alpha is a factor: 0.9 · 0.5 is below the cutoff, too.
+  const auto masked =
+      read(R"({"alphaMode":"MASK","pbrMetallicRoughness":{"baseColorFactor":[1,1,1,0.9]}})", faint);
+  ASSERT_THAT(masked, IsOk());
+  EXPECT_EQ(masked->parts.at(0).indices.size(), 3u);
+  EXPECT_THAT(masked->left_out,
+              ElementsAre(LeftOut{"fully transparent elements of surfaces", 2},
+                          LeftOut{"partly transparent elements of surfaces, drawn opaque", 1}));
+  const auto points = read(mask, first, 0);
+  ASSERT_THAT(points, IsOk());
+  EXPECT_EQ(points->parts.at(0).positions.size(), 6u);
+  EXPECT_THAT(points->left_out, ElementsAre(LeftOut{"fully transparent elements of surfaces", 3}));
+}
+
+TEST_F(GltfFiles, WhatNoSceneHoldsIsCounted) {
+  const auto left_out = [this](const std::string& scenes, const std::string& nodes) {
+    Gltf gltf;
+    gltf.Add(kTriangle, "VEC3");
+    const std::string primitives = R"({"primitives":[{"attributes":{"POSITION":0}}]})";
+    return Good(gltf.Text(absl::StrCat(R"("scene":0,"scenes":)", scenes, R"(,"nodes":)", nodes,
+                                       R"(,"meshes":[)", primitives, ",", primitives, "]")))
+        .left_out;
+  };
+  const std::string both = R"([{"mesh":0},{"mesh":1,"translation":[0,5,0]}])";
+  EXPECT_THAT(left_out(R"([{"nodes":[0,1]}])", both), IsEmpty());
+  EXPECT_THAT(left_out(R"([{"nodes":[0]}])", both),
+              ElementsAre(LeftOut{"meshes outside the scenes", 1}));
+  // A second use of a mesh that is shown, a child of a node outside, and a mesh that no node has.
+  EXPECT_THAT(left_out(R"([{"nodes":[0]}])",
+                       R"([{"mesh":0},{"children":[2]},{"mesh":0,"translation":[0,5,0]}])"),
+              ElementsAre(LeftOut{"meshes outside the scenes", 2}));
+  EXPECT_THAT(left_out(R"([{"nodes":[0]},{"nodes":[1]}])", both),
+              ElementsAre(LeftOut{"other scenes", 1}));
+}
+
 // ------------------------------------------------------------------------------------------- pictures
 
 std::string Textured(const std::string& texture_info, const std::string& sampler,

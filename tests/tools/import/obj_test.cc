@@ -210,6 +210,36 @@ TEST_F(ObjFiles, LightIsAdded) {
             (Rgb{255, 128, 0}));
 }
 
+TEST_F(ObjFiles, LightAloneIsAColour) {
+  folder_.Write("m.mtl", "newmtl a\nKe 1 0 0\nnewmtl b\nKe 0 0 0\nnewmtl c\nKe 0 0.25 0\n");
+  const auto colors = [this](const std::string& name, const std::string& vertices = kQuad) {
+    return Good(absl::StrCat("mtllib m.mtl\n", vertices, "usemtl ", name, "\nf 1 2 3\n"))
+        .parts.at(0)
+        .colors;
+  };
+  EXPECT_EQ(colors("a").at(0), (Rgb{255, 0, 0}));
+  EXPECT_THAT(colors("b"), IsEmpty()) << "no light is no colour";
+  // Vertices' colours are lit in addition.
+  EXPECT_EQ(colors("c", "v 0 0 0 1 0 0\nv 4 0 0 1 0 0\nv 4 1 0 1 0 0\n").at(0), (Rgb{255, 64, 0}));
+}
+
+TEST_F(ObjFiles, NamesOfMaterialsEndAtAComment) {
+  folder_.Write("m.mtl",
+                "newmtl red # old\nKd 1 0 0\nnewmtl Wire #25\nKd 0 1 0\nnewmtl Wire #26\n"
+                "Kd 0 0 1\nnewmtl a#b\nKd 1 1 0\n");
+  const auto color = [this](const std::string& name) {
+    const Model model =
+        Good(absl::StrCat("mtllib m.mtl # ours\n", kQuad, "usemtl ", name, "\nf 1 2 3 4\n"));
+    EXPECT_THAT(model.left_out, IsEmpty()) << name;
+    return model.parts.at(0).colors.empty() ? Rgb{} : model.parts[0].colors[0];
+  };
+  EXPECT_EQ(color("red # paint"), (Rgb{255, 0, 0}));
+  EXPECT_EQ(color("red"), (Rgb{255, 0, 0}));
+  EXPECT_EQ(color("Wire #25"), (Rgb{0, 255, 0}));
+  EXPECT_EQ(color("Wire #26"), (Rgb{0, 0, 255})) << "a whole name comes first";
+  EXPECT_EQ(color("a#b # c"), (Rgb{255, 255, 0}));
+}
+
 TEST_F(ObjFiles, TexturesInAllSpellings) {
   const std::string png("\x89PNG\r\n\x1a\n", 8);
   folder_.Write("a b.png", png);
