@@ -9,6 +9,7 @@
 #include "tools/import/assimp_scene.h"
 #include "tools/import/clouds.h"
 #include "tools/import/dicom_check.h"
+#include "tools/import/dxf_model.h"
 #include "tools/import/gdal_map.h"
 #include "tools/import/gemmi_molecule.h"
 #include "tools/import/gltf_model.h"
@@ -50,6 +51,13 @@ const std::vector<Reader>& Readers() {
         "free-form curves and surfaces, transparency, maps other than colours",
         "assimp-testmodels: 21 of 24 (others are damaged, or in UTF-16)"},
        [](const SourceFile& file, const ImportOptions&) { return ReadObjModel(file); }},
+      {{"meshes", "DXF", ".dxf", "",
+        "faces, meshes, lines, polylines, circles, arcs, ellipses, points, and blocks where they "
+        "are inserted; colours of entities, layers and blocks",
+        "texts, splines, hatches, dimensions and other entities, hidden layers, paper space, "
+        "binary files",
+        "assimp-testmodels: 4"},
+       [](const SourceFile& file, const ImportOptions&) { return ReadDxfModel(file); }},
       {{"points", "PCD", ".pcd", "liblzf",
         "text, binary and compressed; packed and single colours, intensities, normals; other "
         "fields "
@@ -138,7 +146,7 @@ const std::vector<Reader>& Readers() {
 constexpr Format kAssimpFormats = {
     "meshes",
     "FBX, COLLADA, 3MF, Blender, IFC, BVH and others",
-    ".fbx .dae .3mf .off .blend .ifc .bvh .3ds .x .lwo .amf .dxf",
+    ".fbx .dae .3mf .off .blend .ifc .bvh .3ds .x .lwo .amf",
     "assimp 5.2",
     "as glTF, in single precision; materials and pictures of FBX, "
     "COLLADA and 3MF; animations, also "

@@ -29,13 +29,12 @@ inline absl::StatusOr<Model> ReadApart(const std::string& path, const ImportOpti
 }
 
 inline absl::StatusOr<Model> ReadHere(const std::string& path, const ImportOptions& options = {}) {
-  // Damaged files of other formats can crash the libraries that read them, so tests read those in a
-  // separate process too.
-  constexpr std::array<std::string_view, 37> kSafe = {
-      "asc", "cif",  "csv", "ent",  "geojson",  "glb", "gltf", "gpx",   "gz",  "hdr",
-      "img", "json", "kml", "las",  "map",      "mha", "mhd",  "mmcif", "mrc", "nhdr",
-      "nii", "nrrd", "obj", "pcd",  "pdb",      "ply", "pts",  "raw",   "rec", "shp",
-      "stl", "svg",  "tif", "tiff", "topojson", "txt", "vox"};
+  // Damaged files of other formats can crash the libraries that read them, so tests read those in a process of their own too.
+  constexpr std::array<std::string_view, 38> kSafe = {
+      "asc",  "cif", "csv",  "dxf", "ent",  "geojson",  "glb", "gltf", "gpx",   "gz",
+      "hdr",  "img", "json", "kml", "las",  "map",      "mha", "mhd",  "mmcif", "mrc",
+      "nhdr", "nii", "nrrd", "obj", "pcd",  "pdb",      "ply", "pts",  "raw",   "rec",
+      "shp",  "stl", "svg",  "tif", "tiff", "topojson", "txt", "vox"};
   const absl::StatusOr<SourceFile> file = ReadSourceFile(path, options.other_files);
   if (!file.ok()) return ImportFile(path, options);
   const bool is_safe = file->extension == "xyz" ||
