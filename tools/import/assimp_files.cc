@@ -19,7 +19,7 @@ Assimp::IOStream* AssimpFiles::Open(const char* path, const char* mode) {
 void AssimpFiles::Close(Assimp::IOStream* stream) { delete stream; }
 
 const std::string* AssimpFiles::Find(const std::string& path) const {
-  if (path == file_.path) return &file_.bytes;
+  if (path == file_.path) return prepared_.empty() ? &file_.bytes : &prepared_;
   const auto [at, is_new] = others_.try_emplace(path);
   if (is_new) {
     // Assimp prefixes the names that it finds with the folder.

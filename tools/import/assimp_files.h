@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "tools/voxelctl/import/source_file.h"
 
@@ -14,7 +15,9 @@ namespace voxeld::voxelctl {
 // no other files and cannot write. Not thread-safe. `file` must outlive it.
 class AssimpFiles final : public Assimp::IOSystem {
  public:
-  explicit AssimpFiles(const SourceFile& file) : file_(file) {}
+  // `prepared` replaces the bytes of `file` unless it is empty.
+  explicit AssimpFiles(const SourceFile& file, std::string prepared = "")
+      : file_(file), prepared_(std::move(prepared)) {}
 
   bool Exists(const char* path) const override { return Find(path) != nullptr; }
   char getOsSeparator() const override { return '/'; }
@@ -25,6 +28,7 @@ class AssimpFiles final : public Assimp::IOSystem {
   const std::string* Find(const std::string& path) const;
 
   const SourceFile& file_;
+  const std::string prepared_;
   // By path; null if the file may not be read.
   mutable std::map<std::string, std::unique_ptr<std::string>> others_;
 };

@@ -11,6 +11,8 @@
 #include <cmath>
 #include <exception>
 #include <filesystem>
+#include <iterator>
+#include <map>
 #include <optional>
 #include <set>
 #include <string_view>
@@ -27,6 +29,7 @@
 #include "absl/strings/string_view.h"
 #include "common/text/printable.h"
 #include "tools/import/assimp_files.h"
+#include "tools/import/collada_contents.h"
 #include "tools/import/mesh_beginning.h"
 #include "tools/import/three_mf_colors.h"
 
@@ -48,20 +51,32 @@ Point3 Map(const NodeMatrix& m, const aiVector3D& v) {
           m[8] * x + m[9] * y + m[10] * z + m[11]};
 }
 
-Rgb ToRgb(const aiColor4D& c) {
-  return {ColorByte(c.r, false), ColorByte(c.g, false), ColorByte(c.b, false)};
+// Returns whether the file contains `name` as ASCII or UTF-16.
+bool HasText(const SourceFile& file, absl::string_view name) {
+  std::string wide;
+  for (const char c : name) absl::StrAppend(&wide, absl::string_view(&c, 1), std::string(1, '\0'));
+  wide.pop_back();
+  return absl::StrContains(file.bytes, name) || absl::StrContains(file.bytes, wide);
 }
 
-// Returns whether the library made up the material for meshes without one. Such a material has the
-// library's name for it, and either one colour and nothing else, or its grey.
-bool IsMadeUp(const aiMaterial& material) {
-  aiString name;
-  aiColor4D color;
-  material.Get(AI_MATKEY_NAME, name);
-  material.Get(AI_MATKEY_COLOR_DIFFUSE, color);
-  const bool has_grey = color.r == 0.6f && color.g == 0.6f && color.b == 0.6f;
-  return (material.mNumProperties <= 2 || has_grey) &&
-         absl::string_view(name.C_Str()) == AI_DEFAULT_MATERIAL_NAME;
+// Returns for each material whether the library made it up for meshes without one. Such a material
+// has one of these names, which does not occur in the file, or only its name and a colour.
+std::vector<bool> FindMadeUp(const SourceFile& file, const aiScene& scene) {
+  std::vector<bool> made_up(scene.mNumMaterials);
+  for (unsigned m = 0; m < scene.mNumMaterials; ++m) {
+    aiString name;
+    scene.mMaterials[m]->Get(AI_MATKEY_NAME, name);
+    for (const absl::string_view known :
+         {AI_DEFAULT_MATERIAL_NAME, "%%%DEFAULT", "<IFCDefault>", "LWODefaultSurface"}) {
+      if (absl::string_view(name.C_Str()) == known)
+        made_up[m] = scene.mMaterials[m]->mNumProperties <= 2 || !HasText(file, known);
+    }
+    // The one of X has no name. A compressed file is not searched.
+    if (file.extension == "x" && name.length == 0 &&
+        !absl::StrContains(absl::string_view(file.bytes).substr(0, 16), "zip"))
+      made_up[m] = !HasText(file, "Material");
+  }
+  return made_up;
 }
 
 // Returns the type of the texture that gives a material its colours.
@@ -106,8 +121,10 @@ void CountMaterial(const aiMaterial& material, bool has_picture, Model* model) {
 struct Context {
   const SourceFile& file;
   const aiScene& scene;
-  bool has_materials;             // of the file itself; some readers make one up
-  bool has_diffuse;               // the file has diffuse colours at all
+  bool has_materials;         // of the file itself; some readers make one up
+  std::vector<bool> made_up;  // by material; see FindMadeUp
+  // By the name of a COLLADA material: whether it has a diffuse colour or texture.
+  const std::map<std::string, bool>& has_diffuse;
   const ThreeMfColors* three_mf;  // null for other formats
   const Pose* pose;
   bool at_rest;  // the pose is the file's own
@@ -121,11 +138,14 @@ struct Context {
 };
 
 // Returns the colour that the file gives to a material; nothing if it gives none.
-std::optional<aiColor4D> BaseColor(const aiMaterial& material, bool has_picture,
-                                   const Context& context) {
+std::optional<std::array<double, 3>> ColorOf(const aiMaterial& material, bool has_picture,
+                                             const Context& context) {
+  aiString name;
+  material.Get(AI_MATKEY_NAME, name);
+  const auto diffuse = context.has_diffuse.find(name.C_Str());
   // In FBX, COLLADA and Blender a texture replaces the colour.
-  if (has_picture) return aiColor4D(1, 1, 1, 1);
-  if (IsMadeUp(material) || !context.has_diffuse) return std::nullopt;
+  if (has_picture) return std::array<double, 3>{1, 1, 1};
+  if (diffuse != context.has_diffuse.end() && !diffuse->second) return std::nullopt;
   // COLLADA has either a texture or a colour; the library adds a grey.
   if (ColorTextureOf(material) && context.file.extension == "dae") return std::nullopt;
   aiColor4D color;
@@ -133,7 +153,7 @@ std::optional<aiColor4D> BaseColor(const aiMaterial& material, bool has_picture,
       material.Get(AI_MATKEY_COLOR_DIFFUSE, color) != aiReturn_SUCCESS) {
     return std::nullopt;
   }
-  return color;
+  return std::array<double, 3>{color.r, color.g, color.b};
 }
 
 // Returns for each vertex the sum of its bones' maps, weighted; empty if the mesh has no bones or
@@ -363,26 +383,27 @@ absl::Status AddMesh(const aiMesh& mesh, const std::string& node, const NodeMatr
     }
     return absl::OkStatus();
   }
-  std::optional<aiColor4D> base;
-  aiColor4D light(0, 0, 0, 0);
-  if (context->has_materials && mesh.mMaterialIndex < context->scene.mNumMaterials) {
+  std::optional<std::array<double, 3>> own;
+  std::array<double, 3> light = {0, 0, 0};
+  if (context->has_materials && mesh.mMaterialIndex < context->scene.mNumMaterials &&
+      !context->made_up[mesh.mMaterialIndex]) {
     const aiMaterial& material = *context->scene.mMaterials[mesh.mMaterialIndex];
     if (corners == 3) AddPicture(material, mesh, &part, context);
-    base = BaseColor(material, part.picture != kNoPicture, *context);
-    if (part.picture == kNoPicture && !IsMadeUp(material))
-      material.Get(AI_MATKEY_COLOR_EMISSIVE, light);
+    own = ColorOf(material, part.picture != kNoPicture, *context);
+    aiColor4D emission(0, 0, 0, 0);
+    if (part.picture == kNoPicture) material.Get(AI_MATKEY_COLOR_EMISSIVE, emission);
+    light = {emission.r, emission.g, emission.b};
     if (context->materials.insert(mesh.mMaterialIndex).second)
       CountMaterial(material, part.picture != kNoPicture, context->model);
   }
   const bool has_colors = mesh.HasVertexColors(0);
-  if (has_colors || base) {
-    const aiColor4D by = base ? *base : aiColor4D(1, 1, 1, 1);
-    if (has_colors) {
-      part.colors.reserve(mesh.mNumVertices);
-      for (unsigned v = 0; v < mesh.mNumVertices; ++v)
-        part.colors.push_back(ToRgb(mesh.mColors[0][v] * by + light));
-    } else {
-      part.colors.assign(mesh.mNumVertices, ToRgb(by + light));
+  if (const auto base = BaseColor(own, IsLit(light), has_colors)) {
+    part.colors.reserve(mesh.mNumVertices);
+    for (unsigned v = 0; v < mesh.mNumVertices; ++v) {
+      const aiColor4D by = has_colors ? mesh.mColors[0][v] : aiColor4D(1, 1, 1, 1);
+      part.colors.push_back({ColorByte((*base)[0] * by.r + light[0], false),
+                             ColorByte((*base)[1] * by.g + light[1], false),
+                             ColorByte((*base)[2] * by.b + light[2], false)});
     }
   }
   AddLeftOut("further colours of vertices", mesh.HasVertexColors(1) ? 1 : 0, context->model);
@@ -468,25 +489,61 @@ double LengthOf(const Part& bones) {
   return length;
 }
 
+// The formats that assimp reads here. Its readers of other formats are untested here, so they are
+// never registered.
 struct AssimpFormat {
   absl::string_view extension, name;
   Up up = Up::kY;
+  double unit = 0;            // in metres; 0: not known, or the file says it
+  bool has_materials = true;  // that assimp reads
 };
-constexpr AssimpFormat kAssimpFormats[] = {{"off", "OFF"},
-                                           {"fbx", "FBX"},
-                                           {"3mf", "3MF", Up::kZ},
-                                           {"dae", "COLLADA"},
-                                           {"blend", "Blender", Up::kZ},
-                                           {"ifc", "IFC"},
-                                           {"bvh", "BVH"},
-                                           {"amf", "AMF", Up::kZ},
-                                           {"dxf", "DXF"}};
+constexpr AssimpFormat kAssimpReaders[] = {
+    {"off", "OFF", Up::kY, 0, false},
+    {"fbx", "FBX"},
+    {"3mf", "3MF", Up::kZ, 0, false},
+    {"dae", "COLLADA", Up::kY, 1},  // assimp scales it to metres
+    {"blend", "Blender", Up::kZ},
+    {"ifc", "IFC", Up::kY, 1},  // likewise
+    {"bvh", "BVH", Up::kY, 0, false},
+    {"3ds", "3DS"},
+    {"x", "DirectX X"},
+    {"lwo", "LightWave", Up::kY, 1},
+    {"amf", "AMF", Up::kZ}};
+
+const AssimpFormat* FindFormat(absl::string_view extension) {
+  const auto* const found =
+      std::find_if(std::begin(kAssimpReaders), std::end(kAssimpReaders),
+                   [extension](const AssimpFormat& one) { return one.extension == extension; });
+  return found == std::end(kAssimpReaders) ? nullptr : found;
+}
 
 AssimpFormat FormatOf(const SourceFile& file) {
-  for (const AssimpFormat& format : kAssimpFormats) {
-    if (format.extension == file.extension) return format;
+  const AssimpFormat* const format = FindFormat(file.extension);
+  return format != nullptr ? *format : AssimpFormat{file.extension, file.extension};
+}
+
+// Returns the unit of the library's positions in metres; 0 if it is unknown.
+double UnitOf(const SourceFile& file, const aiScene& scene) {
+  if (file.extension == "fbx") {
+    // The factor is in centimetres.
+    float factor = 1;
+    if (scene.mMetaData != nullptr) scene.mMetaData->Get("UnitScaleFactor", factor);
+    return std::isfinite(factor) && factor > 0 ? factor * 0.01 : 0.01;
   }
-  return {file.extension, file.extension};
+  if (file.extension == "amf") {
+    absl::string_view tag = absl::string_view(file.bytes).substr(0, 4096);
+    tag.remove_prefix(std::min(tag.find("<amf"), tag.size()));
+    tag = tag.substr(0, tag.find('>'));
+    static constexpr std::pair<absl::string_view, double> kUnits[] = {
+        {"inch", 0.0254}, {"feet", 0.3048}, {"meter", 1}, {"micron", 1e-6}};
+    for (const auto& [name, unit] : kUnits) {
+      for (const absl::string_view quote : {"\"", "'"}) {
+        if (absl::StrContains(tag, absl::StrCat(quote, name, quote))) return unit;
+      }
+    }
+    return 0.001;
+  }
+  return FormatOf(file).unit;
 }
 
 absl::Status Failed(const SourceFile& file, absl::string_view reason) {
@@ -500,15 +557,17 @@ absl::StatusOr<const aiScene*> Load(const SourceFile& file, Assimp::Importer* im
   importer->SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, aiComponent_TANGENTS_AND_BITANGENTS);
   importer->SetPropertyFloat(AI_CONFIG_PP_GSN_MAX_SMOOTHING_ANGLE, kSmoothingDegrees);
   importer->SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
-  // The library detects the format from the contents, whatever the file's name is, and these of its
-  // readers are known to crash.
-  for (const char* const extension : {"obj", "ply", "stl", "gltf", "glb"}) {
-    while (Assimp::BaseImporter* const reader = importer->GetImporter(extension)) {
-      if (importer->UnregisterLoader(reader) != aiReturn_SUCCESS) break;
-      delete reader;
-    }
+  // The library detects the format from the contents, whatever the file's name is, so only the
+  // reader for the file's own format stays registered.
+  const Assimp::BaseImporter* const own = importer->GetImporter(file.extension.c_str());
+  for (size_t i = importer->GetImporterCount(); i-- > 0;) {
+    Assimp::BaseImporter* const reader = importer->GetImporter(i);
+    if (reader == own || importer->UnregisterLoader(reader) != aiReturn_SUCCESS) continue;
+    delete reader;
   }
-  importer->SetIOHandler(new AssimpFiles(file));  // the importer deletes it
+  // The importer deletes it.
+  importer->SetIOHandler(
+      new AssimpFiles(file, file.extension == "dae" ? WithoutColladaHoles(file) : ""));
   // Post-processing trusts the indices, so it runs after our own check.
   const aiScene* scene = importer->ReadFile(file.path, 0);
   if (scene == nullptr) return Failed(file, importer->GetErrorString());
@@ -556,10 +615,6 @@ void TurnUpsideDown(const aiScene& scene, Model* model) {
 // Counts what the library ignores silently, by the names that the file uses.
 void CountUnread(const SourceFile& file, Model* model) {
   static constexpr std::array<std::string_view, 3> kUnread[] = {
-      {"dae", "<spline", "splines"},
-      {"dae", "<convex_mesh", "convex meshes"},
-      {"dae", "<nurbs", "NURBS"},
-      {"dae", "<brep", "solids of surfaces"},
       {"fbx", "\"NurbsCurve\" {", "NURBS curves"},
       {"fbx", "\"NurbsSurface\" {", "NURBS surfaces"},
       {"fbx", {"S\12\0\0\0NurbsCurve", 15}, "NURBS curves"},
@@ -571,6 +626,11 @@ void CountUnread(const SourceFile& file, Model* model) {
          at = file.bytes.find(mark, at + mark.size()))
       ++count;
     AddLeftOut(kind, count, model);
+  }
+  if (file.extension == "off") {
+    const OffColors colors = CountOffColors(file);
+    AddLeftOut("colours of faces", colors.faces, model);
+    AddLeftOut("colours of vertices that the header does not announce", colors.vertices, model);
   }
   if (file.extension != "bvh") return;
   // The announced number of frames is followed by a line for each frame.
@@ -591,16 +651,13 @@ void CountUnread(const SourceFile& file, Model* model) {
 
 // The library shows the available part of a truncated file. Adds a note if the end is missing.
 void NoteMissingEnd(const SourceFile& file, Model* model) {
-  static constexpr std::pair<absl::string_view, absl::string_view> kEnds[] = {
-      {"ifc", "END-ISO-10303-21"}, {"dxf", "EOF"}};
   constexpr size_t kTail = 4096;
+  constexpr absl::string_view kEnd = "END-ISO-10303-21";
   const absl::string_view text = file.bytes;
-  for (const auto& [extension, end] : kEnds) {
-    if (extension != file.extension ||
-        absl::StrContains(text.substr(text.size() - std::min(kTail, text.size())), end))
-      continue;
-    AddNote(absl::StrCat("it ends without ", end, ", so some of it may be missing"), model);
-  }
+  if (file.extension != "ifc" ||
+      absl::StrContains(text.substr(text.size() - std::min(kTail, text.size())), kEnd))
+    return;
+  AddNote(absl::StrCat("it ends without ", kEnd, ", so some of it may be missing"), model);
 }
 
 // Adds a note if rounding exceeds half a voxel when the model fills 256 voxels.
@@ -625,10 +682,7 @@ void NoteSinglePrecision(double rounding, Model* model) {
 
 }  // namespace
 
-bool AssimpReads(const std::string& extension) {
-  return !extension.empty() &&
-         Assimp::Importer().IsExtensionSupported(absl::StrCat(".", extension));
-}
+bool AssimpReads(absl::string_view extension) { return FindFormat(extension) != nullptr; }
 
 absl::StatusOr<const aiScene*> LoadScene(const SourceFile& file, Assimp::Importer* importer) {
   try {
@@ -644,6 +698,7 @@ absl::StatusOr<Model> ModelOf(const SourceFile& file, const aiScene& scene, cons
   model.path = file.path;
   model.format = std::string(format.name);
   model.up = UpOf(scene, format.up);
+  model.unit = UnitOf(file, scene);
   AddLeftOut("cameras", scene.mNumCameras, &model);
   AddLeftOut("lights", scene.mNumLights, &model);
   if (pose == nullptr) AddLeftOut("animations", scene.mNumAnimations, &model);
@@ -659,20 +714,20 @@ absl::StatusOr<Model> ModelOf(const SourceFile& file, const aiScene& scene, cons
     TurnUpsideDown(scene, &model);
     return model;
   }
-  const bool bare = file.extension == "off";
   static const Pose kRest;
   std::optional<ThreeMfColors> three_mf;
   if (file.extension == "3mf") three_mf.emplace(file, &model);
-  Context context{
-      .file = file,
-      .scene = scene,
-      .has_materials = !bare && !three_mf,
-      // The library gives a grey to COLLADA's materials without a colour.
-      .has_diffuse = file.extension != "dae" || absl::StrContains(file.bytes, "<diffuse"),
-      .three_mf = three_mf ? &*three_mf : nullptr,
-      .pose = pose == nullptr ? &kRest : pose,
-      .at_rest = pose == nullptr,
-      .model = &model};
+  ColladaContents collada;
+  if (file.extension == "dae") collada = ScanCollada(file, &model);
+  Context context{.file = file,
+                  .scene = scene,
+                  .has_materials = format.has_materials,
+                  .made_up = FindMadeUp(file, scene),
+                  .has_diffuse = collada.has_diffuse,
+                  .three_mf = three_mf ? &*three_mf : nullptr,
+                  .pose = pose == nullptr ? &kRest : pose,
+                  .at_rest = pose == nullptr,
+                  .model = &model};
   const absl::Status status = AddNodes(&context);
   if (!status.ok()) return status;
   for (Part& part : model.parts) {

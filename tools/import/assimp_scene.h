@@ -1,5 +1,5 @@
-// Converts assimp's scenes to models: FBX, COLLADA, 3MF, OFF, Blender, IFC, BVH and the other
-// formats that it reads. Only readers that use assimp include this header.
+// Converts assimp's scenes to models: FBX, COLLADA, 3MF, OFF, Blender, IFC, BVH, 3DS, X, LWO and
+// AMF. Only readers that use assimp include this header.
 //
 // assimp is the only library in Debian that reads these formats. It uses single precision: a note
 // is added if that moves vertices by more than half a voxel. It does not report what it ignores, so
@@ -15,6 +15,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 #include "tools/import/mesh_parts.h"
 #include "tools/voxelctl/import/frames.h"
 #include "tools/voxelctl/import/model.h"
@@ -32,8 +33,9 @@ struct Pose {
   std::unordered_map<std::string, std::vector<double>> shapes;
 };
 
-// Returns whether assimp has a reader for files with this extension.
-bool AssimpReads(const std::string& extension);
+// Returns whether assimp reads files with this extension. Its readers of other formats are never
+// registered.
+bool AssimpReads(absl::string_view extension);
 
 // Reads `file` and checks all indices and coordinates before later steps trust them. The scene
 // lives as long as the importer, and `file` must outlive that. Errors: InvalidArgument with the

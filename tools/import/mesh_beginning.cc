@@ -68,10 +68,12 @@ uint64_t TakeCount(absl::string_view* text) {
 
 // The library allocates all vertices and faces that an OFF file declares before it reads the first
 // one. It does not report missing corners.
-absl::Status CheckOff(const SourceFile& file) {
+absl::Status CheckOff(const SourceFile& file, OffColors* colors) {
   absl::string_view text = file.bytes;
   // The magic is [ST][C][N][4][n]OFF; the counts may follow immediately.
-  for (const absl::string_view option : {"ST", "C", "N", "4"}) absl::ConsumePrefix(&text, option);
+  bool is_plain = true;
+  for (const absl::string_view option : {"ST", "C", "N", "4"})
+    is_plain &= !absl::ConsumePrefix(&text, option);
   const bool has_dimension = absl::ConsumePrefix(&text, "n");
   absl::ConsumePrefix(&text, "OFF");
   if (has_dimension) TakeCount(&text);
@@ -89,9 +91,13 @@ absl::Status CheckOff(const SourceFile& file) {
   uint64_t lines = 0;
   for (absl::string_view line : absl::StrSplit(text, absl::ByAnyChar("\r\n"))) {
     line = absl::StripAsciiWhitespace(line.substr(0, line.find('#')));
-    if (line.empty() || ++lines <= vertices || lines > vertices + faces) continue;
+    if (line.empty() || ++lines > vertices + faces) continue;
     const std::vector<absl::string_view> words =
         absl::StrSplit(line, absl::ByAnyChar(" \t"), absl::SkipEmpty());
+    if (lines <= vertices) {
+      colors->vertices += is_plain && !has_dimension && words.size() >= 6 ? 1 : 0;
+      continue;
+    }
     uint64_t corners = 0;
     if (!absl::SimpleAtoi(words[0], &corners) || corners >= words.size()) {
       return FileError(
@@ -100,6 +106,7 @@ absl::Status CheckOff(const SourceFile& file) {
                        " corners of ", EscapeForTerminal(words[0].substr(0, 24))),
           "the file is truncated or damaged");
     }
+    colors->faces += words.size() > corners + 1 ? 1 : 0;
   }
   if (lines < vertices + faces) {
     return FileError(file,
@@ -144,6 +151,12 @@ absl::Status CheckStepReferences(const SourceFile& file) {
 
 }  // namespace
 
+OffColors CountOffColors(const SourceFile& file) {
+  OffColors colors;
+  CheckOff(file, &colors).IgnoreError();
+  return colors;
+}
+
 absl::Status CheckMeshBeginning(const SourceFile& file) {
   if (file.bytes.size() > kMostFileBytes) {
     return FileError(file, absl::StrCat("has ", file.bytes.size(), " bytes"),
@@ -168,7 +181,8 @@ absl::Status CheckMeshBeginning(const SourceFile& file) {
       return FileError(file, absl::StrCat("is ", DescribeContents(file.bytes)), b.expected);
   }
   if (file.extension == "off") {
-    if (absl::Status status = CheckOff(file); !status.ok()) return status;
+    OffColors ignored;
+    if (absl::Status status = CheckOff(file, &ignored); !status.ok()) return status;
   }
   if (file.extension == "ifc") {
     if (absl::Status status = CheckStepReferences(file); !status.ok()) return status;

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "absl/container/flat_hash_map.h"
 #include "absl/strings/match.h"
@@ -117,6 +118,27 @@ Rgb ColorOf(absl::string_view text, bool* transparent) {
           static_cast<uint8_t>(value)};
 }
 
+// Parses numbers separated by blanks; kNoNumber replaces invalid ones.
+std::vector<uint32_t> Numbers(absl::string_view text) {
+  std::vector<uint32_t> numbers;
+  for (const absl::string_view word :
+       absl::StrSplit(text, absl::ByAnyChar(" \t\r\n"), absl::SkipEmpty())) {
+    uint32_t number = 0;
+    numbers.push_back(absl::SimpleAtoi(word, &number) ? number : kNoNumber);
+  }
+  return numbers;
+}
+
+// Returns a unit of length in metres.
+double UnitOf(absl::string_view name) {
+  return name == "micron"       ? 1e-6
+         : name == "centimeter" ? 0.01
+         : name == "inch"       ? 0.0254
+         : name == "foot"       ? 0.3048
+         : name == "meter"      ? 1
+                                : 0.001;
+}
+
 Wrap WrapOfStyle(absl::string_view style) {
   return style == "mirror"                     ? Wrap::kMirror
          : style == "clamp" || style == "none" ? Wrap::kClamp
@@ -159,7 +181,9 @@ void ThreeMfColors::ReadModel(const std::string& text,
     if (xmlTextReaderNodeType(reader.get()) != XML_READER_TYPE_ELEMENT) continue;
     const absl::string_view name =
         reinterpret_cast<const char*>(xmlTextReaderConstLocalName(reader.get()));
-    if (name == "triangle") {
+    if (name == "model") {
+      model->unit = UnitOf(at.Text("unit"));
+    } else if (name == "triangle") {
       if (object == nullptr) continue;
       Property property = object->common;
       const uint32_t pid = at.Number("pid"), first = at.Number("p1");
@@ -207,8 +231,12 @@ void ThreeMfColors::ReadModel(const std::string& text,
     } else if (name == "compositematerials") {
       AddLeftOut("composite materials", 1, model);
     } else if (name == "multiproperties") {
-      // The first layer is shown.
-      AddLeftOut("groups of several layers of properties", 1, model);
+      group = &groups_[at.Number("id")];
+      group->layers = Numbers(at.Text("pids"));
+      if (group->layers.size() > 1)
+        AddLeftOut("lower layers of properties", group->layers.size() - 1, model);
+    } else if (name == "multi") {
+      if (group != nullptr) group->entries.push_back(Numbers(at.Text("pindices")));
     } else if (name == "beam") {
       AddLeftOut("beams", 1, model);
     } else if (name == "slicestack") {
@@ -219,6 +247,27 @@ void ThreeMfColors::ReadModel(const std::string& text,
     }
   }
   AddLeftOut("transparency of materials", transparent ? 1 : 0, model);
+}
+
+ThreeMfColors::Property ThreeMfColors::UppermostOf(const Property& property) const {
+  const auto found = groups_.find(property.group);
+  if (found == groups_.end() || found->second.layers.empty()) return property;
+  const Group& group = found->second;
+  for (size_t l = group.layers.size(); l-- > 0;) {
+    const auto layer = groups_.find(group.layers[l]);
+    if (layer == groups_.end() ||
+        (layer->second.colors.empty() && layer->second.coordinates.empty()))
+      continue;
+    Property upper{group.layers[l], {}};
+    for (size_t c = 0; c < 3; ++c) {
+      const uint32_t entry = property.entries[c];
+      if (entry >= group.entries.size()) return property;
+      const std::vector<uint32_t>& each = group.entries[entry];
+      upper.entries[c] = l < each.size() ? each[l] : 0;
+    }
+    return upper;
+  }
+  return property;
 }
 
 std::vector<Part> ThreeMfColors::Paint(const std::string& name, Part part, Model* model) const {
@@ -237,7 +286,7 @@ std::vector<Part> ThreeMfColors::Paint(const std::string& name, Part part, Model
   };
   std::map<uint64_t, Painted> all;
   for (size_t t = 0; t < object.triangles.size(); ++t) {
-    const Property& property = object.triangles[t];
+    const Property property = UppermostOf(object.triangles[t]);
     const auto of = groups_.find(property.group);
     const Group* const group = of == groups_.end() ? nullptr : &of->second;
     const auto fits = [&](size_t size) {

@@ -34,6 +34,8 @@ class ThreeMfColors {
     std::vector<std::array<float, 2>> coordinates;  // for texture groups
     uint32_t picture = kNoPicture;
     Wrap wrap_u = Wrap::kRepeat, wrap_v = Wrap::kRepeat;
+    std::vector<uint32_t> layers;  // for layered properties: the layers' groups, from below
+    std::vector<std::vector<uint32_t>> entries;  // for layered properties: an entry of each layer
   };
   // A group's number, and an entry for each corner.
   struct Property {
@@ -44,6 +46,10 @@ class ThreeMfColors {
     Property common;
     std::vector<Property> triangles;
   };
+
+  // Returns the uppermost layer with colours or a texture if `property` is of a group of layers,
+  // otherwise `property` itself.
+  Property UppermostOf(const Property& property) const;
 
   // `read_entry` returns an entry of the archive.
   void ReadModel(const std::string& text,

@@ -60,7 +60,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Real{"3MF/box.3mf", "3MF", 36}, Real{"Collada/duck.dae", "COLLADA", 12636},
                     Real{"BLEND/Suzanne_248.blend", "Blender", 11616},
                     Real{"IFC/AC14-FZK-Haus.ifc", "IFC", 107715}, Real{"BVH/01_01.bvh", "BVH", 74},
-                    Real{"3DS/fels.3ds", "3ds", 2304}));
+                    Real{"3DS/fels.3ds", "3DS", 2304}));
 
 TEST(MoreMeshes, ThatAreWrong) {
   TempFolder folder;
@@ -289,7 +289,14 @@ TEST(Animations, ThatAreNotThere) {
   EXPECT_THAT(std::string(OpenAnimation(ModelFile("BVH/01_01.bvh"), 2, 20).status().message()),
               HasSubstr("has no animation 2; it has 1"));
   EXPECT_THAT(std::string(OpenAnimation(ModelFile("OBJ/spider.obj"), 1, 20).status().message()),
-              HasSubstr("it has none at all"));
+              HasSubstr("is .obj, which has no animations"));
+  const TempFolder folder;
+  const std::string drawing = folder.Write("a.svg", "<svg xmlns='http://www.w3.org/2000/svg'/>");
+  EXPECT_THAT(std::string(OpenAnimation(drawing, 1, 20).status().message()),
+              HasSubstr("is .svg, which has no animations"));
+  const std::string mesh = folder.Write("a.stl", "solid a");
+  EXPECT_THAT(std::string(OpenAnimation(mesh, 1, 20).status().message()),
+              HasSubstr("is .stl, which has no animations"));
   EXPECT_THAT(std::string(OpenAnimation("/nowhere.glb", 1, 20).status().message()),
               HasSubstr("No such file"));
 }

@@ -96,6 +96,111 @@ TEST_F(AssimpFormats, ColladaColoursAndLight) {
   EXPECT_THAT(Good("a.dae", Dae("", kQuad)).parts[0].colors, IsEmpty()) << "the library's grey";
 }
 
+// assimp gives a grey to materials without a diffuse colour, also beside others that have one.
+TEST_F(AssimpFormats, ColladaMaterialsThatOnlyEmitLight) {
+  const std::string light = "<emission><color>1 0 0 1</color></emission>";
+  EXPECT_EQ(Good("a.dae", Dae(light, kQuad)).parts[0].colors.at(0), (Rgb{255, 0, 0}));
+  const std::string constant = absl::StrReplaceAll(
+      Dae(light, kQuad), {{"<lambert>", "<constant>"}, {"</lambert>", "</constant>"}});
+  EXPECT_EQ(Good("a.dae", constant).parts[0].colors.at(0), (Rgb{255, 0, 0}));
+  const std::string other = absl::StrReplaceAll(
+      Dae(light, kQuad),
+      {{"<library_effects>",
+        "<library_effects><effect id='other'><profile_COMMON><technique sid='x'><lambert>"
+        "<diffuse><color>0 0 1 1</color></diffuse></lambert></technique></profile_COMMON>"
+        "</effect>"},
+       {"<library_materials>",
+        "<library_materials><material id='other'><instance_effect url='#other'/></material>"}});
+  EXPECT_EQ(Good("a.dae", other).parts[0].colors.at(0), (Rgb{255, 0, 0}));
+  // A colour that is a parameter is not read.
+  const Model parameter = Good("a.dae", Dae("<diffuse><param ref='c'/></diffuse>", kQuad));
+  EXPECT_THAT(parameter.parts[0].colors, IsEmpty());
+  EXPECT_THAT(parameter.left_out, Contains(LeftOut{"colours that are parameters", 1}));
+}
+
+// The library gives this name, and often this grey, to materials of its own.
+TEST_F(AssimpFormats, MaterialsWithTheNameOfTheLibrarysOwn) {
+  const std::string grey = "<diffuse><color>0.6 0.6 0.6 1</color></diffuse>";
+  const std::string named = absl::StrReplaceAll(
+      Dae(grey, kQuad), {{"<material id='m'>", "<material id='m' name='DefaultMaterial'>"}});
+  EXPECT_EQ(Good("a.dae", named).parts[0].colors.at(0), (Rgb{153, 153, 153}));
+  const std::string mesh =
+      "xof 0303txt 0032\nMesh m {\n4;\n0;0;0;,\n4;0;0;,\n4;1;0;,\n0;1;0;;\n1;\n4;0,1,2,3;;\n";
+  const auto x = [&](const std::string& name) {
+    return Good("a.x", absl::StrCat(mesh, "MeshMaterialList {1;1;0;;Material ", name,
+                                    " {0.6;0.6;0.6;1.0;;0.0;0.0;0.0;0.0;;0.0;0.0;0.0;;}}\n}\n"))
+        .parts.at(0)
+        .colors;
+  };
+  EXPECT_EQ(x("DefaultMaterial").at(0), (Rgb{153, 153, 153}));
+  EXPECT_EQ(x("grey").at(0), (Rgb{153, 153, 153}));
+  EXPECT_THAT(Good("a.x", mesh + "}\n").parts.at(0).colors, IsEmpty()) << "the library's own";
+}
+
+TEST_F(AssimpFormats, ColladaOtherScenesAndHolesAreCounted) {
+  const std::string scene =
+      "<visual_scene id='t'><node id='o'><instance_geometry url='#g'/></node></visual_scene>";
+  const Model two =
+      Good("a.dae", absl::StrReplaceAll(Dae("", kQuad), {{"<library_visual_scenes>",
+                                                          "<library_visual_scenes>" + scene}}));
+  EXPECT_EQ(two.parts.size(), 1u);
+  EXPECT_THAT(two.left_out,
+              UnorderedElementsAre(LeftOut{"other scenes", 1}, LeftOut{"splines", 1}));
+  const std::string input = "<input semantic='VERTEX' source='#v' offset='0'/>";
+  const auto polygons = [&](const std::string& content) {
+    std::string dae = Dae("", kQuad);
+    const size_t from = dae.find("<polylist"), to = dae.find("</polylist>") + 11;
+    dae.replace(from, to - from,
+                absl::StrCat("<polygons count='1' material='s'>", input, content, "</polygons>"));
+    return dae;
+  };
+  const Model filled = Good("a.dae", polygons("<ph><p>0 1 2 3</p><h>0 1 2</h><h\n>1 2 3</h></ph>"));
+  EXPECT_EQ(filled.parts.at(0).indices.size(), 6u);
+  EXPECT_THAT(filled.left_out, Contains(LeftOut{"holes of polygons, drawn filled", 2}));
+  EXPECT_THAT(Good("a.dae", polygons("<p>0 1 2 3</p>")).left_out,
+              ElementsAre(LeftOut{"splines", 1}));
+}
+
+// assimp takes another's material for them.
+TEST_F(AssimpFormats, ColladaElementsWithoutAMaterialAreNoted) {
+  const std::string dae = Dae("<diffuse><color>1 0 0 1</color></diffuse>", kQuad);
+  EXPECT_THAT(Good("a.dae", dae).note, IsEmpty());
+  EXPECT_THAT(Good("a.dae", absl::StrReplaceAll(dae, {{" material='s'>", ">"}})).note,
+              HasSubstr("elements without a material (1)"));
+}
+
+TEST_F(AssimpFormats, ColoursOfOffThatAreNotShownAreCounted) {
+  const std::string corners = "4 1 0\n0 0 0\n4 0 0\n4 1 0\n0 1 0\n";
+  EXPECT_THAT(Good("a.off", "OFF\n" + corners + "4 0 1 2 3\n").left_out, IsEmpty());
+  for (const char* color : {" 255 0 0", " 1.0 0 0 0.5", " 7"}) {
+    EXPECT_THAT(Good("a.off", absl::StrCat("OFF\n", corners, "4 0 1 2 3", color, "\n")).left_out,
+                ElementsAre(LeftOut{"colours of faces", 1}))
+        << color;
+  }
+  EXPECT_THAT(
+      Good("a.off", "OFF\n3 1 0\n0 0 0 255 0 0\n4 0 0 255 0 0\n0 1 0 255 0 0\n3 0 1 2\n").left_out,
+      ElementsAre(LeftOut{"colours of vertices that the header does not announce", 3}));
+}
+
+// assimp has readers for many other formats, and looks at what a file holds.
+TEST_F(AssimpFormats, NoOtherReaderIsRegistered) {
+  const std::string ac3d =
+      "AC3Db\nMATERIAL \"m\" rgb 1 0 0 amb 1 1 1 emis 0 0 0 spec 0 0 0 shi 0 trans 0\nOBJECT "
+      "world\nkids 1\nOBJECT poly\nname \"q\"\nnumvert 3\n0 0 0\n4 0 0\n4 1 0\nnumsurf 1\nSURF "
+      "0x0\nmat 0\nrefs 3\n0 0 0\n1 0 0\n2 0 0\nkids 0\n";
+  for (const char* const extension : {"ac", "ac3d", "md2", "ase", "zae"}) {
+    EXPECT_THAT(ReadHere(folder_.Write(absl::StrCat("a.", extension), ac3d), {}),
+                Fails(Words{"are not read", ".fbx"}))
+        << extension;
+  }
+  for (const char* const extension : {"fbx", "3ds", "lwo", "x", "amf", "blend"})
+    EXPECT_FALSE(ReadHere(folder_.Write(absl::StrCat("a.", extension), ac3d), {}).ok())
+        << extension;
+  const std::string off = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+  EXPECT_THAT(ReadHere(folder_.Write("a.off", off), {}), IsOk());
+  EXPECT_FALSE(ReadHere(folder_.Write("a.3ds", off), {}).ok());
+}
+
 TEST_F(AssimpFormats, ColladaTexturesStandInPlaceOfColours) {
   folder_.Write("my picture.png", kPng);
   const std::string dae =
@@ -405,7 +510,7 @@ std::string Zip(const std::vector<std::pair<std::string, std::string>>& entries)
 // A tetrahedron; `triangles` are the properties of each of its four triangles.
 std::string ThreeMf(const std::string& resources, const std::string& object,
                     const std::vector<std::string>& triangles, const std::string& more = "",
-                    const std::string& item = "") {
+                    const std::string& item = "", const std::string& unit = "unit='millimeter'") {
   static constexpr const char* kCorners[] = {"v1='0' v2='2' v3='1'", "v1='0' v2='1' v3='3'",
                                              "v1='1' v2='2' v3='3'", "v1='0' v2='3' v3='2'"};
   std::string all;
@@ -423,8 +528,8 @@ std::string ThreeMf(const std::string& resources, const std::string& object,
         "Type='http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel'/></Relationships>"},
        {"3D/3dmodel.model",
         absl::StrCat(
-            "<?xml version='1.0' encoding='UTF-8'?><model unit='millimeter' "
-            "xmlns='http://schemas.microsoft.com/3dmanufacturing/core/2015/02' "
+            "<?xml version='1.0' encoding='UTF-8'?><model ", unit,
+            " xmlns='http://schemas.microsoft.com/3dmanufacturing/core/2015/02' "
             "xmlns:m='http://schemas.microsoft.com/3dmanufacturing/material/2015/02'><resources>",
             resources, "<object id='1' type='model' ", object,
             "><mesh><vertices><vertex x='0' y='0' z='0'/><vertex x='1' y='0' z='0'/><vertex x='0' "
@@ -535,6 +640,75 @@ TEST_F(AssimpFormats, ThreeMfPlacesAndWhatIsNotShown) {
   // A mirror image: the bottom is the top, and its normal points up.
   EXPECT_THAT(model.parts[0].normals[model.parts[0].indices[0]].z, testing::DoubleNear(1, 1e-9));
   EXPECT_THAT(model.left_out, ElementsAre(LeftOut{"composite materials", 1}));
+}
+
+// The uppermost layer that has colours hides the others: they are mixed by its opacity, which a display has not.
+TEST_F(AssimpFormats, ThreeMfLayersOfProperties) {
+  const std::string colors = "<m:colorgroup id='7'><m:color color='#0000FF'/></m:colorgroup>";
+  const auto read = [&](const std::string& layers) {
+    return Good("a.3mf", ThreeMf(kBases + colors + layers, "pid='8' pindex='1'", {"", "p1='0'"}));
+  };
+  const Model one = read(
+      "<m:multiproperties id='8' pids='5'><m:multi pindices='0'/><m:multi pindices='1'/>"
+      "</m:multiproperties>");
+  ASSERT_EQ(one.parts.size(), 1u);
+  EXPECT_EQ(ColorOfTriangle(one.parts[0], 0), (Rgb{0, 255, 0}));
+  EXPECT_EQ(ColorOfTriangle(one.parts[0], 1), (Rgb{255, 0, 0}));
+  EXPECT_THAT(one.left_out, IsEmpty());
+  // An entry that is missing is the first.
+  const Model two = read(
+      "<m:multiproperties id='8' pids='5 7'><m:multi pindices='0 0'/><m:multi pindices='1'/>"
+      "</m:multiproperties>");
+  EXPECT_EQ(ColorOfTriangle(two.parts.at(0), 0), (Rgb{0, 0, 255}));
+  EXPECT_EQ(ColorOfTriangle(two.parts.at(0), 1), (Rgb{0, 0, 255}));
+  EXPECT_THAT(two.left_out, ElementsAre(LeftOut{"lower layers of properties", 1}));
+  // One that does not exist has no colour.
+  EXPECT_THAT(read("<m:multiproperties id='8' pids='5 7'/>").parts.at(0).colors, IsEmpty());
+}
+
+// Files that are played together share one space, and formats differ in their units.
+TEST_F(AssimpFormats, UnitsOfLength) {
+  const auto three_mf = [this](const std::string& unit) {
+    return Good("a.3mf", ThreeMf("", "", {}, "", "", unit)).unit;
+  };
+  EXPECT_EQ(three_mf("unit='millimeter'"), 0.001);
+  EXPECT_EQ(three_mf("unit='inch'"), 0.0254);
+  EXPECT_EQ(three_mf(""), 0.001);
+  const auto amf = [this](const std::string& unit) {
+    return Good("a.amf",
+                absl::StrCat("<?xml version='1.0'?><amf ", unit,
+                             "><object id='0'><mesh><vertices>"
+                             "<vertex><coordinates><x>0</x><y>0</y><z>0</z></coordinates></vertex>"
+                             "<vertex><coordinates><x>1</x><y>0</y><z>0</z></coordinates></vertex>"
+                             "<vertex><coordinates><x>0</x><y>1</y><z>0</z></coordinates></"
+                             "vertex></vertices><volume>"
+                             "<triangle><v1>0</v1><v2>1</v2><v3>2</v3></triangle></volume></mesh></"
+                             "object></amf>"))
+        .unit;
+  };
+  EXPECT_EQ(amf("unit='inch'"), 0.0254);
+  EXPECT_EQ(amf("unit=\"feet\""), 0.3048);
+  EXPECT_EQ(amf(""), 0.001);
+  // assimp scales COLLADA to metres.
+  const auto width = [](const Model& model) {
+    double most = 0;
+    for (const Point3& p : model.parts.at(0).positions) most = std::max(most, p.x);
+    return most * model.unit;
+  };
+  EXPECT_DOUBLE_EQ(width(Good("a.dae", Dae("", kQuad))), 1);
+  EXPECT_NEAR(
+      width(Good("a.dae", absl::StrReplaceAll(Dae("", kQuad), {{"meter='1'", "meter='0.01'"}}))),
+      0.01, 1e-9);
+  const auto fbx = [this](const std::string& settings) {
+    return Good("a.fbx", absl::StrReplaceAll(
+                             Fbx("", ""),
+                             {{"\tVersion: 1000\n\tProperties70:  {\n",
+                               absl::StrCat("\tVersion: 1000\n\tProperties70:  {\n", settings)}}))
+        .unit;
+  };
+  EXPECT_NEAR(fbx("\t\tP: \"UnitScaleFactor\", \"double\", \"Number\", \"\",2.54\n"), 0.0254, 1e-7);
+  EXPECT_NEAR(fbx(""), 0.01, 1e-9);
+  EXPECT_EQ(Good("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").unit, 0);
 }
 
 }  // namespace assimp_test
