@@ -87,7 +87,8 @@ TEST(WholeFile, ReplacesRegularFilesAlone) {
   ::close(reader);
   EXPECT_TRUE(std::filesystem::is_fifo(fifo));
   ASSERT_EQ(::symlink("/dev/full", link.c_str()), 0);
-  EXPECT_THAT(std::string(WriteWholeFile(link, "new").message()), HasSubstr("could not be written"));
+  EXPECT_THAT(std::string(WriteWholeFile(link, "new").message()),
+              testing::HasSubstr("could not be written"));
   EXPECT_TRUE(std::filesystem::is_symlink(link));
   EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
   ASSERT_EQ(::unlink(link.c_str()), 0);
