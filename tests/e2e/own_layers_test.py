@@ -91,7 +91,7 @@ class Layers(unittest.TestCase):
         self.assertRegex(said, r'nothing of "draw 2" can be seen on display sim: .*outside')
         self.assertRegex(said, r'nothing of "draw 3" can be seen on display sim: .*black')
         # Details are requested for all of them, however many there are.
-        many = ["sphere radius=0.1"] * 20 + ["sphere radius=0.1 at=9,9,9"]
+        many = [f"sphere radius=0.04 at={i / 10 - 0.95},0,0" for i in range(20)] + ["sphere radius=0.1 at=9,9,9"]
         told = json.loads(self.run_as("painter", "--json", "draw", *many).stdout)
         self.assertEqual(len(told["unseen"]), 1)
 

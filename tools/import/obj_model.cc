@@ -282,6 +282,7 @@ class Statements final : public std::streambuf {
                       const char* kind);
   void PrepareElement(absl::string_view rest);
   bool CheckReference(absl::string_view word);
+  void NoteMissing(absl::string_view name);
   void LoadMaterials(absl::string_view names);
   bool LoadMaterialFile(const std::string& name);
   uint32_t Resolve(int index, size_t so_far, int64_t total, const char* what);
@@ -318,6 +319,7 @@ class Statements final : public std::streambuf {
   std::map<std::string, Material> materials_;
   // By number in names_; null if no file defines it.
   std::vector<const Material*> materials_by_number_;
+  bool has_missing_ = false;  // a file that this one names cannot be read
   std::vector<SourceFile> libraries_;
   std::map<std::pair<size_t, std::string>, uint32_t> pictures_;
   Triangulator triangulator_;
@@ -461,6 +463,14 @@ bool Statements::LoadMaterialFile(const std::string& name) {
   return true;
 }
 
+// Names the first file that cannot be read.
+void Statements::NoteMissing(absl::string_view name) {
+  if (std::exchange(has_missing_, true)) return;
+  AddNote(absl::StrCat("cannot read ", EscapeForTerminal(name.substr(0, 80)),
+                       ", which it names; put it beside the file"),
+          model_);
+}
+
 // The names are one name that may contain blanks, or several without.
 void Statements::LoadMaterials(absl::string_view names) {
   const bool quoted = names.size() > 2 && names.front() == '"' && names.back() == '"';
@@ -468,8 +478,11 @@ void Statements::LoadMaterials(absl::string_view names) {
   if (names.empty() || LoadMaterialFile(std::string(names))) return;
   uint64_t missing = 0;
   absl::string_view rest = names;
-  for (absl::string_view name = TakeWord(&rest); !name.empty(); name = TakeWord(&rest))
-    missing += LoadMaterialFile(std::string(name)) ? 0 : 1;
+  for (absl::string_view name = TakeWord(&rest); !name.empty(); name = TakeWord(&rest)) {
+    if (LoadMaterialFile(std::string(name))) continue;
+    ++missing;
+    NoteMissing(name);
+  }
   AddLeftOut("material files that cannot be read", missing, model_);
 }
 
@@ -588,6 +601,7 @@ uint32_t Statements::PictureOf(const Material& material) {
     picture = ReadOtherFile(library, std::filesystem::path(slashes).filename().string());
   if (!picture.ok()) {
     AddLeftOut("textures that cannot be read", 1, model_);
+    NoteMissing(material.picture);
   } else if (!IsPicture(picture->bytes)) {
     AddLeftOut("textures that are neither PNG nor JPEG", 1, model_);
   } else {

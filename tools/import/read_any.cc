@@ -178,6 +178,11 @@ absl::StatusOr<Model> ReadAny(const SourceFile& file, const ImportOptions& optio
   // Slices often have no extension, or a name that seems to end in one.
   if (LooksLikeDicom(file)) return ReadDicomVolume(file);
   if (AssimpReads(file.extension)) return ReadMesh(file);
+  if (file.extension == "gz") {
+    return FileError(file, "is compressed by gzip",
+                     "unpack it (gunzip); only .nii.gz, .hdr.gz, .img.gz, .pdb.gz, .ent.gz and "
+                     ".cif.gz are read as they are");
+  }
   return FileError(
       file,
       file.extension.empty()

@@ -119,6 +119,9 @@ TEST_F(Clouds, TextThatIsWrong) {
   EXPECT_THAT(Error("a.xyz", "1 2 3\n\n4 5\n"), HasSubstr("line 3 has nothing in column 3"));
   EXPECT_THAT(Error("a.xyz", "1 2 3\n1 2 inf\n"), HasSubstr("line 2 is (1, 2, inf)"));
   EXPECT_THAT(Error("a.csv", "x,y\n1,2\n"), HasSubstr("has no column z"));
+  EXPECT_THAT(Error("a.csv", "X [m],Y [m],Z [m]\n1,2,3\n"),
+              HasSubstr("its first line names X [m], Y [m], Z [m]; rename three columns to x, y"));
+  EXPECT_THAT(Error("a.csv.gz", "\x1f\x8b"), HasSubstr("is compressed by gzip; unpack it"));
   EXPECT_THAT(Error("a.csv", "x,y,z\n"), HasSubstr("ends after its names"));
   EXPECT_THAT(Error("a.xyz", "# nothing\n"), HasSubstr("holds no line of numbers"));
   EXPECT_THAT(Error("a.xyz", "\x1b[31m 2 3\n1 2 3"), testing::Not(HasSubstr("\x1b")));

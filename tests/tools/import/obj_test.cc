@@ -21,6 +21,7 @@ namespace voxeld::voxelctl {
 namespace obj_test {
 
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::UnorderedElementsAre;
 
@@ -273,6 +274,7 @@ TEST_F(ObjFiles, TexturesInAllSpellings) {
               ElementsAre(LeftOut{"textures that are neither PNG nor JPEG", 1}));
   EXPECT_THAT(read("map_Kd missing.png").left_out,
               ElementsAre(LeftOut{"textures that cannot be read", 1}));
+  EXPECT_THAT(read("map_Kd missing.png").note, HasSubstr("cannot read missing.png"));
   EXPECT_THAT(read("Kd 1 1 1\nmap_Bump -bm 2 a b.png\nmap_d a b.png\nd 0.5").left_out,
               UnorderedElementsAre(LeftOut{"bump maps", 1}, LeftOut{"opacity maps", 1},
                                    LeftOut{"transparency of materials", 1}));
@@ -303,6 +305,7 @@ TEST_F(ObjFiles, WhatIsNotShownIsCounted) {
                                    LeftOut{"free-form curves", 1}, LeftOut{"free-form surfaces", 1},
                                    LeftOut{"unknown statements", 1},
                                    LeftOut{"normals that are not numbers", 1}));
+  EXPECT_EQ(model.note, "cannot read nowhere.mtl, which it names; put it beside the file");
 }
 
 TEST_F(ObjFiles, NumbersThatAreNotNumbersAreRefused) {

@@ -12,6 +12,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "absl/strings/str_split.h"
 #include "absl/strings/string_view.h"
 #include "common/text/printable.h"
@@ -375,7 +376,17 @@ absl::StatusOr<Model> ReadTextPoints(const SourceFile& file, bool attributes) {
   }
   absl::StatusOr<PointTable> table =
       PointTable::Make(file, layout, FullScale(file.bytes, mark, layout.shown));
-  if (!table.ok()) return table.status();
+  if (!table.ok()) {
+    constexpr size_t kMostNamed = 12;
+    std::vector<std::string> named;
+    for (size_t c = 0; c < std::min(columns->size(), kMostNamed); ++c)
+      named.push_back(EscapeForTerminal((*columns)[c].name.substr(0, 40)));
+    return absl::Status(
+        table.status().code(),
+        absl::StrCat(table.status().message(), "; its first line names ",
+                     absl::StrJoin(named, ", "), columns->size() > kMostNamed ? ", …" : "",
+                     "; rename three columns to x, y and z"));
+  }
   table->SetAttributes(std::move(names));
   std::vector<double> values(numbers.size());
   uint64_t beyond = 0, rows = 0;                // words, lines
