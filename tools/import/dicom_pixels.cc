@@ -165,13 +165,13 @@ absl::StatusOr<std::string> Decompress(const SourceFile& file, const DicomFacts&
        .big_endian = false});
 }
 
-// The number to which a table's first entry belongs, which is signed where the pixels are.
+// Returns the number of a table's first entry. It is signed if the pixels are.
 int32_t FirstOf(const DicomFacts& facts, const DicomFacts::Palette& table) {
   const auto bits = static_cast<uint16_t>(table.descriptor[1]);
   return facts.is_signed ? static_cast<int16_t>(bits) : bits;
 }
 
-// Puts entries of a table in place of the numbers that name them.
+// Replaces numbers by the table entries with those numbers; numbers outside the table use its first or last entry.
 void LookUp(const SourceFile& file, const DicomFacts& facts, const DicomFacts::Palette& table,
             float* begin, float* end) {
   const auto& [descriptor, entries] = table;

@@ -15,6 +15,7 @@
 #include "tools/import/dicom_check.h"
 #include "tools/import/volume_samples.h"
 #include "tools/import/volumes.h"
+#include "tools/voxelctl/import/surface_builder.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -29,7 +30,6 @@ constexpr double kSameDirection = 0.999;  // the least cosine between two direct
 Point3 Cross(const Point3& a, const Point3& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-double Inner(const Point3& a, const Point3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 Point3 Times(const Point3& p, double by) { return {p.x * by, p.y * by, p.z * by}; }
 Point3 Less(const Point3& a, const Point3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 
@@ -88,7 +88,7 @@ Slice Locate(const DicomFacts& facts) {
 
 // Returns a place along the normal; 0 if it is too far away to be represented.
 double Along(const Slice& slice, const Point3& place) {
-  const double along = Inner(slice.Normal(), place);
+  const double along = Dot(slice.Normal(), place);
   return std::isfinite(along) ? along : 0;
 }
 
@@ -100,7 +100,7 @@ struct Layer {
   std::vector<double> time;
 };
 
-// Whether frames without places of their own follow each other in time, or differ in something else that is no place.
+// Returns whether frames without positions differ in time or another property, and not in their position.
 bool AreAlternatives(const DicomFacts& facts) {
   constexpr uint32_t kSliceOrder = 0x00540080, kDoseOffsets = 0x3004000C;
   return !facts.frame_axes.empty() &&
@@ -149,7 +149,7 @@ Point3 StepOf(const std::vector<Layer>& layers, const Slice& first, std::string*
       *note = absl::StrCat("its slices are unevenly apart (", nearest, " to ", farthest,
                            "); shown as if they were even");
     const Point3 step = Times(Less(layers.back().place, layers.front().place), 1 / count);
-    if (std::abs(Inner(step, first.Normal())) > 1e-6 * std::sqrt(Inner(step, step))) return step;
+    if (std::abs(Dot(step, first.Normal())) > 1e-6 * std::sqrt(Dot(step, step))) return step;
   }
   const double between = first.between != 0 && std::isfinite(first.between) ? first.between : 1;
   return Times(first.Normal(), between);
@@ -231,8 +231,8 @@ struct Stack {
   bool Takes(const std::string& other_series, const Slice& other) const {
     return series == other_series && first.size[2] == 1 && first.size == other.size &&
            first.channels == other.channels && first.places.empty() == other.places.empty() &&
-           Inner(first.right, other.right) > kSameDirection &&
-           Inner(first.down, other.down) > kSameDirection;
+           Dot(first.right, other.right) > kSameDirection &&
+           Dot(first.down, other.down) > kSameDirection;
   }
 };
 

@@ -9,6 +9,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/escaping.h"
 #include "absl/strings/match.h"
+#include "tools/voxelctl/import/surface_builder.h"
 
 namespace voxeld::voxelctl {
 namespace {
@@ -16,8 +17,6 @@ namespace {
 constexpr uint32_t kNoVertex = UINT32_MAX;
 constexpr double kSameNormal = 0.9999;  // cosine between normals that one vertex may have
 constexpr int kMostCopies = 8;          // copies of a vertex that are searched for a normal
-
-double Dot(const Point3& a, const Point3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
 // The length of the result is twice the area.
 Point3 AreaNormal(const Point3& a, const Point3& b, const Point3& c) {

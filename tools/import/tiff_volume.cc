@@ -100,7 +100,7 @@ struct Description {
   std::optional<std::array<double, 3>> spacing;
   std::optional<double> depth;  // in the unit of the resolution
   uint64_t images = 0;          // pages that the description counts; 0: it does not
-  // Where pages lie by OME's elements TiffData: the slice, channel and time of each page that they name.
+  // The slice, channel and time of each page that OME's elements TiffData name.
   std::map<uint64_t, std::array<uint64_t, 3>> places;
 };
 
@@ -143,9 +143,10 @@ absl::string_view OmeAttribute(absl::string_view pixels, absl::string_view name)
   return value.substr(0, value.find('"'));
 }
 
-// Takes the elements TiffData of the first Pixels: from page IFD on, PlaneCount pages follow each other in the order of the dimensions.
+// Reads the elements TiffData of the first Pixels. Each describes PlaneCount pages from page IFD on, in the order of the dimensions.
 void TakeTiffData(absl::string_view text, Description* found) {
   constexpr uint64_t kMostPlaces = 65536;
+  uint64_t left = kMostPlaces;  // of all elements, which may name one page again and again
   const std::array<uint64_t, 3> sizes = {found->slices, found->channels, found->times};
   text = text.substr(0, text.find("</Pixels>"));
   constexpr absl::string_view kElement = "<TiffData";
@@ -160,11 +161,10 @@ void TakeTiffData(absl::string_view text, Description* found) {
     std::array<uint64_t, 3> place = {number("FirstZ", 0), number("FirstC", 0), number("FirstT", 0)};
     const bool has_page = !OmeAttribute(element, "IFD").empty();
     const uint64_t page = number("IFD", next);
-    // Without a page or a count it is about all pages.
+    // Without a page and a count it describes all pages.
     uint64_t count = number("PlaneCount", has_page ? 1 : kMostPlaces);
-    for (; count > 0 && found->places.size() < kMostPlaces; --count, ++next) {
+    for (next = page; count > 0 && left > 0; --count, --left, ++next) {
       if (place[0] >= sizes[0] || place[1] >= sizes[1] || place[2] >= sizes[2]) break;
-      if (next < page) next = page;
       found->places[next] = place;
       for (const char axis : found->order) {
         const size_t i = axis == 'Z' ? 0 : axis == 'C' ? 1 : 2;
@@ -326,7 +326,7 @@ class TiffReader {
     return FromOme(description).value_or(Description());
   }
 
-  // The pages of the first channel at the first time, by slices, where the description names the place of each; else none.
+  // Returns the pages of the first channel and time in the order of their slices; empty unless the description names every page.
   static std::vector<size_t> PlacedPages(const Description& description, size_t pages) {
     if (description.places.size() != pages) return {};
     std::map<uint64_t, size_t> by_slice;

@@ -47,7 +47,7 @@ class Upload {
   // Returns when the asset is stored, or when there was no progress for the patience.
   absl::Status Run() {
     uint64_t stored = 0;
-    bool anew = false;  // the stored part is wrong: start again from 0
+    bool restart = false;  // the stored part is wrong: start again from 0
     absl::Status last = absl::UnavailableError("the server does not answer");
     Clock::time_point moved = Clock::now();
     for (;; std::this_thread::sleep_for(kPause)) {
@@ -56,13 +56,13 @@ class Upload {
         if (there->assets(0).complete()) return absl::OkStatus();
         if (there->assets(0).stored() > stored) moved = Clock::now();
         stored = there->assets(0).stored();
-        const uint64_t from = anew || stored >= bytes_.size() ? 0 : stored;
+        const uint64_t from = restart || stored >= bytes_.size() ? 0 : stored;
         last = Send(
             from, std::max<uint64_t>(1, std::min<uint64_t>(kPieceBytes, there->max_piece_bytes())));
         if (last.ok()) return last;
         // Another client began this part with other bytes: send all of it once more.
         if (absl::IsDataLoss(last) && from > 0) {
-          anew = true;
+          restart = true;
           continue;
         }
       } else if (!there.ok()) {

@@ -242,9 +242,9 @@ std::vector<std::pair<std::shared_ptr<const Transaction>, std::string>> Outbox::
     std::vector<Operation> operations = transaction->operations;
     const std::vector<Oversized> oversized = TakeOversized(most_bytes, &operations);
     if (oversized.empty() && !operations.empty()) {
-      const std::shared_ptr<Transaction> anew =
+      const std::shared_ptr<Transaction> fresh =
           MakeTransaction(std::move(operations), {}, most_bytes);
-      transaction->pieces = std::move(anew->pieces);
+      transaction->pieces = std::move(fresh->pieces);
       waiting_bytes_ += BytesOf(*transaction);
       ++it;
       continue;

@@ -175,7 +175,7 @@ class Unit:
         self.operations = list(operations)
         self.commit = commit
         self.on_accepted = on_accepted
-        self.restores = restores  # it sends anew what had been accepted
+        self.restores = restores  # it sends accepted content again
         self.drops = 0            # frames given up before it was sent: what its commit reports
         self.weigh()
         self.forget_sending()

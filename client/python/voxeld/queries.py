@@ -122,7 +122,7 @@ class Queries:
                                scene_pb2.ListAssetsResponse.FromString)
         send = call.stream_unary(_SCENE + "UploadAsset", scene_pb2.UploadAssetRequest.SerializeToString,
                                  scene_pb2.UploadAssetResponse.FromString)
-        stored, anew, moved = 0, False, time.monotonic()
+        stored, restart, moved = 0, False, time.monotonic()
         while True:
             start = 0
             try:
@@ -134,12 +134,12 @@ class Queries:
                 if there.stored > stored:
                     moved = time.monotonic()
                 stored = there.stored
-                start = 0 if anew or stored >= len(data) else stored
+                start = 0 if restart or stored >= len(data) else stored
                 send(_upload_pieces(data, asset, start, min(_PIECE_BYTES, answer.max_piece_bytes), progress), metadata=self._metadata)
                 return asset
             except grpc.RpcError as error:
                 if error.code() == grpc.StatusCode.DATA_LOSS and start > 0:
-                    anew = True  # a part that somebody began with other bytes
+                    restart = True  # the stored part has other bytes
                 elif error.code() not in _GOES_ON or time.monotonic() - moved >= patience:
                     raise _failed(error) from None
             time.sleep(0.1)

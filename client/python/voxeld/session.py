@@ -62,14 +62,14 @@ class Session:
         self.open = False                      # a stream stands, and its Opened has come
         self.streams_opened = 0
         self.resumed = 0
-        self.restored = 0                      # how often the scene was sent anew
-        self.answered = 0                      # commits; those that send the scene anew do not count
+        self.restored = 0                      # how often the scene was sent again
+        self.answered = 0                      # commits; commits that send the scene again do not count
         self.on_issue: Callable[[Issue], None] = lambda issue: None  # called with what is refused, here or there
         self.done: Done = resolve              # resolves the futures that others have of frames
         self._next_frame = settings.first_frame
         self._again: Deque[Unit] = deque()    # to be sent before what waits in the outbox
         self._current: Optional[Unit] = None  # being sent
-        self._restore_due = False             # a scene was being sent anew and was not whole when the stream ended
+        self._restore_due = False             # the stream ended while the scene was being sent again
         self._owed: list[Frame] = []          # accepted before the session was taken up, without their outcomes
         self._owed_until_ns = 0
         self._begin_stream()

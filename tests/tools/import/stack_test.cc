@@ -568,6 +568,11 @@ TEST_F(Volumes, TiffPagesWhereOmePutsThem) {
                     times),
               ElementsAre('d', 'b'));
   EXPECT_THAT(stack("<TiffData/>", times), ElementsAre('a', 'b'));
+  // Elements may name pages in any order, and one without a page continues the element before.
+  EXPECT_THAT(stack("<TiffData IFD=\"2\" FirstZ=\"0\" PlaneCount=\"2\"/>"
+                    "<TiffData IFD=\"0\" FirstZ=\"2\"/><TiffData FirstZ=\"3\"/>",
+                    deep),
+              ElementsAre('c', 'd', 'a', 'b'));
   // A text that does not name all pages, or names a slice that does not exist, is ignored.
   EXPECT_THAT(stack("<TiffData IFD=\"0\" FirstZ=\"3\"/>", deep), ElementsAre('a', 'b', 'c', 'd'));
   EXPECT_THAT(stack("<TiffData IFD=\"0\" FirstZ=\"9\"/>", deep), ElementsAre('a', 'b', 'c', 'd'));

@@ -65,6 +65,8 @@ Corner SurfaceBuilder::VertexAt(uint32_t vertex) const {
   return {part_.positions[vertex], part_.normals[vertex], colored_ ? part_.colors[vertex] : Rgb{}};
 }
 
+double Dot(const Point3& a, const Point3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+
 Point3 UnitOrZero(const Point3& v) {
   const double length = std::hypot(v.x, v.y, v.z);
   if (!(length > 1e-12) || !std::isfinite(length)) return {};

@@ -41,6 +41,8 @@ class SurfaceBuilder {
 // Returns a unit vector; zero without a direction.
 Point3 UnitOrZero(const Point3& v);
 
+double Dot(const Point3& a, const Point3& b);
+
 // Returns a triangle's unit normal by its winding; zero if it has no area.
 Point3 FacetNormal(const Point3& a, const Point3& b, const Point3& c);
 
