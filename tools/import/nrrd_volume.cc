@@ -347,7 +347,7 @@ class NrrdReader {
 
   absl::Status ReadSamples(absl::string_view data, SampledVolume* volume) const {
     std::vector<float> numbers;
-    // Of the first volume.
+    // The samples of the first volume.
     const uint64_t samples = size_[0] * size_[1] * size_[2] * (AreColorPlanes() ? volumes_ : each_);
     const uint64_t wanted = samples * SampleBytes(code_.type);
     if (encoding_ == "gzip") return ReadCompressed(data, wanted, volume);

@@ -30,7 +30,7 @@ struct Field {
   uint32_t size = 0;   // of one value
   char type = 'F';     // I, U, F
   uint32_t count = 1;  // values of each point
-  // What its first value is, and which of a point's attributes.
+  // The role of its first value, and the index among the attributes of a point.
   std::optional<PointColumn> shown;
   std::optional<size_t> attribute;
 };
@@ -272,7 +272,7 @@ absl::string_view TakeWordOf(absl::string_view* line) {
   return word;
 }
 
-// What the data have and points do not.
+// Counts of what the data contain besides points.
 struct Surplus {
   uint64_t points = 0;  // beyond the header's number
   uint64_t words = 0;   // of lines, beyond the fields

@@ -79,7 +79,7 @@ absl::StatusOr<std::vector<std::string>> Command(const std::vector<std::string>&
                                                  const std::vector<std::string>& more) {
   std::string program = FindProgram();
   if (program.empty()) {
-    // What is wrong with a file of any type comes first.
+    // Errors of the files themselves, such as a missing one, come before the missing program.
     for (const std::string& path : paths) {
       std::error_code ignored;
       if (std::filesystem::is_directory(path, ignored)) continue;

@@ -73,7 +73,7 @@ struct PlyVertices {
   std::vector<Rgb> colors;            // or none
   std::vector<uint32_t> unknown;      // which colors are not finite in the file, in ascending order
   std::vector<float> intensities;     // or none
-  std::vector<Attribute> attributes;  // the other properties that are no lists, if they are wanted
+  std::vector<Attribute> attributes;  // the other scalar properties, if requested
   uint64_t others = 0;                // properties that are not there
 };
 

@@ -35,7 +35,7 @@ enum class PointColumn : uint8_t {
 };
 inline constexpr size_t kPointColumns = 10;  // of a row
 using PointRow = std::array<double, kPointColumns>;
-// What each column of a file is; nothing: another number.
+// The role of each column of a file; nullopt: another number.
 using PointColumns = std::vector<std::optional<PointColumn>>;
 
 // Finds columns by the names that files use, in any case: "x", "easting", "nx", "normal_x", "r", "red", "diffuse_red", "i", "intensity", …
@@ -72,7 +72,7 @@ class ChannelRange {
 
 // Returns: the colour whose channels are these parts of full brightness, or nothing if one is not finite.
 std::optional<Rgb> ColorOfChannels(double red, double green, double blue);
-// What is shown instead, and what it is counted as.
+// The substitute that is shown, and the kind under which it is counted.
 inline constexpr Rgb kUnknownColor = {255, 255, 255};
 inline constexpr std::string_view kUnknownColors =
     "colours and intensities that are not a number (shown white)";
@@ -83,7 +83,7 @@ std::vector<Rgb> GreysOf(std::span<const float> intensities, uint64_t* unknown);
 // Returns: the number that a word in a text is, with a sign or without; nothing if it is not one.
 std::optional<double> NumberOfWord(absl::string_view word);
 
-// Rows become points: intensities become greys where there are no colours, stretched from the least to
+// Converts rows to points. Intensities become greys where there are no colours, stretched from the least to
 // the greatest.
 class PointTable {
  public:
